@@ -1,0 +1,9 @@
+"""What can go wrong, each with one clear sentence."""
+
+
+class InputError(ValueError):
+    """A value that makes no sense: says what was given, what is expected and the valid names."""
+
+
+class SimulationError(RuntimeError):
+    """A physical simulation that did not settle or diverged; it is never counted as an outcome."""

@@ -1,0 +1,107 @@
+"""The stick insect: the MJCF compiled once, and its names turned into indices in one place.
+
+Units mm, g, s, rad; forces in g mm/s^2.  Joints, actuators and the columns of `ctrl` come leg by leg
+in the order of `LEGS`, each leg's joints in the order of `JOINTS`: ``qpos[ROOT_QPOS:]`` and ``ctrl``
+reshape to (leg, joint).
+"""
+
+import copy
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.kinematics import LegDimensions
+from hexmj.legs import LEGS, SIDE
+
+JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
+"""A leg's joints from the body outwards; their angles are protraction, levation, the knee's inner angle."""
+
+TRUNK = ("head", "prothorax", "mesothorax", "metathorax", "abdomen")
+"""Parts of the body that can touch the ground, from front to rear; also names of bodies and geoms."""
+
+ROOT_QPOS = 7
+"""Numbers of `qpos` before the joints: the root's position (3) and unit quaternion (4)."""
+
+ROOT_QVEL = 6
+"""Numbers of `qvel` before the joints: the root's velocity (3) and angular velocity (3)."""
+
+LONGEST_STEP = 0.001
+"""The longest time step [s] that the gains and contacts of the MJCF allow."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Columns of `sensordata`: ``data[..., sensors.touch]`` is (..., leg)."""
+
+    foot: slice
+    """Feet in the world, (..., leg * axis) [mm]; reshape to (leg, 3)."""
+    touch: slice
+    """Normal force of the ground on each foot, (..., leg) [g mm/s^2]."""
+    trunk: slice
+    """Number of contacts of each part in `TRUNK` with the ground, (..., part)."""
+    centre_of_mass: slice
+    """Centre of mass of the whole insect in the world, (..., axis) [mm]."""
+
+
+def load(timestep: float = 0.001, friction: float = 1.0) -> mujoco.MjModel:
+    """The compiled insect on its plane; every call gives a copy of its own.
+
+    Args:
+        timestep: integration step [s], at most the 0.001 that gains and contacts are made for.
+        friction: coefficient of sliding friction between the ground and feet or trunk.
+    """
+    if not 0 < timestep <= LONGEST_STEP:
+        raise InputError(f"timestep = {timestep} s; expected above 0 and at most {LONGEST_STEP} s")
+    if not 0 <= friction < math.inf:
+        raise InputError(f"friction = {friction}; expected a finite number, at least 0")
+    model = copy.copy(_compiled())
+    model.opt.timestep = timestep
+    model.geom_friction[:, 0] = friction
+    return model
+
+
+def mjcf() -> str:
+    """The insect's MJCF text."""
+    packaged = files("hexmj") / "assets"
+    folder = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
+    return (folder / "stick_insect.xml").read_text(encoding="utf-8")
+
+
+def sensors(model: mujoco.MjModel) -> Sensors:
+    """Where the insect's sensors lie in the model's `sensordata`."""
+
+    def columns(first: str, last: str) -> slice:
+        end = model.sensor(last)
+        return slice(int(model.sensor(first).adr[0]), int(end.adr[0] + end.dim[0]))
+
+    return Sensors(
+        foot=columns(f"{LEGS[0]}_foot", f"{LEGS[-1]}_foot"),
+        touch=columns(f"{LEGS[0]}_touch", f"{LEGS[-1]}_touch"),
+        trunk=columns(f"{TRUNK[0]}_ground", f"{TRUNK[-1]}_ground"),
+        centre_of_mass=columns("centre_of_mass", "centre_of_mass"),
+    )
+
+
+def dimensions(model: mujoco.MjModel) -> LegDimensions:
+    """The legs' geometry, read from the compiled model."""
+    ranges = [[model.joint(f"{leg}_{joint}").range for joint in JOINTS] for leg in LEGS]
+    return LegDimensions(
+        coxa_position=np.array([model.body(f"{leg}_coxa").pos for leg in LEGS]),
+        coxa=np.array([model.body(f"{leg}_femur").pos[0] for leg in LEGS]),
+        femur=np.array([model.body(f"{leg}_tibia").pos[0] for leg in LEGS]),
+        tibia=np.array([model.site(f"{leg}_foot").pos[0] for leg in LEGS]),
+        foot=float(model.geom(f"{LEGS[0]}_foot").size[0]),
+        side=np.array(SIDE, dtype=np.float64),
+        joint_range=np.array(ranges),
+    )
+
+
+@cache
+def _compiled() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(mjcf())

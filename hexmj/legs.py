@@ -1,0 +1,57 @@
+"""The six legs: numbering, sides, neighbours (paper, Section 2) and Fig. 1's geometry.
+
+The only place that knows which leg is which.  Index ``i`` of every ``leg`` axis is the
+paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
+"""
+
+from dataclasses import dataclass
+
+LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
+"""Names by index: side, then segment from front (1) to rear (3)."""
+
+SIDE = (1, 1, 1, -1, -1, -1)
+"""Sign of the leg's y coordinate: left is positive."""
+
+MIRROR = (3, 4, 5, 0, 1, 2)
+"""Index of the contralateral leg of the same segment."""
+
+N1: tuple[tuple[int, ...], ...] = ((1, 3), (2, 4), (5,), (4, 0), (5, 1), (2,))
+"""Mechanism 1 acts on leg ``d`` from the legs ``N1[d]``: ipsilateral rear, contralateral."""
+
+N2: tuple[tuple[int, ...], ...] = ((1,), (2,), (), (4,), (5,), ())
+"""Mechanism 2: ipsilateral rear leg."""
+
+N3: tuple[tuple[int, ...], ...] = ((3,), (0, 4), (1, 5), (0,), (3, 1), (4, 2))
+"""Mechanism 3: ipsilateral anterior leg, contralateral."""
+
+N4: tuple[tuple[int, ...], ...] = ((), (0,), (1,), (), (3,), (4,))
+"""Mechanism 4: ipsilateral anterior leg."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The lines on which the tips move, seen from above (Fig. 1)."""
+
+    origins: tuple[float, float, float] = (28.0, 4.0, -20.0)
+    """Origins O_1, O_2, O_3 of the leg axes ahead of the centre of mass [mm]; inferred from Fig. 1's D4, D5, D6."""
+    lateral: tuple[float, float, float] = (18.0, 20.0, 15.0)
+    """Distance of the lines of legs 1, 2, 3 from the body axis [mm]; Fig. 1's D1, D2, D3."""
+
+    @property
+    def origin(self) -> tuple[float, ...]:
+        """Origin O_i of each leg's axis ahead of the centre of mass, (leg,) [mm]."""
+        return self.origins * 2
+
+    @property
+    def y(self) -> tuple[float, ...]:
+        """Signed distance of each leg's line from the body axis, (leg,) [mm]."""
+        return tuple(side * y for side, y in zip(SIDE, self.lateral * 2, strict=True))
+
+
+FIG1 = Geometry()
+"""Our reading of Fig. 1: D4 = O_1 - O_2, D5 = O_2 - O_3, D6 = centre of mass ahead of O_3."""
+
+CENTRED = Geometry(origins=(24.0, 0.0, -24.0))
+"""The other reading: centre of mass above O_2, D6 = step range.  Fits the paper almost as well."""
+
+GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}

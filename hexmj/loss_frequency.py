@@ -1,0 +1,153 @@
+"""FLSS, the frequency of the loss of static stability (paper, Section 3): starts, windows, I_N and J_N."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.network import first_loss
+from hexmj.parameters import Acceleration, Model, Network
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WINDOWS = ("walk", "start")
+SAMPLE = 1000
+"""Starts of one sample of the paper's protocol; it takes seven of them."""
+
+
+def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndarray:
+    """Starts drawn uniformly from S: all legs stand between PEP_0 and AEP_0 (Section 3).
+
+    Returns:
+        (start, leg) [mm].  The first k of n starts are the same for every n.
+    """
+    network = network or Network()
+    if size < 1:
+        raise InputError(f"starts = {size}; expected at least 1")
+    if seed < 0:
+        raise InputError(f"seed = {seed}; expected an integer of at least 0")
+    return np.random.default_rng(seed).uniform(network.pep0, network.aep0, (size, 6))
+
+
+def observation_time(
+    window: str | float, velocity: np.ndarray, network: Network, acceleration: Acceleration | None = None
+) -> np.ndarray:
+    """The time t of Eq. 7 for each velocity [time units], which the paper leaves open.
+
+    'walk' is three periods of a single leg oscillator, 3 (AEP_0 - PEP_0) (1 + 1/V); 'start' is
+    2 (AEP_0 - PEP_0) / V_p.  When accelerating, a named window is counted from the time at which V is
+    reached; a number is always the whole time.
+    """
+    v = np.asarray(velocity, dtype=float)
+    if not isinstance(window, str):
+        return np.full(v.shape, float(window))
+    if window not in WINDOWS:
+        raise InputError(f"window = {window!r}; valid names: {', '.join(WINDOWS)}, or a number of time units")
+    stride = network.aep0 - network.pep0
+    if window == "walk" and not (v > 0).all():
+        raise InputError("velocity = 0 has no period; expected V > 0 with the window 'walk'")
+    time = 3.0 * stride * (1.0 + 1.0 / v) if window == "walk" else np.full(v.shape, 2.0 * stride)
+    return time + (v - acceleration.start) / acceleration.rate if acceleration else time
+
+
+def wilson_interval(lost: int, size: int) -> tuple[float, float]:
+    """The 95 % Wilson interval of a frequency, from `lost` losses in `size` starts."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(lost, size).proportion_ci(0.95, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def flss(
+    model: Model,
+    velocities: Sequence[float],
+    *,
+    starts: int = 7 * SAMPLE,
+    window: str | float = "walk",
+    seed: int = 0,
+    network: Network | None = None,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
+
+    Args:
+        model: coupling weights.
+        velocities: V_r (when accelerating, its final value), each 0 <= V < 1.
+        starts: N.
+        window: 'walk', 'start' or the observation time itself [time units].
+        seed: of the starts.
+        network: the constants that the paper leaves out.
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+
+    Returns:
+        `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples of 1000
+        starts, the observation time `duration` and every start's `loss_time`.
+    """
+    network = network or Network()
+    v = checked_list(velocities)
+    x = draw_starts(starts, seed, network)
+    duration = observation_time(window, v, network, acceleration)
+    lost = [
+        first_loss(x, model, one, t, network=network, acceleration=acceleration, threads=threads)
+        for one, t in zip(v, duration, strict=True)
+    ]
+    return frequency_table(np.array(lost), v, duration)
+
+
+def flss_over_range(
+    model: Model,
+    low: float,
+    high: float,
+    *,
+    starts: int = 7 * SAMPLE,
+    window: str | float = "walk",
+    seed: int = 0,
+    network: Network | None = None,
+    threads: int | None = None,
+) -> tuple[float, tuple[float, float]]:
+    """J_N^t of Eq. 10 with its 95 % interval: each start has a velocity of its own, uniform on [low, high]."""
+    network = network or Network()
+    if not 0 <= low <= high < 1:
+        raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
+    x = draw_starts(starts, seed, network)
+    v = np.random.default_rng([seed, 1]).uniform(low, high, starts)
+    lost = first_loss(x, model, v, observation_time(window, v, network), network=network, threads=threads)
+    count = int(np.isfinite(lost).sum())
+    return count / starts, wilson_interval(count, starts)
+
+
+def checked_list(velocities: Sequence[float]) -> np.ndarray:
+    """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
+    v = np.array(velocities, dtype=float)
+    if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
+        raise InputError(f"velocities = {list(velocities)}; expected at least one, and none of them twice")
+    if not ((v >= 0) & (v < 1)).all():
+        raise InputError(f"velocities = {v.tolist()}; expected 0 <= V < 1, fractions of V_p")
+    return v
+
+
+def frequency_table(loss_time: np.ndarray, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
+    """FLSS with its intervals, from the time of every loss, (velocity, start) [time units], inf for none."""
+    import xarray as xr
+
+    lost = np.isfinite(loss_time)
+    size = lost.shape[1]
+    intervals = np.array([wilson_interval(int(row.sum()), size) for row in lost])
+    samples = lost[:, : size // SAMPLE * SAMPLE].reshape(len(lost), -1, SAMPLE).mean(axis=2)
+    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(lost), np.nan)
+    unit = {"units": "1"}
+    return xr.Dataset(
+        {
+            "flss": ("velocity", lost.mean(axis=1), unit | {"long_name": "frequency of the loss of static stability"}),
+            "low": ("velocity", intervals[:, 0], unit | {"long_name": "lower end of the 95 % Wilson interval"}),
+            "high": ("velocity", intervals[:, 1], unit | {"long_name": "upper end of the 95 % Wilson interval"}),
+            "sample_sd": ("velocity", spread, unit | {"long_name": "standard deviation over samples of 1000 starts"}),
+            "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
+            "loss_time": (("velocity", "start"), loss_time, {"units": "time unit", "long_name": "first loss, or inf"}),
+        },
+        coords={"velocity": ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})},
+    )

@@ -1,0 +1,272 @@
+"""Coupling weights (paper, Section 2 and Appendix A), presets, and the constants of the network.
+
+Letters follow the paper: ``p1`` is P^1 up to ``p4`` for P^4, ``p31`` ... ``p34`` are
+P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
+"""
+
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.legs import FIG1, N1, N2, N3, N4, Geometry
+
+NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
+"""Kind of weight -> for each destination leg the legs that act on it."""
+
+BINARY = ("p2", "p4")
+
+
+def _pairs(kind: str) -> list[tuple[int, int]]:
+    """All (destination, source) pairs of one kind of weight, in the paper's order."""
+    return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
+
+
+def _kinds(size: int, with_velocity: int) -> list[str]:
+    """Kinds of weight in a vector of `size` numbers; the short form leaves out P^{3,4}."""
+    return [kind for kind in NEIGHBOURS if kind != "p34" or size == with_velocity]
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """General weights P_{d,e} of each destination leg d and source leg e: 58 numbers, 48 where p34 = 0.
+
+    Every field is a (destination leg, source leg) array that is zero off the paper's
+    neighbour sets N^1 ... N^4.
+    """
+
+    p1: np.ndarray
+    """Mechanism 1: shift of the PEP while the source protracts [mm]."""
+    p2: np.ndarray
+    """Mechanism 2: 0 or 1."""
+    p31: np.ndarray
+    """Mechanism 3: neutral position at V_r = 0 [mm]."""
+    p32: np.ndarray
+    """Mechanism 3: weight behind the neutral position."""
+    p33: np.ndarray
+    """Mechanism 3: weight ahead of the neutral position."""
+    p34: np.ndarray
+    """Mechanism 3: change of the neutral position with V_r [mm]."""
+    p4: np.ndarray
+    """Mechanism 4: 0 or 1."""
+
+    def __post_init__(self) -> None:
+        for kind in NEIGHBOURS:
+            matrix = np.array(getattr(self, kind), dtype=float)
+            if matrix.shape != (6, 6):
+                raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
+            if not np.isfinite(matrix).all():
+                raise InputError(f"{kind} holds a number that is not finite; expected finite weights")
+            allowed = np.zeros((6, 6), dtype=bool)
+            allowed[tuple(np.transpose(_pairs(kind)))] = True
+            if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
+                d, e = stray[0] + 1
+                raise InputError(f"{kind} of leg {d} from leg {e} is not 0, but leg {e} is no neighbour there")
+            if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
+                raise InputError(f"{kind} is binary in the paper: expected only 0 or 1")
+            matrix.setflags(write=False)
+            object.__setattr__(self, kind, matrix)
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
+        """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
+        size = len(vector)
+        if size not in (48, 58):
+            raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
+        values = iter(vector)
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for kind in _kinds(size, 58):
+            for pair in _pairs(kind):
+                matrices[kind][pair] = next(values)
+        return cls(**matrices)
+
+    def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
+        """The inverse of `from_vector`."""
+        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in _pairs(kind)])
+
+
+@dataclass(frozen=True)
+class Symmetric:
+    """Weights with the symmetries of Appendix A: ten numbers (LDVS), nine where p34_i = 0 (HWS)."""
+
+    p1_i: float = 0.0
+    """P_i^1: shift of the PEP while the ipsilateral rear leg protracts [mm]."""
+    p1_c: float = 0.0
+    """P_c^1: shift of the PEP while the contralateral leg protracts [mm]."""
+    p2: float = 0.0
+    """P^2: mechanism 2 off (0) or on (1)."""
+    p31_i: float = 0.0
+    """P_i^{3,1}: ipsilateral neutral position at V_r = 0 [mm]."""
+    p32_i: float = 0.0
+    """P_i^{3,2}: ipsilateral weight behind the neutral position."""
+    p33_i: float = 0.0
+    """P_i^{3,3}: ipsilateral weight ahead of the neutral position."""
+    p34_i: float = 0.0
+    """P_i^{3,4}: change of the ipsilateral neutral position with V_r [mm]."""
+    p31_c: float = 0.0
+    """P_c^{3,1}: contralateral neutral position [mm]."""
+    p32_c: float = 0.0
+    """P_c^{3,2} = P_c^{3,3}: contralateral weight of mechanism 3."""
+    p4_i: float = 0.0
+    """P_i^4: mechanism 4 off (0) or on (1)."""
+
+    def __post_init__(self) -> None:
+        for key, value in asdict(self).items():
+            if not math.isfinite(value):
+                raise InputError(f"{key} = {value}; expected a finite number")
+            if key in ("p2", "p4_i") and value not in (0, 1):
+                raise InputError(f"{key} = {value}; it is binary in the paper: expected 0 or 1")
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
+        """Read ten numbers in the order of the fields, or nine without p34_i."""
+        names = [f.name for f in fields(cls)]
+        if len(vector) == 9:
+            names.remove("p34_i")
+        elif len(vector) != 10:
+            raise InputError(f"{len(vector)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
+        return cls(**{name: float(value) for name, value in zip(names, vector, strict=True)})
+
+    def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
+        """The inverse of `from_vector`."""
+        return np.array([v for key, v in asdict(self).items() if key != "p34_i" or size == 10])
+
+    def expand(self) -> Weights:
+        """Appendix A: the general weights, equal on both sides and along each side."""
+        by_kind = {
+            "p1": (self.p1_i, self.p1_c),
+            "p2": (self.p2, 0.0),
+            "p31": (self.p31_i, self.p31_c),
+            "p32": (self.p32_i, self.p32_c),
+            "p33": (self.p33_i, self.p32_c),
+            "p34": (self.p34_i, 0.0),
+            "p4": (self.p4_i, 0.0),
+        }
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for kind, (ipsilateral, contralateral) in by_kind.items():
+            for d, e in _pairs(kind):
+                matrices[kind][d, e] = contralateral if abs(d - e) == 3 else ipsilateral
+        return Weights(**matrices)
+
+
+Model = Symmetric | Weights
+
+HWS = Symmetric(
+    p1_i=10.85, p1_c=6.73, p31_i=-2.48, p32_i=4.75, p33_i=0.191, p31_c=-0.34, p32_c=0.09, p4_i=1.0
+)
+"""The hard-wired system: printed in the caption of Fig. 3; P^2 and P^4 from Section 5.1.1."""
+
+LDVS = Symmetric(
+    p1_i=11.998, p1_c=5.999, p31_i=-9.32, p32_i=6.23, p33_i=0.083, p34_i=16.058, p31_c=-2.063, p32_c=0.081, p4_i=1.0
+)
+"""The linearly velocity-dependent system: printed in the caption of Fig. 4."""
+
+UNCOORDINATED = Symmetric()
+"""No coordinating mechanism."""
+
+PRESETS: dict[str, Model] = {"hws": HWS, "ldvs": LDVS, "uncoordinated": UNCOORDINATED}
+
+
+@dataclass(frozen=True)
+class Network:
+    """Constants of the network that the paper leaves out; the defaults are inferred (README, table)."""
+
+    aep0: float = 10.0
+    """Anterior extreme position without influences, on each leg's own axis [mm]."""
+    pep0: float = -10.0
+    """Posterior extreme position without influences [mm]."""
+    pep_min: float = -20.0
+    """Rearmost posterior extreme position [mm]."""
+    dt: float = 0.1
+    """Time step of Eq. 6 [time units; in one, a protracting tip moves 1 mm]."""
+    order: Literal["printed", "undelayed", "sequential"] = "printed"
+    """Order of updates: 'printed', all legs at once, PEP(t+dt) from Delta(t) as Eq. 6 has it; 'undelayed', from
+    Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
+    geometry: Geometry = field(default=FIG1)
+    """Lines of the tips: 'fig1', or 'centred' with the centre of mass above O_2."""
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(v) for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
+            raise InputError(f"aep0, pep0, pep_min and dt must be finite; given {self}")
+        if not self.pep_min <= self.pep0 < self.aep0:
+            raise InputError(
+                f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"
+            )
+        if not 0 < self.dt <= 1:
+            raise InputError(f"dt = {self.dt}; expected a time step above 0 and at most 1 time unit")
+        if self.order not in (orders := ("printed", "undelayed", "sequential")):
+            raise InputError(f"order = {self.order!r}; valid names: {', '.join(orders)}")
+
+
+@dataclass(frozen=True)
+class Acceleration:
+    """The accelerating procedure, Eq. 11: V_r grows from `start` with `rate` up to the velocity of the walk."""
+
+    rate: float = 0.00008
+    """a [1 / time unit]; the paper's 0.00008."""
+    start: float = 0.1
+    """V_r(0), as a fraction of V_p; inferred."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"acceleration = {self.rate}; expected a finite number above 0 per time unit")
+        if not 0 <= self.start < 1:
+            raise InputError(f"velocity at the start = {self.start}; expected 0 <= V_r(0) < 1")
+
+
+def weights(model: Model) -> Weights:
+    """The general weights of either form."""
+    return model.expand() if isinstance(model, Symmetric) else model
+
+
+def load_model(name: str) -> Model:
+    """A preset by its name, or the model in a TOML file.
+
+    The file holds either a table ``[symmetric]`` with fields of `Symmetric`, or tables
+    ``[weights.p1]`` ... ``[weights.p4]`` with keys ``"d,e"`` (the paper's leg numbers).
+
+    Raises:
+        InputError: no such preset or file, or a key, type or value that makes no sense.
+    """
+    if name in PRESETS:
+        return PRESETS[name]
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(f"model {name!r} is neither a preset ({', '.join(PRESETS)}) nor a TOML file that exists")
+    try:
+        table = tomllib.loads(path.read_text())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path} cannot be read as TOML: {error}") from None
+    if list(table) == ["symmetric"]:
+        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{path} [symmetric]"))
+    if list(table) == ["weights"] and isinstance(table["weights"], dict):
+        return _read_weights(table["weights"], str(path))
+    raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
+
+
+def _read_weights(table: dict[str, object], where: str) -> Weights:
+    if unknown := set(table) - set(NEIGHBOURS):
+        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
+    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+    for kind, entries in table.items():
+        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in _pairs(kind)}
+        for key, value in _numbers(entries, list(keys), f"{where} [weights.{kind}]").items():
+            matrices[kind][keys[key]] = value
+    return Weights(**matrices)
+
+
+def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
+    """The entries of a TOML table, all of which must be numbers with valid keys."""
+    if not isinstance(table, dict):
+        raise InputError(f"{where} is {table!r}; expected a table with the keys {', '.join(valid)}")
+    for key, value in table.items():
+        if key not in valid:
+            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"{where}: {key} = {value!r}; expected a number")
+    return {key: float(value) for key, value in table.items()}

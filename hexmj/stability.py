@@ -1,0 +1,105 @@
+"""Static stability (paper, Section 3): support polygon, signed stability margin, first loss.
+
+The general polygon, for planned and measured walks alike.  The compiled network decides stability in
+the same pass by a closed form that holds for the paper's geometry (`hexmj.network`); a test holds the
+two against each other.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from hexmj.threads import run_blocks
+from hexmj.walks import Walk
+
+
+def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = None) -> np.ndarray:
+    """Signed distance from the centre of mass to the nearest edge of the support polygon.
+
+    Args:
+        feet: tips seen from the projected centre of mass, (..., leg, 2) [mm].
+        stance: which of them stand, (..., leg).
+        threads: one per core unless given.
+
+    Returns:
+        (...) [mm]: positive if and only if the centre of mass lies strictly within the polygon (Section 3),
+        negative outside, where fewer than three feet stand too; -inf where none does.
+    """
+    points = np.ascontiguousarray(feet, dtype=float)
+    stands = np.ascontiguousarray(stance, dtype=bool)
+    shape = stands.shape[:-1]
+    points, stands = points.reshape(-1, *points.shape[-2:]), stands.reshape(-1, stands.shape[-1])
+    margin = np.empty(len(points))
+
+    def work(begin: int, end: int) -> None:
+        _margins(points[begin:end], stands[begin:end], margin[begin:end])
+
+    run_blocks(work, len(points), 4096, threads)
+    return margin.reshape(shape)
+
+
+def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
+    """The stability margin after each step, (step, start) [mm]; NaN where the walk is unknown (after a fall)."""
+    margin = stability_margin(walk.feet, walk.stance, threads)
+    return np.where(np.isnan(walk.x).any(axis=-1), np.nan, margin)
+
+
+def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:
+    """Time of the first loss of static stability (Eq. 7), (start,) [time units]; inf where there is none."""
+    lost = walk_margin(walk, threads) <= 0.0
+    return np.where(lost.any(axis=0), walk.time[np.argmax(lost, axis=0)], np.inf)
+
+
+def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
+    """Corners of the support polygon of one posture, counter-clockwise, (corner, 2) [mm].
+
+    Args:
+        feet: tips, (leg, 2) [mm].
+        stance: which of them stand, (leg,).
+    """
+    points = np.asarray(feet, dtype=float)[np.asarray(stance, dtype=bool)]
+    if len(points) < 3 or np.linalg.matrix_rank(points - points[0]) < 2:
+        return points
+    from scipy.spatial import ConvexHull
+
+    return points[ConvexHull(points).vertices]
+
+
+@njit(cache=True, nogil=True)
+def _margins(feet: Any, stance: Any, margin: Any) -> None:
+    """`stability_margin` of postures (posture, leg, 2).
+
+    The line through two standing feet carries an edge of the polygon if all others lie on one side of it.
+    """
+    for n in range(len(feet)):
+        f, s = feet[n], stance[n]
+        nearest, inside, standing = np.inf, True, 0
+        for a in range(6):
+            if not s[a]:
+                continue
+            standing += 1
+            for b in range(a):
+                if not s[b]:
+                    continue
+                ex, ey = f[b, 0] - f[a, 0], f[b, 1] - f[a, 1]
+                left = right = False
+                for c in range(6):
+                    if s[c]:
+                        side = ex * (f[c, 1] - f[a, 1]) - ey * (f[c, 0] - f[a, 0])
+                        left |= side > 0.0
+                        right |= side < 0.0
+                if left and right:
+                    continue
+                side = ey * f[a, 0] - ex * f[a, 1]  # of the centre of mass
+                inside &= (left and side > 0.0) or (right and side < 0.0)
+                length = ex * ex + ey * ey
+                along = -(f[a, 0] * ex + f[a, 1] * ey) / length if length > 0.0 else 0.0
+                along = min(max(along, 0.0), 1.0)
+                nearest = min(nearest, np.hypot(f[a, 0] + along * ex, f[a, 1] + along * ey))
+        if standing == 1:
+            for a in range(6):
+                if s[a]:
+                    nearest = np.hypot(f[a, 0], f[a, 1])
+        margin[n] = nearest if inside and standing > 2 else -nearest

@@ -1,0 +1,29 @@
+"""Work on all cores: contiguous blocks of starts on a pool of threads that release the GIL."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from hexmj.errors import InputError
+
+
+def thread_count(threads: int | None = None) -> int:
+    """The number of threads asked for, by default one per core that this process may use."""
+    if threads is None:
+        return len(os.sched_getaffinity(0))
+    if threads < 1:
+        raise InputError(f"threads = {threads}; expected at least 1, or nothing for one per core")
+    return threads
+
+
+def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads: int | None = None) -> None:
+    """Call ``work(begin, end)`` for consecutive blocks of range(size); results must not depend on the order."""
+    count = thread_count(threads)
+    bounds = [(begin, min(begin + block, size)) for begin in range(0, size, block)]
+    if count == 1 or len(bounds) == 1:
+        for begin, end in bounds:
+            work(begin, end)
+        return
+    with ThreadPoolExecutor(count) as pool:
+        for future in [pool.submit(work, begin, end) for begin, end in bounds]:
+            future.result()

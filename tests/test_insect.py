@@ -1,0 +1,264 @@
+"""The compiled insect: masses, symmetry, postures, ranges, names and the physics of standing."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from hexmj import insect
+from hexmj.errors import InputError
+from hexmj.insect import JOINTS, ROOT_QPOS, TRUNK
+from hexmj.kinematics import tips_to_joints
+from hexmj.legs import FIG1, LEGS, MIRROR
+
+STANDING_HEIGHT = 10.0  # mm
+LIFT = 12.0  # mm
+MEASURED_RANGES = np.array(  # (segment, joint, 2) degrees, 2 to 98 % of the motion-captured animal
+    [
+        [[-9, 66], [-20, 29], [51, 145]],
+        [[-43, 24], [-22, 24], [55, 163]],
+        [[-62, -15], [-1, 45], [45, 164]],
+    ]
+)
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return insect.load()
+
+
+@pytest.fixture
+def home(model: mujoco.MjModel) -> mujoco.MjData:
+    return at_home(model)
+
+
+def at_home(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+@pytest.fixture(scope="module")
+def standing(model: mujoco.MjModel) -> mujoco.MjData:
+    """One second after it was put down in the home posture."""
+    data = at_home(model)
+    for _ in range(round(1 / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def step_range_targets(count: int = 61) -> np.ndarray:
+    """All tips that a walk may ask for, in the root frame, (x * z, leg, axis) [mm].
+
+    Standing heights of 8 to 12 mm, feet lifted by up to 12 mm, and a body that sags by 1 mm.
+    """
+    x, z = np.meshgrid(np.linspace(-20.2, 10.2, count), np.linspace(-12.0, LIFT - 8.0 + 1.0, count))
+    x, z = x.ravel()[:, None], z.ravel()[:, None]
+    y = np.broadcast_to(FIG1.y, (x.size, 6))
+    return np.stack([FIG1.origin + x, y, np.broadcast_to(z, y.shape)], axis=-1)
+
+
+def test_it_weighs_one_gram(model: mujoco.MjModel):
+    assert model.body_mass.sum() == pytest.approx(1.0, abs=1e-4)
+    assert (model.body_mass[1:] > 0).all()
+    assert (model.body_inertia[1:] > 0).all()
+
+
+def test_only_the_abdomen_is_lighter_than_published(model: mujoco.MjModel):
+    """Published split: mesothorax 20, metathorax 15, prothorax 3, head 3, all legs 10, abdomen 49."""
+    mass = {name: model.body(name).mass[0] for name in TRUNK}
+    unit = mass["mesothorax"] / 20
+    legs = sum(model.body(f"{leg}_{part}").mass[0] for leg in LEGS for part in ("coxa", "femur", "tibia"))
+    assert mass["metathorax"] / unit == pytest.approx(15, rel=1e-3)
+    assert mass["prothorax"] / unit == pytest.approx(3, rel=1e-3)
+    assert mass["head"] / unit == pytest.approx(3, rel=1e-3)
+    assert legs / unit == pytest.approx(10, rel=1e-3)
+    assert mass["abdomen"] / unit < 49
+
+
+def test_centre_of_mass_is_the_papers(home: mujoco.MjData):
+    offset = home.body("mesothorax").subtree_com - home.body("mesothorax").xpos
+    assert np.abs(offset[:2]).max() < 0.01
+
+
+def test_home_puts_the_tips_on_the_origins_of_the_legs_axes(model: mujoco.MjModel, home: mujoco.MjData):
+    tips = np.array([home.site(f"{leg}_foot").xpos for leg in LEGS])
+    radius = insect.dimensions(model).foot
+    np.testing.assert_allclose(tips[:, 0], FIG1.origin, atol=1e-6)
+    np.testing.assert_allclose(tips[:, 1], FIG1.y, atol=1e-6)
+    np.testing.assert_allclose(tips[:, 2], radius, atol=1e-6)
+    assert home.qpos[2] == pytest.approx(STANDING_HEIGHT + radius)
+
+
+def test_home_keeps_its_posture_and_is_symmetric(model: mujoco.MjModel):
+    key = model.key("home")
+    joints = key.qpos[ROOT_QPOS:].reshape(6, 3)
+    np.testing.assert_array_equal(key.ctrl.reshape(6, 3), joints)
+    np.testing.assert_array_equal(joints[list(MIRROR)], joints)
+
+
+def test_left_and_right_are_mirror_images(model: mujoco.MjModel):
+    for left, right in zip(LEGS[:3], LEGS[3:], strict=True):
+        for part in ("coxa", "femur", "tibia"):
+            a, b = model.body(f"{left}_{part}"), model.body(f"{right}_{part}")
+            np.testing.assert_array_equal(a.mass, b.mass)
+            np.testing.assert_array_equal(a.inertia, b.inertia)
+            np.testing.assert_array_equal(a.ipos, b.ipos)
+        for joint in JOINTS:
+            a, b = model.joint(f"{left}_{joint}"), model.joint(f"{right}_{joint}")
+            np.testing.assert_array_equal(a.range, b.range)
+    for name in TRUNK:
+        assert model.body(name).ipos[1] == pytest.approx(0, abs=1e-12)
+
+
+def test_mirrored_postures_have_a_mirrored_centre_of_mass(model: mujoco.MjModel):
+    data = mujoco.MjData(model)
+    low, high = model.jnt_range[1:].T
+    joints = np.random.default_rng(1).uniform(low, high)
+    centres = []
+    for posture in (joints, joints.reshape(6, 3)[list(MIRROR)].ravel()):
+        data.qpos[ROOT_QPOS:] = posture
+        mujoco.mj_forward(model, data)
+        centres.append(data.body("mesothorax").subtree_com.copy())
+    np.testing.assert_allclose(centres[0], centres[1] * [1, -1, 1], atol=1e-12)
+
+
+def test_every_element_is_named(model: mujoco.MjModel):
+    counts = {
+        mujoco.mjtObj.mjOBJ_BODY: model.nbody,
+        mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
+        mujoco.mjtObj.mjOBJ_GEOM: model.ngeom,
+        mujoco.mjtObj.mjOBJ_SITE: model.nsite,
+        mujoco.mjtObj.mjOBJ_CAMERA: model.ncam,
+        mujoco.mjtObj.mjOBJ_LIGHT: model.nlight,
+        mujoco.mjtObj.mjOBJ_MESH: model.nmesh,
+        mujoco.mjtObj.mjOBJ_TEXTURE: model.ntex,
+        mujoco.mjtObj.mjOBJ_MATERIAL: model.nmat,
+        mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
+        mujoco.mjtObj.mjOBJ_SENSOR: model.nsensor,
+        mujoco.mjtObj.mjOBJ_KEY: model.nkey,
+    }
+    for kind, count in counts.items():
+        assert all(mujoco.mj_id2name(model, kind, i) for i in range(count)), kind
+
+
+def test_joints_actuators_and_sensors_come_in_the_stated_order(model: mujoco.MjModel):
+    joints = [f"{leg}_{joint}" for leg in LEGS for joint in JOINTS]
+    assert [model.joint(i).name for i in range(model.njnt)] == ["root", *joints]
+    assert [model.actuator(i).name for i in range(model.nu)] == joints
+    assert model.actuator_trnid[:, 0].tolist() == list(range(1, model.njnt))
+    assert [model.sensor(i).name for i in range(model.nsensor)] == [
+        *(f"{leg}_foot" for leg in LEGS),
+        *(f"{leg}_touch" for leg in LEGS),
+        *(f"{part}_ground" for part in TRUNK),
+        "centre_of_mass",
+    ]
+
+
+def test_sensors_measure_what_their_names_say(model: mujoco.MjModel, standing: mujoco.MjData):
+    sensors, read = insect.sensors(model), standing.sensordata
+    feet = [standing.site(f"{leg}_foot").xpos for leg in LEGS]
+    np.testing.assert_array_equal(read[sensors.foot].reshape(6, 3), feet)
+    assert read[sensors.touch].shape == (6,)
+    np.testing.assert_array_equal(read[sensors.trunk], np.zeros(len(TRUNK)))
+    np.testing.assert_array_equal(read[sensors.centre_of_mass], standing.body("mesothorax").subtree_com)
+
+
+def test_the_part_of_the_trunk_that_touches_the_ground_is_known(model: mujoco.MjModel, home: mujoco.MjData):
+    home.qpos[2] = 3.0  # abdomen and the metathorax's rear end: axes 1 mm above the ground
+    mujoco.mj_forward(model, home)
+    touching = home.sensordata[insect.sensors(model).trunk] > 0
+    assert dict(zip(TRUNK, touching, strict=True)) == {
+        "head": False,
+        "prothorax": False,
+        "mesothorax": False,
+        "metathorax": True,
+        "abdomen": True,
+    }
+
+
+def test_only_the_ground_is_touched(model: mujoco.MjModel):
+    touching = [model.geom(i).name for i in range(model.ngeom) if model.geom_conaffinity[i]]
+    assert sorted(touching) == sorted(["ground", *TRUNK, *(f"{leg}_foot" for leg in LEGS)])
+    assert [model.geom(i).name for i in range(model.ngeom) if model.geom_contype[i]] == ["ground"]
+
+
+def test_every_target_of_the_step_range_is_reachable(model: mujoco.MjModel):
+    _, reachable = tips_to_joints(step_range_targets(), insect.dimensions(model))
+    assert reachable.all()
+
+
+def test_joint_ranges_are_the_measured_ones_widened_only_as_needed(model: mujoco.MjModel):
+    """By less than one degree more than the targets need; the MJCF has the table."""
+    dimensions = insect.dimensions(model)
+    joints, _ = tips_to_joints(step_range_targets(), dimensions)
+    needed = np.degrees(np.stack([joints.min(axis=0), joints.max(axis=0)], axis=-1))  # (leg, joint, 2)
+    measured = np.concatenate([MEASURED_RANGES, MEASURED_RANGES])
+    low = np.minimum(measured[..., 0], np.floor(needed[..., 0]))
+    high = np.maximum(measured[..., 1], np.ceil(needed[..., 1]))
+    np.testing.assert_allclose(np.degrees(dimensions.joint_range), np.stack([low, high], axis=-1), atol=1e-9)
+
+
+def test_targets_are_limited_to_the_joint_ranges(model: mujoco.MjModel):
+    np.testing.assert_allclose(model.actuator_ctrlrange, model.jnt_range[1:], rtol=1e-12)
+    assert model.actuator_ctrllimited.all()
+    assert model.jnt_limited[1:].all()
+
+
+def test_lengths_in_the_solvers_settings_are_in_mm(model: mujoco.MjModel):
+    solid = [i for i in range(model.ngeom) if model.geom_conaffinity[i]]
+    assert (model.geom_solimp[solid, 2] == 0.1).all()
+    assert (model.geom_solref[solid, 0] >= 2 * insect.LONGEST_STEP).all()
+    assert model.opt.gravity.tolist() == [0, 0, -9810]
+    assert model.opt.tolerance == 1e-5
+    assert model.opt.ccd_tolerance == 1e-3
+
+
+def test_standing_raises_no_warning(standing: mujoco.MjData):
+    assert standing.warning.number.sum() == 0
+    assert np.abs(standing.qvel).max() < 1
+
+
+def test_the_feet_carry_the_weight(model: mujoco.MjModel, standing: mujoco.MjData):
+    forces = standing.sensordata[insect.sensors(model).touch]
+    weight = -model.body_mass.sum() * model.opt.gravity[2]
+    assert (forces > 0).all()
+    assert forces.sum() == pytest.approx(weight, rel=0.01)
+    np.testing.assert_allclose(forces, forces[list(MIRROR)], rtol=0.01)
+
+
+def test_feet_do_not_sink_in_and_the_body_does_not_sag(standing: mujoco.MjData, home: mujoco.MjData):
+    assert standing.ncon == 6
+    assert -0.2 < standing.contact.dist.min() < 0
+    assert -1 < standing.qpos[2] - home.qpos[2] < 0
+
+
+def test_one_leg_can_carry_the_whole_weight(model: mujoco.MjModel):
+    """The force range holds the weight at the end of the longest straight femur and tibia."""
+    dimensions = insect.dimensions(model)
+    torque = 9810 * (dimensions.femur + dimensions.tibia).max()
+    np.testing.assert_allclose(model.actuator_forcerange[:, 1], torque, rtol=0.01)
+
+
+def test_standing_does_not_depend_on_the_time_step(standing: mujoco.MjData):
+    model = insect.load(timestep=0.00025)
+    data = at_home(model)
+    for _ in range(4000):
+        mujoco.mj_step(model, data)
+    assert data.qpos[2] == pytest.approx(standing.qpos[2], abs=0.001)
+
+
+def test_every_load_is_a_copy_of_its_own():
+    first, second = insect.load(timestep=0.0005, friction=0.3), insect.load()
+    assert (first.opt.timestep, second.opt.timestep) == (0.0005, 0.001)
+    assert set(first.geom_friction[:, 0]) == {0.3}
+    assert set(second.geom_friction[:, 0]) == {1.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("timestep", 0.0), ("timestep", 0.002), ("friction", -1.0), ("friction", np.nan)]
+)
+def test_values_without_sense_are_refused(name: str, value: float):
+    with pytest.raises(InputError, match=name):
+        insect.load(**{name: value})

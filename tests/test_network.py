@@ -1,0 +1,138 @@
+"""Laws of the network: it equals its plain form to the last bit, whatever the number of starts and threads."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import plain_network as plain
+from hexmj.errors import InputError
+from hexmj.legs import CENTRED, FIG1, MIRROR
+from hexmj.network import LANES, NetworkRun, first_loss, walk
+from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network, Weights, weights
+
+
+def random_weights(rng: np.random.Generator) -> Weights:
+    """Asymmetric weights of the size of the published ones; the binary ones 0 or 1."""
+    vector = rng.normal(0.0, 8.0, 58)
+    vector[10:14] = rng.integers(0, 2, 4)
+    vector[24:44] *= rng.choice([0.02, 1.0], 20)
+    vector[54:58] = rng.integers(0, 2, 4)
+    return Weights.from_vector(vector)
+
+
+def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
+    return rng.uniform(-10.0, 10.0, (size, 6))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    size=st.sampled_from([1, 2, LANES - 1, LANES, LANES + 3]),
+    threads=st.sampled_from([1, 2, 3]),
+    order=st.sampled_from(["printed", "undelayed", "sequential"]),
+    geometry=st.sampled_from([FIG1, CENTRED]),
+    velocity=st.floats(0.0, 0.99),
+    rate=st.one_of(st.none(), st.floats(1e-5, 0.02)),
+)
+def test_equals_plain_network_to_the_last_bit(seed, size, threads, order, geometry, velocity, rate):
+    rng = np.random.default_rng(seed)
+    p, starts = random_weights(rng), random_starts(rng, size)
+    network = Network(order=order, geometry=geometry, dt=rng.choice([0.1, 0.25]))
+    acceleration = Acceleration(rate, start=velocity / 2) if rate else None
+    steps = 250
+    options = {"network": network, "acceleration": acceleration, "threads": threads}
+    fast = walk(starts, p, velocity, steps * network.dt, **options)
+    lost = first_loss(starts, p, velocity, steps * network.dt, **options)
+    for i in rng.choice(size, min(size, 3), replace=False):
+        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, network, acceleration)
+        assert np.array_equal(fast.x[:, i], x)
+        assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
+        assert np.array_equal(fast.velocity[:, i], v)
+        unstable = [n for n in range(steps) if not plain.stable(x[n], s[n], network)]
+        assert lost[i] == ((unstable[0] + 1) * network.dt if unstable else np.inf)
+
+
+@pytest.mark.parametrize("model", [HWS, LDVS])
+def test_published_models_equal_plain_network(model):
+    starts = random_starts(np.random.default_rng(1), 2)
+    fast = walk(starts, model, 0.3, 200.0)
+    for i in range(2):
+        x, s, _ = plain.walk(list(starts[i]), weights(model), 0.3, 2000, Network())
+        assert np.array_equal(fast.x[:, i], x)
+        assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
+
+
+def test_does_not_depend_on_threads_batch_or_neighbours_in_the_batch():
+    starts = random_starts(np.random.default_rng(2), 3 * LANES + 5)
+    whole = walk(starts, LDVS, 0.4, 60.0, threads=1)
+    threaded = walk(starts, LDVS, 0.4, 60.0, threads=2)
+    part = walk(starts[70:101], LDVS, 0.4, 60.0)
+    assert np.array_equal(whole.x, threaded.x)
+    assert np.array_equal(whole.x[:, 70:101], part.x)
+    assert np.array_equal(whole.stance[:, 70:101], part.stance)
+
+
+def test_advancing_in_parts_is_one_walk():
+    starts = random_starts(np.random.default_rng(3), 5)
+    whole = walk(starts, LDVS, 0.4, 50.0, acceleration=Acceleration(0.002))
+    run = NetworkRun(starts, LDVS, 0.4, acceleration=Acceleration(0.002))
+    parts = [run.advance(n) for n in (1, 99, 400)]
+    for name in ("time", "velocity", "x", "stance"):
+        assert np.array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
+
+
+@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
+@pytest.mark.parametrize("order", ["printed", "undelayed"])
+def test_mirrored_starts_give_mirrored_walks(model, order):
+    starts = random_starts(np.random.default_rng(4), 40)
+    network = Network(order=order)
+    walked = walk(starts, model, 0.35, 150.0, network=network)
+    mirrored = walk(starts[:, MIRROR], model, 0.35, 150.0, network=network)
+    assert np.array_equal(walked.x[:, :, MIRROR], mirrored.x)
+    assert np.array_equal(walked.stance[:, :, MIRROR], mirrored.stance)
+
+
+def test_velocities_of_single_starts():
+    starts = random_starts(np.random.default_rng(5), 4)
+    speeds = np.array([0.1, 0.2, 0.5, 0.9])
+    together = walk(starts, LDVS, speeds, 40.0)
+    for i, v in enumerate(speeds):
+        assert np.array_equal(together.x[:, i], walk(starts[i : i + 1], LDVS, v, 40.0).x[:, 0])
+
+
+def test_acceleration_is_eq_11_step_by_step():
+    acceleration = Acceleration(rate=0.013, start=0.1)
+    walked = walk(np.zeros((1, 6)), UNCOORDINATED, 0.3, 30.0, acceleration=acceleration)
+    expected = [0.1]
+    for n in range(1, 300):
+        expected.append(0.1 + 0.013 * (n * 0.1) if expected[-1] < 0.3 else 0.3)
+    assert np.array_equal(walked.velocity[:, 0], expected)
+    assert walked.velocity[-1, 0] == 0.3
+    assert (np.diff(walked.velocity[:150, 0]) > 0).all()
+
+
+def test_tips_stay_within_the_step_range():
+    walked = walk(random_starts(np.random.default_rng(6), 100), LDVS, 0.7, 100.0)
+    assert walked.x.max() <= 10.0 + 0.1 + 1e-9
+    assert walked.x.min() >= -20.0 - 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"velocity": 1.0}, "0 <= V < 1"),
+        ({"velocity": float("nan")}, "0 <= V < 1"),
+        ({"velocity": [0.1, 0.2]}, "one number or"),
+        ({"duration": 0.0}, "at least one step"),
+        ({"duration": float("inf")}, "at least one step"),
+        ({"starts": np.zeros((0, 6))}, "at least one start"),
+        ({"starts": np.zeros((3, 5))}, "6 legs"),
+        ({"starts": np.full((1, 6), np.nan)}, "step range"),
+        ({"velocity": 0.05, "acceleration": Acceleration()}, "at least V_r"),
+    ],
+)
+def test_nonsense_gets_a_clear_sentence(change, words):
+    arguments = {"starts": np.zeros((1, 6)), "model": LDVS, "velocity": 0.3, "duration": 10.0} | change
+    with pytest.raises(InputError, match=words):
+        walk(**arguments)
