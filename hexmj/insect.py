@@ -102,6 +102,21 @@ def dimensions(model: mujoco.MjModel) -> LegDimensions:
     )
 
 
+def trunk_corners(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the trunk's capsules in the root frame, (corner, axis) [mm], and their radii, (corner,) [mm]."""
+    data = mujoco.MjData(model)
+    data.qpos[: ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    mujoco.mj_kinematics(model, data)
+    ends, radii = [], []
+    for part in TRUNK:
+        geom = model.geom(part).id
+        radius, half = model.geom_size[geom, :2]
+        axis = data.geom_xmat[geom].reshape(3, 3)[:, 2]
+        ends += [data.geom_xpos[geom] - half * axis, data.geom_xpos[geom] + half * axis]
+        radii += [radius, radius]
+    return np.array(ends), np.array(radii)
+
+
 @cache
 def _compiled() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(mjcf())

@@ -1,0 +1,162 @@
+"""What a physical walk has shown: the measured walk, and how every start went."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hexmj import insect
+from hexmj.physics import Settled, Stretch
+from hexmj.stability import walk_margin
+from hexmj.threads import run_blocks
+from hexmj.walks import Walk
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """How every start went; times in time units of the network, inf where it did not happen."""
+
+    planned_loss: np.ndarray
+    """(start,) first loss of static stability of the plan: planned polygon, centre of mass at O."""
+    measured_loss: np.ndarray
+    """(start,) first loss of measured static stability: feet in contact, the body's centre of mass."""
+    fall: np.ndarray
+    """(start,) first contact of head, thorax or abdomen with the ground."""
+    fall_part: np.ndarray
+    """(start,) index in `insect.TRUNK` of the part that touched first, -1 for none."""
+    clearance: np.ndarray
+    """(start,) least height of the trunk's lowest point [mm]; below 0 by how far it sinks in on contact."""
+    tilt: np.ndarray
+    """(start,) greatest angle between the trunk's vertical and the world's [rad]."""
+    speed: np.ndarray
+    """(start,) distance walked ahead over distance commanded, until the fall; NaN at V = 0."""
+    slip: np.ndarray
+    """(start,) mean sliding speed of a foot in contact [mm/s]."""
+    saturation: np.ndarray
+    """(start,) fraction of joints times physics steps in which the torque stood at its limit."""
+    unreachable: np.ndarray
+    """(start,) tip targets out of reach; such a leg keeps its last angles and is counted here."""
+
+
+def measured_walk(stretch: Stretch, settled: Settled) -> tuple[np.ndarray, Walk, np.ndarray]:
+    """The measured walk at the network's steps that fall within a stretch.
+
+    Returns:
+        Columns of the stretch's substeps, (step,), the walk of the stretch's starts, and the centre of
+        mass in the world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall.
+    """
+    m, network = settled.body.substeps(settled.network), settled.network
+    substep = np.arange(stretch.qpos.shape[1])
+    shown = substep[((stretch.first + substep) % m == 0) & (stretch.first + substep > 0)]
+    columns = insect.sensors(settled.mujoco_model)
+    sensors = stretch.sensors[:, shown].swapaxes(0, 1)
+    w, x, y, z = np.moveaxis(stretch.qpos[:, shown, 3:7].swapaxes(0, 1), -1, 0)
+    heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))[..., None]
+    centre = sensors[..., columns.centre_of_mass]
+    away = sensors[..., columns.foot].reshape(*sensors.shape[:2], 6, 3) - centre[..., None, :]
+    ahead = np.cos(heading) * away[..., 0] + np.sin(heading) * away[..., 1]
+    left = np.cos(heading) * away[..., 1] - np.sin(heading) * away[..., 0]
+    over = (shown[:, None] >= stretch.valid)[..., None]
+    step = (stretch.first + shown) // m
+    walk = Walk(
+        time=step * network.dt,
+        velocity=stretch.plan.velocity[np.maximum(step - 1 - stretch.first // m, 0)][:, stretch.ids],
+        x=np.where(over, np.nan, ahead - np.array(network.geometry.origin)),
+        y=np.where(over, np.nan, left),
+        stance=(sensors[..., columns.touch] > 0) & ~over,
+        geometry=network.geometry,
+    )
+    return shown, walk, np.where(over, np.nan, centre)
+
+
+class Tally:
+    """Adds up the outcomes of all starts, stretch by stretch."""
+
+    def __init__(self, settled: Settled, planned_loss: np.ndarray, threads: int | None = None) -> None:
+        """Begin with nothing but the plan's losses, (start,) [time units]."""
+        size = len(settled.starts)
+        self._settled, self._threads = settled, threads
+        self._planned_loss = planned_loss
+        self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
+        self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
+        self._walked, self._commanded = np.zeros(size), np.zeros(size)
+        self._sums = np.zeros((size, len(_SUMS)))
+        self._sums[:, _CLEARANCE], self._sums[:, _UPRIGHT] = np.inf, 1.0
+        self._corners = insect.trunk_corners(settled.mujoco_model)
+
+    def add(self, stretch: Stretch) -> None:
+        """Take in one stretch of `physics.drive`."""
+        settled, ids = self._settled, stretch.ids
+        model, dt, m = settled.mujoco_model, settled.network.dt, settled.body.substeps(settled.network)
+        columns, limit = insect.sensors(model), model.actuator_forcerange[:, 1]
+        feet, touch = columns.foot.start, columns.touch.start
+
+        def work(begin: int, end: int) -> None:
+            part = slice(begin, end)
+            seen = stretch.qpos[part], stretch.sensors[part], stretch.force[part], stretch.valid[part]
+            _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids[part])
+
+        run_blocks(work, len(ids), 64, self._threads)
+        n, last = np.arange(len(ids)), stretch.valid - 1
+        trunk = stretch.sensors[n, last, columns.trunk] > 0
+        fell = stretch.fell
+        self._fall[ids[fell]] = ((stretch.first + last) / m * dt)[fell]
+        self._fall_part[ids[fell]] = np.argmax(trunk, axis=1)[fell]
+        self._unreachable[ids] += stretch.unreachable
+        self._walked[ids] = stretch.qpos[n, last, 0] - settled.qpos[ids, 0]
+        share = np.clip(stretch.valid / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
+        self._commanded[ids] += (share * stretch.plan.velocity[:, ids]).sum(axis=0) * dt
+        _, measured, _ = measured_walk(stretch, settled)
+        lost = walk_margin(measured, self._threads) <= 0.0
+        if lost.size:
+            time = np.where(lost.any(axis=0), measured.time[np.argmax(lost, axis=0)], np.inf)
+            self._measured_loss[ids] = np.minimum(self._measured_loss[ids], time)
+
+    def outcomes(self) -> Outcomes:
+        """How every start went, as far as the stretches reach."""
+        sums, timestep = self._sums, self._settled.mujoco_model.opt.timestep
+        with np.errstate(invalid="ignore", divide="ignore"):
+            speed = np.where(self._commanded > 0, self._walked / self._commanded, np.nan)
+            slip = sums[:, _SLID] / (sums[:, _CONTACTS] * timestep)
+        return Outcomes(
+            planned_loss=self._planned_loss,
+            measured_loss=self._measured_loss,
+            fall=self._fall,
+            fall_part=self._fall_part,
+            clearance=sums[:, _CLEARANCE],
+            tilt=np.arccos(np.clip(sums[:, _UPRIGHT], -1.0, 1.0)),
+            speed=speed,
+            slip=slip,
+            saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * self._settled.mujoco_model.nu),
+            unreachable=self._unreachable,
+        )
+
+
+_SUMS = _CLEARANCE, _UPRIGHT, _SLID, _CONTACTS, _SATURATED, _SHOWN = range(6)
+
+
+@njit(cache=True, nogil=True)
+def _scan(
+    qpos: Any, sensors: Any, force: Any, valid: Any, feet: int, touch: int,
+    corner: Any, radius: Any, limit: Any, sums: Any, ids: Any,
+) -> None:  # fmt: skip
+    """Take a stretch's substeps into the sums of its starts."""
+    for i, start in enumerate(ids):
+        total = sums[start]
+        for t in range(valid[i]):
+            z, w, x, y, k = qpos[i, t, 2], qpos[i, t, 3], qpos[i, t, 4], qpos[i, t, 5], qpos[i, t, 6]
+            up_x, up_y, up_z = 2 * (x * k - w * y), 2 * (y * k + w * x), 1 - 2 * (x * x + y * y)
+            for c in range(len(corner)):
+                height = z + up_x * corner[c, 0] + up_y * corner[c, 1] + up_z * corner[c, 2] - radius[c]
+                total[_CLEARANCE] = min(total[_CLEARANCE], height)
+            total[_UPRIGHT] = min(total[_UPRIGHT], up_z)
+            for leg in range(6):
+                if t > 0 and sensors[i, t, touch + leg] > 0 and sensors[i, t - 1, touch + leg] > 0:
+                    f = feet + 3 * leg
+                    forward = sensors[i, t, f] - sensors[i, t - 1, f]
+                    total[_SLID] += np.hypot(forward, sensors[i, t, f + 1] - sensors[i, t - 1, f + 1])
+                    total[_CONTACTS] += 1.0
+            for joint in range(len(limit)):
+                total[_SATURATED] += abs(force[i, t, joint]) >= limit[joint]
+            total[_SHOWN] += 1.0

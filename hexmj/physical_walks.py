@@ -1,0 +1,136 @@
+"""Physical walks from start to end: `physical_walk` keeps them whole, `physical_outcomes` only how they went."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.body import Body
+from hexmj.measurement import Outcomes, Tally, measured_walk
+from hexmj.network import first_loss, walk
+from hexmj.parameters import Acceleration, Model, Network
+from hexmj.physics import Progress, Settled, drive, settle
+from hexmj.walks import Walk
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalWalk:
+    """Physical walks kept whole.  After a fall everything measured is NaN, and no foot stands."""
+
+    planned: Walk
+    """What the network planned."""
+    measured: Walk
+    """What the insect did: feet in contact, seen from its own centre of mass and heading."""
+    outcomes: Outcomes
+    """How every start went."""
+    qpos: np.ndarray
+    """(step, start, 25) MuJoCo's positions at the end of each step of the network."""
+    centre_of_mass: np.ndarray
+    """(step, start, 3) in the world [mm]."""
+    body: Body
+    """Conditions of the walk."""
+    network: Network
+    """Constants of the plan."""
+
+
+def physical_outcomes(
+    settled: Settled,
+    model: Model,
+    velocity: ArrayLike,
+    duration: float,
+    *,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Outcomes:
+    """How every settled start goes; only outcomes are kept.
+
+    Args:
+        settled: starts at rest, see `physics.settle`.
+        model: coupling weights.
+        velocity: V_r, or its final value; one number or (start,).
+        duration: observation time [time units of the network].
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
+
+    Raises:
+        InputError, SimulationError: see `physics.drive`.
+    """
+    tally = _tally(settled, model, velocity, duration, acceleration, threads)
+    for stretch in drive(
+        settled, model, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
+    ):
+        tally.add(stretch)
+    return tally.outcomes()
+
+
+def physical_walk(
+    starts: ArrayLike,
+    model: Model,
+    velocity: ArrayLike,
+    duration: float,
+    *,
+    body: Body | None = None,
+    vp: float | None = None,
+    network: Network | None = None,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> PhysicalWalk:
+    """The physical walk of every start, kept whole.
+
+    Args:
+        starts: tips at time 0, (start, leg) [mm]; all feet stand.
+        model: coupling weights.
+        velocity: V_r, or its final value; one number or (start,).
+        duration: observation time [time units of the network].
+        body: conditions of the walk.
+        vp: V_p [mm/s], short for a body with this velocity.
+        network: constants of the plan.
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
+
+    Raises:
+        InputError, SimulationError: see `physics.settle` and `physics.drive`.
+    """
+    body, network = body or Body(), network or Network()
+    body = body if vp is None else replace(body, vp=vp)
+    planned = walk(starts, model, velocity, duration, network=network, acceleration=acceleration, threads=threads)
+    settled = settle(starts, body, network, threads)
+    tally = _tally(settled, model, velocity, duration, acceleration, threads)
+    shape = planned.stance.shape
+    x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+    qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
+    for stretch in drive(
+        settled, model, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
+    ):
+        tally.add(stretch)
+        columns, seen, seen_centre = measured_walk(stretch, settled)
+        at = np.ix_((stretch.first + columns) // body.substeps(network) - 1, stretch.ids)
+        x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre
+        over = (columns[:, None] >= stretch.valid)[..., None]
+        qpos[at] = np.where(over, np.nan, stretch.qpos[:, columns].swapaxes(0, 1))
+    measured = Walk(planned.time, planned.velocity, x, y, stance, network.geometry)
+    return PhysicalWalk(planned, measured, tally.outcomes(), qpos, centre, body, network)
+
+
+def _tally(
+    settled: Settled,
+    model: Model,
+    velocity: ArrayLike,
+    duration: float,
+    acceleration: Acceleration | None,
+    threads: int | None,
+) -> Tally:
+    planned_loss = first_loss(
+        settled.starts,
+        model,
+        velocity,
+        duration,
+        network=settled.network,
+        acceleration=acceleration,
+        threads=threads,
+    )
+    return Tally(settled, planned_loss, threads)

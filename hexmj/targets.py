@@ -1,0 +1,74 @@
+"""From the planned walk to the tips that the legs must follow, physics step by physics step.
+
+The plan says where a tip is along its line and whether it swings; here it gets a height.  A foot rises
+while its leg protracts and sinks while it retracts, from ground to full height in `Body.lift_time` of
+physical time, so the lift vanishes against the stride as V_p goes to zero.  The phase of the lift only
+ever moves on, forwards or backwards, so no tip jumps, also where mechanism 4 ends a swing early.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hexmj.body import Body
+from hexmj.parameters import Network
+from hexmj.threads import run_blocks
+from hexmj.walks import Walk
+
+
+class TipTargets:
+    """The targets of many starts, made as the plan goes on."""
+
+    def __init__(self, starts: np.ndarray, body: Body, network: Network) -> None:
+        """All feet stand at the starts, (start, leg) [mm]."""
+        self._x = np.array(starts)
+        self._stance = np.ones(starts.shape, dtype=bool)
+        self._lift = np.zeros(starts.shape)
+        self._body, self._network = body, network
+        self._origin, self._y = np.array(network.geometry.origin), np.array(network.geometry.y)
+
+    def follow(self, plan: Walk, ids: np.ndarray, threads: int | None = None) -> np.ndarray:
+        """Tips in the root frame at the end of each substep of the plan's steps.
+
+        Args:
+            plan: the next steps of the walk, of all starts.
+            ids: the starts that are still wanted, (n,).
+            threads: one per core unless given.
+
+        Returns:
+            (n, substep, leg, 3) [mm]: forward, left, up.
+        """
+        m = self._body.substeps(self._network)
+        tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
+        rate = 1000.0 * self._body.seconds(self._network) / m / self._body.lift_time
+        shape = m, rate, self._body.step_height, self._body.standing_height, self._origin, self._y
+
+        def work(begin: int, end: int) -> None:
+            _follow(plan.x, plan.stance, ids[begin:end], self._x, self._stance, self._lift, *shape, tips[begin:end])
+
+        run_blocks(work, len(ids), 64, threads)
+        self._x[ids], self._stance[ids] = plan.x[-1, ids], plan.stance[-1, ids]
+        return tips
+
+
+@njit(cache=True, nogil=True)
+def _follow(
+    x: Any, stance: Any, ids: Any, x_old: Any, s_old: Any, lift: Any,
+    m: int, rate: float, step_height: float, standing_height: float, origin: Any, y: Any, tips: Any,
+) -> None:  # fmt: skip
+    """Between two steps a tip moves evenly; its height is a smooth function of the phase of its lift."""
+    for i, start in enumerate(ids):
+        for leg in range(6):
+            x_from, s, phase = x_old[start, leg], s_old[start, leg], lift[start, leg]
+            for n in range(len(x)):
+                x_to = x[n, start, leg]
+                for sub in range(m):
+                    phase = max(phase - rate, 0.0) if s else min(phase + rate, 1.0)
+                    height = step_height * phase * phase * (3.0 - 2.0 * phase)
+                    tip = tips[i, n * m + sub, leg]
+                    tip[0] = origin[leg] + x_from + (x_to - x_from) * ((sub + 1.0) / m)
+                    tip[1] = y[leg]
+                    tip[2] = height - standing_height
+                x_from, s = x_to, stance[n, start, leg]
+            lift[start, leg] = phase
