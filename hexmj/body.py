@@ -19,7 +19,7 @@ class Body:
     body."""
     standing_height: float = 10.0
     """Height of the middle coxae above the standing tips [mm]."""
-    lift_time: float = 20.0
+    lift_time: float = 5.0
     """Time in which a foot is raised, and in which it is lowered again [ms]."""
     friction: float = 1.0
     """Coefficient of sliding friction between the ground and feet or trunk."""

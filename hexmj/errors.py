@@ -7,3 +7,7 @@ class InputError(ValueError):
 
 class SimulationError(RuntimeError):
     """A physical simulation that did not settle or diverged; it is never counted as an outcome."""
+
+
+class RenderingError(RuntimeError):
+    """No video can be rendered on this machine; names the package that brings it."""

@@ -1,6 +1,6 @@
 """FLSS, the frequency of the loss of static stability (paper, Section 3): starts, windows, I_N and J_N."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +70,7 @@ def flss(
     network: Network | None = None,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
@@ -82,6 +83,7 @@ def flss(
         network: the constants that the paper leaves out.
         acceleration: the accelerating procedure of Eq. 11.
         threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
 
     Returns:
         `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples of 1000
@@ -91,10 +93,11 @@ def flss(
     v = checked_list(velocities)
     x = draw_starts(starts, seed, network)
     duration = observation_time(window, v, network, acceleration)
-    lost = [
-        first_loss(x, model, one, t, network=network, acceleration=acceleration, threads=threads)
-        for one, t in zip(v, duration, strict=True)
-    ]
+    lost = []
+    for one, t in zip(v, duration, strict=True):
+        lost.append(first_loss(x, model, one, t, network=network, acceleration=acceleration, threads=threads))
+        if progress:
+            progress(1 / len(v))
     return frequency_table(np.array(lost), v, duration)
 
 

@@ -64,7 +64,7 @@ def measured_walk(stretch: Stretch, settled: Settled) -> tuple[np.ndarray, Walk,
         velocity=stretch.plan.velocity[np.maximum(step - 1 - stretch.first // m, 0)][:, stretch.ids],
         x=np.where(over, np.nan, ahead - np.array(network.geometry.origin)),
         y=np.where(over, np.nan, left),
-        stance=(sensors[..., columns.touch] > 0) & ~over,
+        stance=stretch.standing[:, shown].swapaxes(0, 1) & ~over,
         geometry=network.geometry,
     )
     return shown, walk, np.where(over, np.nan, centre)

@@ -9,10 +9,12 @@ belongs to the state before it.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from numba import njit
 from numpy.typing import ArrayLike
 
 from hexmj import insect
@@ -27,6 +29,9 @@ from hexmj.walks import Walk
 
 STRETCH = 40
 """Physics steps in a stretch, about: fewer cost more calls, more waste steps after a fall."""
+
+CONTACT_GAP = 10.0
+"""A foot that bounces off the ground for less than this still stands [ms]."""
 
 AT_REST = 5.0
 """Speed of the root below which a start counts as settled [mm/s]."""
@@ -67,6 +72,8 @@ class Stretch:
     """(n, substep, 25)."""
     sensors: np.ndarray
     """(n, substep, column), see `insect.Sensors`."""
+    standing: np.ndarray
+    """(n, substep, leg) whether the ground carried the foot within the last `CONTACT_GAP`."""
     force: np.ndarray
     """(n, substep, actuator) torques of the joints [g mm^2/s^2]."""
     valid: np.ndarray
@@ -146,6 +153,8 @@ def drive(
     batch.bind("qacc_warmstart")[:] = settled.warmstart
     commands = settled.qpos[:, insect.ROOT_QPOS :].reshape(-1, 6, 3).copy()
     columns = insect.sensors(settled.mujoco_model)
+    unloaded = np.zeros((len(starts), 6), dtype=int)
+    longest_gap = CONTACT_GAP / 1000.0 / settled.mujoco_model.opt.timestep
     total, ids = int(steps_within(duration, network)), np.arange(len(starts))
     while plan.done < total and len(ids):
         first = plan.done * m
@@ -157,12 +166,22 @@ def drive(
         before = {name: batch.bind(name)[ids] for name in ("qpos", "qvel", "qacc_warmstart")}
         seen = batch.rollout(joints.shape[1], joints, record=("qpos", "sensordata", "actuator_force"), ids=ids)
         _raise_if_diverged(batch, ids, first / m * network.dt, "while walking", before | {"ctrl": joints})
+        standing = _standing(seen["sensordata"][:, :, columns.touch] > 0, unloaded, ids, longest_gap)
         touching = (seen["sensordata"][:, :, columns.trunk] > 0).any(axis=2)
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
         qpos = np.concatenate([before["qpos"][:, None], seen["qpos"][:, :-1]], axis=1)
         yield Stretch(
-            ahead, first, ids, qpos, seen["sensordata"], seen["actuator_force"], valid, fell, unreachable
+            plan=ahead,
+            first=first,
+            ids=ids,
+            qpos=qpos,
+            sensors=seen["sensordata"],
+            standing=standing,
+            force=seen["actuator_force"],
+            valid=valid,
+            fell=fell,
+            unreachable=unreachable,
         )
         ids = ids[~fell]
         if progress:
@@ -208,6 +227,18 @@ def _hold(joints: np.ndarray, last: np.ndarray) -> None:
         missing = np.isnan(now)
         now[missing] = last[missing]
         last = now
+
+
+@njit(cache=True, nogil=True)
+def _standing(touches: Any, unloaded: Any, ids: Any, longest_gap: float) -> Any:
+    """Which feet stand, (n, substep, leg); `unloaded`, (start, leg), counts the substeps since they last touched."""
+    standing = np.empty(touches.shape, dtype=np.bool_)
+    for i, start in enumerate(ids):
+        for t in range(touches.shape[1]):
+            for leg in range(6):
+                unloaded[start, leg] = 0 if touches[i, t, leg] else unloaded[start, leg] + 1
+                standing[i, t, leg] = unloaded[start, leg] <= longest_gap
+    return standing
 
 
 def _raise_if_diverged(batch: Batch, ids: np.ndarray, time: float, when: str, state: dict[str, np.ndarray]) -> None:

@@ -1,0 +1,50 @@
+# make compare    the main job; ARGS="..." adds options
+# make test       the tests
+# make lint       style and types
+# PYTHON=...      the Python, 3.11 or newer, that .venv is made from
+
+PYTHON ?= python3
+PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
+GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
+GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
+
+.PHONY: compare test lint system
+.DELETE_ON_ERROR:
+
+compare: .venv/project system
+	.venv/bin/hexmj compare --out results/compare $(ARGS)
+
+test: export MUJOCO_GL ?= egl
+test: .venv/dev system
+	.venv/bin/python -m pytest $(ARGS)
+
+lint: .venv/dev
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/pyright
+
+# Rendering without a screen; where it cannot be installed, the rest goes on without it.
+system:
+	@missing=; root=; libraries=$$(PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p); \
+	for library in $(GL_LIBRARIES); do \
+	    case "$$libraries" in *"$$library"*) ;; *) missing=yes ;; esac; \
+	done; \
+	test -z "$$missing" && exit; \
+	test "$$(id -u)" = 0 || root="sudo -n"; \
+	echo "Installing $(GL_PACKAGES), for rendering."; \
+	{ $$root apt-get -qq update && \
+	    $$root env DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends $(GL_PACKAGES); } \
+	    >/dev/null 2>&1 || \
+	echo "Rendering needs system packages that could not be installed here: apt-get install $(GL_PACKAGES)."
+
+.venv/project: pyproject.toml constraints.txt
+	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || \
+	    { echo "$(PYTHON) cannot make virtual environments: apt-get install python3-venv."; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(PIP) install --constraint constraints.txt --editable .
+	touch $@
+
+.venv/dev: .venv/project
+	$(PIP) install "pip>=25.1"  # the first with dependency groups
+	$(PIP) install --constraint constraints.txt --group dev
+	touch $@

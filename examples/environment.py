@@ -1,0 +1,24 @@
+"""The insect as a dm_env environment: one episode of the pure network walk, without offsets to its tips."""
+
+import numpy as np
+
+from hexmj import environment
+
+
+def main() -> None:
+    walking = environment.load(velocity=0.3, actions="tips")
+    spec = walking.action_spec()
+    step = walking.reset()
+    rewards, speeds = [], []
+    while not step.last():
+        step = walking.step(np.zeros(spec.shape))
+        rewards.append(step.reward)
+        speeds.append(step.observation["velocity"][0])
+    end = "fell" if step.discount == 0 else "walked on"
+    print(f"The insect {end} after {walking.physics.time():.2f} s, {len(rewards)} steps.")
+    print(f"return {sum(rewards):.0f}, {np.mean(rewards):.2f} a step")
+    print(f"speed {np.mean(speeds):.1f} mm/s, commanded {float(step.observation['command']):.1f} mm/s")
+
+
+if __name__ == "__main__":
+    main()

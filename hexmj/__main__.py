@@ -1,0 +1,5 @@
+"""`python -m hexmj` is the command `hexmj`."""
+
+from hexmj.cli import main
+
+main()

@@ -1,0 +1,183 @@
+"""The command line: typed options in, one call to the package, tables and files out."""
+
+import sys
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, subcommand
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
+
+from hexmj.body import Body
+from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.film import Film
+from hexmj.legs import GEOMETRIES, Geometry
+from hexmj.parameters import Acceleration, Network
+
+_ABOUT = "A stick insect in MuJoCo, driven by the coordination network of 1998, and its stability measured twice."
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a walk needs besides its model and velocity."""
+
+    window: str = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (40 time units) or a number [time units]."""
+    seed: int = 0
+    """Seed of the random starts."""
+    acceleration: float | None = None
+    """Accelerate from --initial-velocity with this a of Eq. 11 [1 / time unit]; the paper's is 0.00008."""
+    initial_velocity: float = 0.1
+    """V_r(0) when accelerating, a fraction of V_p."""
+    threads: int | None = None
+    """Threads; one per core unless given.  No result depends on it."""
+    network: OmitArgPrefixes[Network] = field(default_factory=Network)
+    body: OmitArgPrefixes[Body] = field(default_factory=Body)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Arguments that every function of the package understands."""
+        a = Acceleration(self.acceleration, self.initial_velocity) if self.acceleration is not None else None
+        return {"network": self.network, "acceleration": a, "threads": self.threads}
+
+    @property
+    def time(self) -> str | float:
+        """The window's name, or its number of time units."""
+        try:
+            return float(self.window)
+        except ValueError:
+            return self.window
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All of this but the threads, on which no result depends."""
+        return {key: value for key, value in asdict(self).items() if key != "threads"}
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait video."""
+
+    models: tuple[str, ...] = ("ldvs", "uncoordinated")
+    """Presets (hws, ldvs, uncoordinated) or parameter files (TOML)."""
+    velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1."""
+    starts: int = 100
+    """Number of random starts, the same for every model and velocity."""
+    out: Path = Path("results/compare")
+    """Folder for the results."""
+    no_video: bool = False
+    """Leave the video out."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+@dataclass(frozen=True)
+class Flss:
+    """FLSS of one model over velocities, kinematic or physical."""
+
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    physical: bool = False
+    """Count falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    starts: int | None = None
+    """Number of random starts; 7000 unless given (seven samples of 1000, as in the paper), 200 if physical."""
+    out: Path | None = None
+    """Folder for figure, NetCDF and manifest; none are written unless given."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+@dataclass(frozen=True)
+class Walk:
+    """One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF)."""
+
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    velocity: float = 0.3
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    physical: bool = False
+    """Walk the insect in MuJoCo instead of the plan alone."""
+    start: int = 0
+    """Which of the seed's random starts."""
+    out: Path = Path("results/walk")
+    """Folder for the results."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+@dataclass(frozen=True)
+class Render:
+    """A gait video, from recordings or from a walk that is recorded first."""
+
+    recordings: Positional[tuple[Path, ...]] = ()
+    """One recording, or two for side by side (recording.nc of `hexmj walk`); none: record a physical walk first."""
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    velocity: float = 0.3
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    beside: str | None = None
+    """Side by side on the same start: 'planned' (the plan, with its polygon) or a second model."""
+    start: int = 0
+    """Which of the seed's random starts."""
+    out: Path = Path("results/render")
+    """Folder for the video and its recordings."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    film: OmitArgPrefixes[Film] = field(default_factory=Film)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+Command = (
+    Annotated[Compare, subcommand("compare")]
+    | Annotated[Flss, subcommand("flss")]
+    | Annotated[Walk, subcommand("walk")]
+    | Annotated[Render, subcommand("render")]
+)
+
+_registry = ConstructorRegistry()
+
+
+@_registry.primitive_rule
+def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometry] | None:
+    """On the command line a geometry is given by its name."""
+    if info.type is not Geometry:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="{" + ",".join(GEOMETRIES) + "}",
+        instance_from_str=lambda words: GEOMETRIES[words[0]],
+        is_instance=lambda value: isinstance(value, Geometry),
+        str_from_instance=lambda value: [name for name, g in GEOMETRIES.items() if g == value],
+        choices=tuple(GEOMETRIES),
+    )
+
+
+def main() -> None:
+    """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
+    try:
+        options = tyro.cli(Command, prog="hexmj", description=_ABOUT, registry=_registry, config=(FlagCreatePairsOff,))
+        from hexmj import commands
+
+        run = {
+            Compare: commands.run_compare,
+            Flss: commands.run_flss,
+            Walk: commands.run_walk,
+            Render: commands.run_render,
+        }
+        run[type(options)](options)
+    except InputError as error:
+        sys.exit(_complain(error, 2))
+    except (SimulationError, RenderingError) as error:
+        sys.exit(_complain(error, 1))
+
+
+def _complain(error: Exception, code: int) -> int:
+    print(f"hexmj: {error}", file=sys.stderr)
+    return code

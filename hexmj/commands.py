@@ -1,0 +1,287 @@
+"""What each command does: call the package, print a table or one JSON object, write the files."""
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj import figures, gl, recording
+from hexmj.comparison import AGREEMENT, MEASURES, compare, physical_flss
+from hexmj.film import Film
+from hexmj.insect import TRUNK
+from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time
+from hexmj.network import walk
+from hexmj.parameters import Model, load_model
+from hexmj.physical_walks import physical_walk
+from hexmj.progress import progress_bar
+from hexmj.results import json_text, results_folder, save_dataset, save_manifest, write_whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from hexmj.cli import Compare, Conditions, Flss, Render, Walk
+
+
+def run_compare(options: "Compare") -> None:
+    """`hexmj compare`: both FLSS, the measured polygon's, and the agreement per start."""
+    models = {Path(name).stem: load_model(name) for name in options.models}
+    conditions, out = options.conditions, results_folder(options.out)
+    settings = conditions.settings | {"models": list(options.models), "starts": options.starts}
+    with progress_bar("comparing") as progress:
+        result = compare(
+            models,
+            options.velocities,
+            starts=options.starts,
+            window=conditions.time,
+            seed=conditions.seed,
+            body=conditions.body,
+            progress=progress,
+            **conditions.options,
+        )
+    result.attrs = settings | {"vp": conditions.body.vp}
+    files = [
+        save_dataset(result, out / "comparison.nc"),
+        _save_figure(figures.comparison_figure(result), out / "comparison.png"),
+        save_manifest(settings, out / "manifest.json"),
+    ]
+    sentence = gl.missing()
+    if not options.no_video and sentence is None:
+        files.append(_typical_gait(models, result, conditions, out))
+    report = _physical_report(result)
+    if options.json:
+        summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
+        for name in models:
+            one = result.sel(model=name)
+            keys = [m + end for m in MEASURES for end in ("", "_low", "_high")] + ["agreement", *AGREEMENT]
+            summary[name] = {key: one[key].values.tolist() for key in keys}
+        settings |= {"duration": result.duration.values.tolist()}
+        _print_json(summary | {"report": report, "settings": settings, "files": files})
+    else:
+        table = _table("model", "V", "t", *(f"{m} FLSS" for m in MEASURES), "agreement", *AGREEMENT)
+        for name in models:
+            for v in result.velocity.values:
+                one = result.sel(model=name, velocity=v)
+                flss_cells = [_interval(one, m) for m in MEASURES]
+                counts = [str(int(one[case])) for case in AGREEMENT]
+                table.add_row(name, f"{v:g}", f"{float(one.duration):.0f}", *flss_cells, f"{float(one.agreement):.2f}",
+                              *counts)  # fmt: skip
+        _print(table, _conditions_line(conditions, physical=True), _report_line(report), *map(str, files))
+    if not options.no_video and sentence:
+        print(f"hexmj: no video: {sentence}", file=sys.stderr)
+
+
+def run_flss(options: "Flss") -> None:
+    """`hexmj flss`: one FLSS over velocities."""
+    model, conditions = load_model(options.model), options.conditions
+    out = results_folder(options.out) if options.out else None
+    starts = options.starts if options.starts is not None else 200 if options.physical else 7 * SAMPLE
+    settings = conditions.settings | {"model": options.model, "physical": options.physical, "starts": starts}
+    if not options.physical:
+        del settings["body"]
+    measure, extra = (physical_flss, {"body": conditions.body}) if options.physical else (flss, {})
+    with progress_bar("physical FLSS" if options.physical else "FLSS") as progress:
+        table = measure(
+            model,
+            options.velocities,
+            starts=starts,
+            window=conditions.time,
+            seed=conditions.seed,
+            progress=progress,
+            **extra,
+            **conditions.options,
+        )
+    table.attrs = settings
+    kind = "physical" if options.physical else "kinematic"
+    files = []
+    if out:
+        title = f"{Path(options.model).stem}, {kind} FLSS, {starts} starts, window {conditions.window}"
+        files = [
+            save_dataset(table, out / "flss.nc"),
+            _save_figure(figures.flss_figure(table, title), out / "flss.png"),
+            save_manifest(settings, out / "manifest.json"),
+        ]
+    columns = [name for name, values in table.items() if values.dims == ("velocity",)]
+    if options.json:
+        lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
+        _print_json(lists | {"settings": settings, "files": files})
+    else:
+        rows = _table("V", *columns)
+        for v in table.velocity.values:
+            one = table.sel(velocity=v)
+            rows.add_row(f"{v:g}", *(f"{float(one[c]):.4g}" for c in columns))
+        head = f"{kind} FLSS of {options.model}, {starts} starts"
+        _print(head, rows, _conditions_line(conditions, options.physical), *map(str, files))
+
+
+def run_walk(options: "Walk") -> None:
+    """`hexmj walk`: one walk with its footfall diagram and stability margin."""
+    model, out = load_model(options.model), results_folder(options.out)
+    title = f"{Path(options.model).stem}, V = {options.velocity:g}"
+    walked = _recorded(model, options.velocity, options.start, options.conditions, title, options.physical)
+    settings = options.conditions.settings | {
+        "model": options.model, "velocity": options.velocity, "physical": options.physical, "start": options.start,
+    }  # fmt: skip
+    files = [
+        recording.save_recording(walked, out / "recording.nc"),
+        _save_figure(figures.walk_figure(walked), out / "walk.png"),
+        save_manifest(settings, out / "manifest.json"),
+    ]
+    summary = _summary(walked)
+    if options.json:
+        _print_json(summary | {"settings": settings, "files": files})
+    else:
+        _print(title, *(f"{key}: {value}" for key, value in summary.items()),
+               _conditions_line(options.conditions, options.physical), *map(str, files))  # fmt: skip
+
+
+def run_render(options: "Render") -> None:
+    """`hexmj render`: record if there is nothing to render yet, then render from the recordings."""
+    from hexmj.errors import InputError, RenderingError
+    from hexmj.video import render
+
+    if len(options.recordings) > 2:
+        raise InputError(f"{len(options.recordings)} recordings were given; expected one, or two for side by side")
+    if sentence := gl.missing():
+        raise RenderingError(sentence)
+    shown = [recording.load_recording(path) for path in options.recordings] or None
+    models = [load_model(name) for name in (options.model, options.beside) if name and name != "planned"]
+    out = results_folder(options.out)
+    files = []
+    if shown is None:
+        conditions, v, start = options.conditions, options.velocity, options.start
+        names = [Path(name).stem for name in (options.model, options.beside) if name and name != "planned"]
+        shown = [
+            _recorded(model, v, start, conditions, name, True) for model, name in zip(models, names, strict=True)
+        ]
+        if options.beside == "planned":
+            shown.insert(0, _recorded(models[0], v, start, conditions, f"{names[0]}, planned", False))
+        for i, one in enumerate(shown):
+            files.append(recording.save_recording(one, out / f"recording-{i + 1}.nc"))
+    with progress_bar("rendering") as progress:
+        frames = render(shown, out / "gait.mp4", options.film, progress)
+    files.append(out / "gait.mp4")
+    summary = {"frames": frames, "fps": options.film.fps, "film": asdict(options.film), "files": files}
+    if options.json:
+        _print_json(summary | {"recordings": [_summary(one) for one in shown]})
+    else:
+        _print(f"{frames} frames at {options.film.fps:g} per second", *map(str, files))
+
+
+def _recorded(
+    model: Model, velocity: float, start: int, conditions: "Conditions", title: str, physical: bool
+) -> "xr.Dataset":
+    """A recording of one of the seed's starts."""
+    from hexmj.errors import InputError
+
+    if start < 0:
+        raise InputError(f"start = {start}; expected at least 0")
+    starts = draw_starts(start + 1, conditions.seed, conditions.network)[start:]
+    acceleration = conditions.options["acceleration"]
+    time = float(observation_time(conditions.time, np.array(velocity), conditions.network, acceleration))
+    if not physical:
+        plan = walk(starts, model, velocity, time, **conditions.options)
+        return recording.record_plan(plan, conditions.body, conditions.network, title=title)
+    with progress_bar("walking") as progress:
+        walked = physical_walk(
+            starts, model, velocity, time, body=conditions.body, progress=progress, **conditions.options
+        )
+    return recording.record(walked, title=title)
+
+
+def _typical_gait(models: dict[str, Model], result: "xr.Dataset", conditions: "Conditions", out: Path) -> Path:
+    """A video of the first model near V = 0.3, of the first start that neither fell nor lost stability, if any."""
+    from hexmj.video import render
+
+    name, model = next(iter(models.items()))
+    velocities = result.velocity.values
+    v = float(velocities[np.abs(velocities - 0.3).argmin()])
+    one = result.sel(model=name, velocity=v)
+    start = int(np.argmax((np.isinf(one.planned_loss) & np.isinf(one.fall)).values))
+    walked = _recorded(model, v, start, conditions, name, physical=True)
+    recording.save_recording(walked, out / "recording.nc")
+    with progress_bar("rendering") as progress:
+        render([walked], out / "gait.mp4", Film(), progress)
+    return out / "gait.mp4"
+
+
+def _summary(walked: "xr.Dataset") -> dict[str, Any]:
+    """When a recorded walk lost stability or fell [time units], and its least margins [mm]."""
+    summary: dict[str, Any] = {
+        "time units": float(walked.time[-1]),
+        "planned loss": float(walked.planned_loss_time),
+        "least planned margin [mm]": float(walked.planned_margin.min()),
+    }
+    if "measured_margin" in walked:
+        part = int(walked.fall_part)
+        summary |= {
+            "measured loss": float(walked.measured_loss_time),
+            "least measured margin [mm]": float(walked.measured_margin.min()),
+            "fall": float(walked.fall_time),
+            "fell on": TRUNK[part] if part >= 0 else None,
+        }
+    return summary
+
+
+def _physical_report(result: "xr.Dataset") -> dict[str, Any]:
+    """How far the bodies did what they were told, over all models and velocities."""
+    upright = result.speed.where(np.isinf(result.fall)).values
+    walked = upright[np.isfinite(upright)]
+    low, high = (float(walked.min()), float(walked.max())) if walked.size else (float("nan"), float("nan"))
+    return {
+        "speed reached over commanded, starts that did not fall": [low, high],
+        "mean slip [mm/s]": float(result.slip.mean()),
+        "joints at their torque limit": float(result.saturation.mean()),
+        "tip targets out of reach": int(result.unreachable.sum()),
+        "simulator warnings": 0,
+    }
+
+
+def _report_line(report: dict[str, Any]) -> str:
+    def show(value: Any) -> str:
+        return " to ".join(f"{v:.3g}" for v in value) if isinstance(value, list) else f"{value:.3g}"
+
+    return "; ".join(f"{key}: {show(value)}" for key, value in report.items())
+
+
+def _conditions_line(conditions: "Conditions", physical: bool) -> str:
+    """The conditions that stand beside every measure."""
+    line = f"window {conditions.window} (t in time units); seed {conditions.seed}"
+    if conditions.acceleration is not None:
+        line += f"; a = {conditions.acceleration:g} from V = {conditions.initial_velocity:g}"
+    if physical:
+        line += "; " + ", ".join(f"{key} {value:g}" for key, value in asdict(conditions.body).items())
+    return line
+
+
+def _interval(one: "xr.Dataset", measure: str) -> str:
+    return f"{float(one[measure]):.3f} [{float(one[measure + '_low']):.2f}, {float(one[measure + '_high']):.2f}]"
+
+
+def _save_figure(figure: "Figure", path: Path) -> Path:
+    return write_whole(path, lambda part: figure.savefig(part, dpi=150))
+
+
+def _table(*columns: str) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(column.replace("_", " "))
+    return table
+
+
+def _print(*parts: Any) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    for part in parts:
+        console.print(part, markup=False) if isinstance(part, str) else console.print(part)
+
+
+def _print_json(value: dict[str, Any]) -> None:
+    print(json_text(value))

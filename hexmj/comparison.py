@@ -1,0 +1,148 @@
+"""The two measures of stability on the same starts: polygon on paper, polygon under the body, body on the ground."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.body import Body
+from hexmj.insect import TRUNK
+from hexmj.loss_frequency import checked_list, draw_starts, frequency_table, observation_time, wilson_interval
+from hexmj.measurement import Outcomes
+from hexmj.parameters import PRESETS, Acceleration, Model, Network
+from hexmj.physical_walks import physical_outcomes
+from hexmj.physics import Progress, settle
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical": "fall"}
+"""Measure of FLSS -> the outcome whose frequency it is."""
+
+AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
+"""What a start can do: lose stability on paper, touch the ground, both or none."""
+
+_UNITS = {
+    "planned_loss": "time unit",
+    "measured_loss": "time unit",
+    "fall": "time unit",
+    "clearance": "mm",
+    "tilt": "rad",
+    "slip": "mm/s",
+}
+
+
+def compare(
+    models: Model | Mapping[str, Model],
+    velocities: Sequence[float],
+    *,
+    starts: int = 100,
+    window: str | float = "walk",
+    seed: int = 0,
+    body: Body | None = None,
+    network: Network | None = None,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> "xr.Dataset":
+    """Kinematic, measured and physical FLSS of one or more models over velocities, on the same starts.
+
+    Args:
+        models: coupling weights, or several by name.
+        velocities: V_r (when accelerating, its final value), each 0 <= V < 1.
+        starts: number of starts, the same for every model and velocity.
+        window: 'walk', 'start' or the observation time itself [time units].
+        seed: of the starts.
+        body: conditions of the physical walks.
+        network: the constants that the paper leaves out.
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
+
+    Returns:
+        Over (model, velocity): the three FLSS with their 95 % Wilson intervals (`kinematic`,
+        `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
+        fraction of starts for which kinematic and physical answer are the same; over (model, velocity,
+        start) every field of `Outcomes`.
+
+    Raises:
+        InputError, SimulationError: see `physics.settle` and `physics.drive`.
+    """
+    import xarray as xr
+
+    network, v = network or Network(), checked_list(velocities)
+    named = dict(models) if isinstance(models, Mapping) else {_name(models): models}
+    duration = observation_time(window, v, network, acceleration)
+    settled = settle(draw_starts(starts, seed, network), body, network, threads)
+    share = duration / duration.sum() / len(named)
+
+    def outcomes(model: Model, i: int) -> Outcomes:
+        tick: Progress | None = (lambda done: progress(done * share[i])) if progress else None
+        return physical_outcomes(
+            settled, model, v[i], duration[i], acceleration=acceleration, threads=threads, progress=tick
+        )
+
+    table = [[outcomes(model, i) for i in range(len(v))] for model in named.values()]
+    data = xr.Dataset(
+        coords={
+            "model": list(named),
+            "velocity": ("velocity", v, {"units": "V_p", "long_name": "velocity V_r"}),
+            "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
+            "leg": ["L1", "L2", "L3", "R1", "R2", "R3"],
+            "starts": (("start", "leg"), settled.starts, {"units": "mm", "long_name": "tips at the start"}),
+        }
+    )
+    for field in fields(Outcomes):
+        values = np.array([[getattr(o, field.name) for o in row] for row in table])
+        data[field.name] = (("model", "velocity", "start"), values, {"units": _UNITS.get(field.name, "1")})
+    data.fall_part.attrs["flag_meanings"] = " ".join(TRUNK)
+    for measure, outcome in MEASURES.items():
+        lost = np.isfinite(data[outcome])
+        data[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
+        interval = np.array([[wilson_interval(int(n), starts) for n in row] for row in lost.sum("start").values])
+        data[f"{measure}_low"] = (("model", "velocity"), interval[..., 0], {"units": "1"})
+        data[f"{measure}_high"] = (("model", "velocity"), interval[..., 1], {"units": "1"})
+    kinematic, physical = np.isfinite(data.planned_loss), np.isfinite(data.fall)
+    cases = (kinematic & physical, kinematic & ~physical, ~kinematic & physical, ~kinematic & ~physical)
+    for case, true in zip(AGREEMENT, cases, strict=True):
+        data[case] = true.sum("start").assign_attrs(units="1", long_name="number of starts")
+    data["agreement"] = (kinematic == physical).mean("start").assign_attrs(units="1")
+    return data
+
+
+def physical_flss(
+    model: Model,
+    velocities: Sequence[float],
+    *,
+    starts: int = 200,
+    window: str | float = "walk",
+    seed: int = 0,
+    body: Body | None = None,
+    network: Network | None = None,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> "xr.Dataset":
+    """Physical FLSS: the frequency with which the trunk touches the ground; arguments as for `compare`.
+
+    Returns:
+        The table of `loss_frequency.flss`, with the time of the fall in `loss_time`.
+    """
+    result = compare(
+        model,
+        velocities,
+        starts=starts,
+        window=window,
+        seed=seed,
+        body=body,
+        network=network,
+        acceleration=acceleration,
+        threads=threads,
+        progress=progress,
+    )
+    return frequency_table(result.fall.values[0], result.velocity.values, result.duration.values)
+
+
+def _name(model: Model) -> str:
+    return next((name for name, preset in PRESETS.items() if preset is model), "model")

@@ -1,0 +1,39 @@
+"""How a walk is filmed."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from hexmj.errors import InputError
+
+CAMERAS = ("following", "side", "top", "front")
+
+
+@dataclass(frozen=True)
+class Film:
+    """Camera, size, speed and quality of a video."""
+
+    camera: Literal["following", "side", "top", "front"] = "following"
+    """Camera of the MJCF."""
+    width: int = 640
+    """Width of a panel [pixels], even."""
+    height: int = 480
+    """Height of a panel [pixels], even."""
+    fps: float = 30.0
+    """Frames per second of play."""
+    slow_motion: float = 2.0
+    """Play time over physical time: 2 plays at half speed."""
+    quality: Literal["fast", "high"] = "fast"
+    """'fast': no shadows, reflections or multisampling; 'high': all of them."""
+
+    def __post_init__(self) -> None:
+        if self.camera not in CAMERAS:
+            raise InputError(f"camera = {self.camera!r}; valid names: {', '.join(CAMERAS)}")
+        if self.quality not in ("fast", "high"):
+            raise InputError(f"quality = {self.quality!r}; valid names: fast, high")
+        for name, size, most in (("width", self.width, 1920), ("height", self.height, 1080)):
+            if not (64 <= size <= most and size % 2 == 0):
+                raise InputError(f"{name} = {size}; expected an even number of pixels from 64 to {most}")
+        for name, value in (("fps", self.fps), ("slow_motion", self.slow_motion)):
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} = {value}; expected a finite number above 0")

@@ -1,0 +1,199 @@
+"""Recordings: one start of a walk as a file, with all that figures and films need."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from hexmj import insect
+from hexmj.body import Body
+from hexmj.errors import InputError
+from hexmj.kinematics import LegDimensions, tips_to_joints
+from hexmj.legs import LEGS
+from hexmj.parameters import Network
+from hexmj.physical_walks import PhysicalWalk
+from hexmj.results import write_whole
+from hexmj.stability import loss_time, walk_margin
+from hexmj.targets import TipTargets
+from hexmj.walks import Walk
+
+_LEGS, _STEPS, _ONCE = ("step", "leg"), ("step",), ()
+_TIPS = ("step", "leg", "coordinate")
+
+PLANNED = {  # dimensions, units, long_name
+    "velocity": (_STEPS, "V_p", "commanded velocity V_r during the step"),
+    "planned_x": (_LEGS, "mm", "planned tip on its own axis"),
+    "planned_y": (_LEGS, "mm", "planned tip beside the body axis, left positive"),
+    "planned_stance": (_LEGS, "1", "leg retracts in the plan"),
+    "planned_margin": (_STEPS, "mm", "stability margin of the plan"),
+    "planned_loss_time": (_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
+    "planned_tip": (_TIPS, "mm", "planned tip in the world, lifted while it swings"),
+    "qpos": (("step", "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
+    "centre_of_mass": (("step", "coordinate"), "mm", "centre of mass in the world"),
+}
+"""Variables of every recording."""
+
+MEASURED = {
+    "measured_x": (_LEGS, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
+    "measured_y": (_LEGS, "mm", "foot beside the centre of mass, left positive"),
+    "measured_stance": (_LEGS, "1", "foot touches the ground"),
+    "measured_margin": (_STEPS, "mm", "measured stability margin"),
+    "measured_loss_time": (_ONCE, "time unit", "first loss of measured static stability, or inf"),
+    "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
+    "fall_part": (_ONCE, "1", f"part that touched the ground first: {', '.join(insect.TRUNK)} from 0; -1 for none"),
+}
+"""Variables of a recorded physical insect; a puppet that only shows the plan has none of them."""
+
+_TIMES = {
+    "time": (_STEPS, "time unit", "time, in the network's unit 1 mm / V_p"),
+    "seconds": (_STEPS, "s", "time"),
+}
+
+
+def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
+    """What the physical insect did from one start, and what was planned; NaN after a fall.
+
+    Args:
+        walk: physical walks kept whole.
+        start: which of them.
+        title: shown on films.
+    """
+    planned, measured = _one_start(walk.planned, start), _one_start(walk.measured, start)
+    qpos, outcomes = walk.qpos[:, start], walk.outcomes
+    tips, _ = _lifted_tips(planned, walk.body, walk.network)
+    return _dataset(
+        planned,
+        walk.body,
+        walk.network,
+        title,
+        planned_tip=qpos[:, None, :3] + _rotated(qpos[:, None, 3:7], tips),
+        measured_x=measured.x[:, 0],
+        measured_y=measured.y[:, 0],
+        measured_stance=measured.stance[:, 0],
+        measured_margin=walk_margin(measured)[:, 0],
+        measured_loss_time=outcomes.measured_loss[start],
+        fall_time=outcomes.fall[start],
+        fall_part=outcomes.fall_part[start],
+        qpos=qpos,
+        centre_of_mass=walk.centre_of_mass[:, start],
+    )
+
+
+def record_plan(plan: Walk, body: Body, network: Network, start: int = 0, title: str = "") -> xr.Dataset:
+    """A puppet that shows the plan of one start: carried along at V_r, its joints put where the tips are planned.
+
+    Its trunk stays level at the standing height and its centre of mass is the paper's O.  A leg that cannot
+    reach its tip keeps its last angles.
+
+    Args:
+        plan: planned walks from their first step on.
+        body: conditions that the plan leaves open: V_p, heights and the time of a lift.
+        network: constants of the plan.
+        start: which of the walks.
+        title: shown on films.
+    """
+    planned = _one_start(plan, start)
+    legs = insect.dimensions(insect.load())
+    tips, first = _lifted_tips(planned, body, network)
+    root = np.zeros((len(plan.time), insect.ROOT_QPOS))
+    root[:, 0] = np.cumsum(planned.velocity[:, 0]) * network.dt
+    root[:, 2] = body.standing_height + legs.foot
+    root[:, 3] = 1.0
+    joints = _held_joints(np.concatenate([first[None], tips]), legs)[1:]
+    return _dataset(
+        planned,
+        body,
+        network,
+        title,
+        planned_tip=root[:, None, :3] + tips,
+        qpos=np.concatenate([root, joints.reshape(len(joints), -1)], axis=1),
+        centre_of_mass=root[:, :3],
+    )
+
+
+def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
+    """Write a recording as NetCDF; the file appears whole or not at all."""
+    return write_whole(Path(path), lambda part: recording.to_netcdf(part, engine="h5netcdf"))
+
+
+def load_recording(path: Path | str) -> xr.Dataset:
+    """Open a recording.  Numbers are read when they are used, so close it after that, best in a `with` statement.
+
+    Raises:
+        InputError: no recording of ours.
+    """
+    try:
+        recording = xr.open_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read as NetCDF ({error}); expected a recording") from None
+    expected = _TIMES | PLANNED | (MEASURED if set(MEASURED) & set(recording.variables) else {})
+    missing = [name for name in expected if name not in recording.variables]
+    settings = ("title", *asdict(Body()), *_settings(Network()))
+    missing += [f"attribute {name}" for name in settings if name not in recording.attrs]
+    if missing:
+        recording.close()
+        raise InputError(f"{path} is no recording; missing: {', '.join(missing)}")
+    return recording
+
+
+def _dataset(planned: Walk, body: Body, network: Network, title: str, **values: np.ndarray) -> xr.Dataset:
+    """A recording of a plan of one start and `values` by the names of their variables."""
+    values |= {
+        "time": planned.time,
+        "seconds": planned.time / body.vp,
+        "velocity": planned.velocity[:, 0],
+        "planned_x": planned.x[:, 0],
+        "planned_y": planned.y[:, 0],
+        "planned_stance": planned.stance[:, 0],
+        "planned_margin": walk_margin(planned)[:, 0],
+        "planned_loss_time": loss_time(planned)[0],
+    }
+    texts = _TIMES | PLANNED | MEASURED
+    variables = {
+        name: (dimensions, values[name], {"units": units, "long_name": long_name})
+        for name, (dimensions, units, long_name) in texts.items()
+        if name in values
+    }
+    coords = {name: variables.pop(name) for name in _TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
+    return xr.Dataset(variables, coords, {"title": title, **asdict(body), **_settings(network)})
+
+
+def _settings(network: Network) -> dict[str, Any]:
+    """The constants of a network in one flat table that NetCDF and JSON can hold."""
+    settings = asdict(network)
+    return settings | {name: list(values) for name, values in settings.pop("geometry").items()}
+
+
+def _one_start(walk: Walk, start: int) -> Walk:
+    size = walk.stance.shape[1]
+    if not 0 <= start < size:
+        raise InputError(f"start = {start}; expected 0 to {size - 1}")
+    one = slice(start, start + 1)
+    return Walk(walk.time, walk.velocity[:, one], walk.x[:, one], walk.y[:, one], walk.stance[:, one], walk.geometry)
+
+
+def _lifted_tips(planned: Walk, body: Body, network: Network) -> tuple[np.ndarray, np.ndarray]:
+    """Planned tips of one start in the root frame after each step, (step, leg, 3), and at time 0, (leg, 3) [mm]."""
+    x = planned.x[0] + planned.velocity[0, :, None] * network.dt  # all legs retract in the first step
+    tips = TipTargets(x, body, network).follow(planned, np.array([0]))[0]
+    start = np.stack([x[0] + network.geometry.origin, network.geometry.y, np.full(6, -body.standing_height)], axis=-1)
+    m = body.substeps(network)
+    return tips[m - 1 :: m], start
+
+
+def _held_joints(tips: np.ndarray, legs: LegDimensions) -> np.ndarray:
+    """Joint angles at the tips, (step, leg, joint) [rad]; a leg out of reach keeps its last angles."""
+    joints, reachable = tips_to_joints(tips, legs)
+    if not reachable[0].all():
+        leg = int(np.argmin(reachable[0]))
+        raise InputError(f"leg {LEGS[leg]} cannot reach its tip at time 0, {tips[0, leg].round(3).tolist()} mm")
+    last = np.maximum.accumulate(np.where(reachable, np.arange(len(tips))[:, None], 0), axis=0)
+    return joints[last, np.arange(6)]
+
+
+def _rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors, (..., 3), turned by unit quaternions, (..., 4)."""
+    w, axis = quaternion[..., :1], quaternion[..., 1:]
+    return vector + 2.0 * np.cross(axis, np.cross(axis, vector) + w * vector)

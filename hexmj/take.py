@@ -1,0 +1,97 @@
+"""What a film shows of a recording: the measured walk of a physical insect, or the plan that a puppet shows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from hexmj.errors import InputError
+from hexmj.insect import TRUNK
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """The numbers of one recording, in memory; only steps with a pose, so none after a fall."""
+
+    title: str
+    physical: bool
+    """Whether a physical insect was recorded, or a puppet."""
+    vp: float
+    """V_p [mm/s]."""
+    step: float
+    """Duration of a step [s]."""
+    duration: float
+    """Time recorded [s], also beyond a fall."""
+    velocity: np.ndarray
+    """(step,) V_r as a fraction of V_p."""
+    margin: np.ndarray
+    """(step,) stability margin [mm]."""
+    stance: np.ndarray
+    """(step, leg) which feet stand."""
+    feet: np.ndarray
+    """(step, leg, 2) feet in the world [mm]."""
+    planned_tip: np.ndarray
+    """(step, leg, 3) planned tips in the world [mm]."""
+    centre_of_mass: np.ndarray
+    """(step, 3) in the world [mm]."""
+    qpos: np.ndarray
+    """(step, 25) positions of the insect."""
+    lost: float
+    """First loss of static stability [s], inf for none."""
+    fell: float
+    """Fall [s], inf for none."""
+    part: str
+    """Part of the trunk that touched the ground first, where `fell` is finite."""
+
+    @classmethod
+    def of(cls, recording: xr.Dataset) -> "Take":
+        """Read a recording."""
+        qpos = recording["qpos"].values
+        shown = slice(np.isfinite(qpos).all(axis=1).sum())
+        if shown.stop == 0:
+            raise InputError(f"the recording {recording.attrs['title']!r} holds no pose; expected at least one")
+        physical = "measured_stance" in recording
+        kind = "measured" if physical else "planned"
+        centre, tips = recording["centre_of_mass"].values[shown], recording["planned_tip"].values[shown]
+        seen = np.stack(
+            [
+                recording[f"{kind}_x"].values[shown] + np.tile(recording.attrs["origins"], 2),
+                recording[f"{kind}_y"].values[shown],
+            ],
+            axis=-1,
+        )
+        seconds, vp = recording["seconds"].values, float(recording.attrs["vp"])
+        return cls(
+            title=recording.attrs["title"],
+            physical=physical,
+            vp=vp,
+            step=float(recording.attrs["dt"]) / vp,
+            duration=float(seconds[-1]),
+            velocity=recording["velocity"].values[shown],
+            margin=recording[f"{kind}_margin"].values[shown],
+            stance=recording[f"{kind}_stance"].values[shown].astype(bool),
+            feet=centre[:, None, :2] + _turned(seen, _heading(qpos[shown])),
+            planned_tip=tips,
+            centre_of_mass=centre,
+            qpos=qpos[shown],
+            lost=float(recording[f"{kind}_loss_time"]) / vp,
+            fell=float(recording["fall_time"]) / vp if physical else np.inf,
+            part=TRUNK[int(recording["fall_part"])] if physical else "",
+        )
+
+    def row(self, seconds: float) -> int:
+        """The step whose end is nearest to a time; the last one after the end."""
+        return int(np.clip(round(seconds / self.step) - 1, 0, len(self.qpos) - 1))
+
+
+def _heading(qpos: np.ndarray) -> np.ndarray:
+    """Direction in which the root points, (step,) [rad], counter-clockwise from the world's x axis."""
+    w, x, y, z = qpos[:, 3:7].T
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _turned(points: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Points, (step, leg, 2), turned by an angle in each step."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    ahead, left = points[..., 0], points[..., 1]
+    return np.stack([cos * ahead - sin * left, sin * ahead + cos * left], axis=-1)

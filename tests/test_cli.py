@@ -1,0 +1,212 @@
+"""The command line: JSON, files, exit codes, and the same bits whatever the threads."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import mediapy
+import numpy as np
+import pytest
+import xarray as xr
+
+import hexmj
+from hexmj.cli import main
+
+PNG = b"\x89PNG"
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command in this process: its exit code, standard output and standard error."""
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["hexmj", *map(str, words)])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, *capsys.readouterr()
+
+    return call
+
+
+def test_help_names_every_command_and_imports_nothing_slow():
+    script = "import sys; from hexmj.cli import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
+    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render"))
+    assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
+
+
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render"])
+def test_every_command_has_help_with_units_and_defaults(run, command):
+    code, out, _ = run(command, "--help")
+    assert code == 0
+    assert "[mm/s]" in out
+    assert "(default: 80.0)" in out
+
+
+def test_kinematic_side_never_imports_mujoco():
+    script = (
+        "import sys, numpy as np, hexmj\n"
+        "hexmj.flss(hexmj.LDVS, [0.5], starts=10); hexmj.walk(np.zeros((1, 6)), hexmj.LDVS, 0.5, 10.0)\n"
+        "assert 'mujoco' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):
+    words = ["flss", "--velocities", "0.1", "0.5", "--starts", "500", "--window", "start", "--json"]
+    done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, check=True)
+    answer = json.loads(done.stdout)
+    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], starts=500, window="start")
+    for key in ("velocity", "flss", "low", "high"):
+        assert answer[key] == table[key].values.tolist()
+    assert answer["settings"]["window"] == "start"
+    assert answer["settings"]["seed"] == 0
+    assert answer["sample_sd"] == [None, None]
+
+
+def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
+    words = ["compare", "--velocities", 0.4, 0.6, "--starts", 12, "--window", "start", "--json", "--no-video"]
+    answers, datasets = [], []
+    for threads in (1, 2):
+        out = tmp_path / str(threads)
+        code, text, _ = run(*words, "--threads", threads, "--out", out)
+        assert code == 0
+        answers.append({key: value for key, value in json.loads(text).items() if key != "files"})
+        datasets.append(xr.load_dataset(out / "comparison.nc"))
+        assert (out / "comparison.png").read_bytes().startswith(PNG)
+    assert answers[0] == answers[1]
+    assert datasets[0].identical(datasets[1])
+    assert answers[0]["velocity"] == [0.4, 0.6]
+    for model in ("ldvs", "uncoordinated"):
+        assert {"kinematic", "measured", "physical", "agreement"} <= set(answers[0][model])
+    data = datasets[0]
+    assert data.fall.attrs["units"] == "time unit"
+    assert data.sizes == {"model": 2, "velocity": 2, "start": 12, "leg": 6}
+    manifest = json.loads((tmp_path / "1" / "manifest.json").read_text())
+    assert manifest["settings"]["seed"] == 0
+    assert manifest["settings"]["body"]["vp"] == 80.0
+    assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
+
+
+def test_compare_makes_a_video_of_a_gait(run, tmp_path):
+    code, out, _ = run("compare", "--models", "ldvs", "--velocities", 0.5, "--starts", 4, "--window", 30, "--out", tmp_path)
+    assert code == 0
+    assert "agreement" in out
+    video = mediapy.read_video(tmp_path / "gait.mp4")
+    assert len(video) == round(30 / 80 * 30 * 2)
+
+
+def test_without_rendering_compare_still_delivers(tmp_path):
+    """MuJoCo is told to use a screen that is not there: numbers and figure come, and a sentence on what is missing."""
+    words = ["compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--window", "20", "--out", str(tmp_path)]
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "MUJOCO_GL": "glfw"}
+    done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0
+    assert "libegl1" in done.stderr
+    assert (tmp_path / "comparison.png").exists()
+    assert not (tmp_path / "gait.mp4").exists()
+
+
+def test_physical_flss(run, tmp_path):
+    words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--window", "start"]
+    code, text, _ = run(*words, "--json", "--out", tmp_path)
+    answer = json.loads(text)
+    assert code == 0
+    body = hexmj.Body(vp=200.0)
+    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], starts=10, window="start", body=body)
+    assert answer["flss"] == expected.flss.values.tolist()
+    assert answer["settings"]["body"]["vp"] == 200.0
+    assert xr.load_dataset(tmp_path / "flss.nc").flss.values.tolist() == answer["flss"]
+    code, text, _ = run(*words)
+    assert "vp 200" in text
+    assert "step_height 12" in text
+
+
+def test_accelerated_flss(run):
+    code, text, _ = run("flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--window", "start", "--json")
+    assert code == 0
+    assert json.loads(text)["duration"] == [pytest.approx(240.0)]
+
+
+@pytest.mark.parametrize("physical", [False, True])
+def test_walk(run, tmp_path, physical):
+    words = ["walk", "--velocity", 0.5, "--window", 40, "--start", 3, "--json", "--out", tmp_path]
+    code, text, _ = run(*words, *(["--physical"] if physical else []))
+    assert code == 0
+    answer = json.loads(text)
+    lost = hexmj.first_loss(hexmj.draw_starts(4, 0)[3:], hexmj.LDVS, 0.5, 40.0)[0]
+    assert answer["planned loss"] == (lost if np.isfinite(lost) else None)
+    assert ("fall" in answer) == physical
+    assert (tmp_path / "walk.png").read_bytes().startswith(PNG)
+    assert hexmj.load_recording(tmp_path / "recording.nc").sizes["step"] == 400
+
+
+def test_render_from_a_recording_and_side_by_side(run, tmp_path):
+    walk = ["--velocity", 0.5, "--window", 16]
+    run("walk", *walk, "--physical", "--out", tmp_path / "walk")
+    for name, words, width in (
+        ("file", [tmp_path / "walk" / "recording.nc"], 320),
+        ("plan", [*walk, "--beside", "planned"], 640),
+        ("model", [*walk, "--beside", "uncoordinated"], 640),
+    ):
+        film = ["--width", 320, "--height", 240, "--fps", 20, "--slow-motion", 4]
+        code, text, _ = run("render", *words, *film, "--json", "--out", tmp_path / name)
+        assert code == 0
+        video = mediapy.read_video(tmp_path / name / "gait.mp4")
+        assert json.loads(text)["frames"] == len(video) == round(16 / 80 * 4 * 20)
+        assert video.shape[1:] == (240, width, 3)
+
+
+NONSENSE = [
+    (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
+    (["flss", "--velocities", "1.2"], "0 <= V < 1"),
+    (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
+    (["flss", "--velocity", "0.1"], "Unrecognized options"),
+    (["flss", "--window", "long"], "valid names: walk, start"),
+    (["flss", "--starts", "0"], "at least 1"),
+    (["flss", "--dt", "0"], "dt = 0.0; expected"),
+    (["flss", "--geometry", "round"], "fig1"),
+    (["flss", "--acceleration", "-1"], "above 0"),
+    (["walk", "--start", "-1"], "at least 0"),
+    (["walk", "--physical", "--step-height", "40"], "step_height = 40.0; expected above 0 and at most 14 mm"),
+    (["walk", "--physical", "--vp", "nan"], "vp = nan; expected"),
+    (["compare", "--models", "nowhere.toml"], "nor a TOML file"),
+    (["render", "--camera", "behind"], "following"),
+    (["render", "--width", "321"], "even number"),
+    (["render", "nowhere.nc"], "nowhere.nc"),
+    (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),
+    (["dance"], "compare, flss, walk, render"),
+]
+
+
+@pytest.mark.parametrize(("words", "sentence"), NONSENSE, ids=lambda value: " ".join(value) if isinstance(value, list) else "")
+def test_nonsense_gets_a_sentence_and_code_2_and_leaves_results_alone(run, tmp_path, monkeypatch, words, sentence):
+    monkeypatch.chdir(tmp_path)
+    results = [tmp_path / "results" / words[0] / name for name in ("manifest.json", "recording.nc", "gait.mp4")]
+    for path in results:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("precious")
+    code, out, error = run(*words)
+    assert code == 2
+    assert sentence in " ".join(error.replace("│", " ").split())
+    assert out == ""
+    assert all(path.read_text() == "precious" for path in results)
+
+
+def test_a_folder_that_is_a_file(run, tmp_path):
+    (tmp_path / "taken").write_text("precious")
+    code, _, error = run("walk", "--out", tmp_path / "taken")
+    assert code == 2
+    assert "expected a folder" in error
+    assert (tmp_path / "taken").read_text() == "precious"
+
+
+def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):
+    code, _, error = run("walk", "--physical", "--settling-time", 1, "--out", tmp_path)
+    assert code == 1
+    assert "did not settle" in error
+    assert not Path(tmp_path / "recording.nc").exists()

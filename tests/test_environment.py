@@ -1,0 +1,351 @@
+"""The dm_env face: its contract, its agreement with the physical walk, and what the viewer needs."""
+
+import unittest
+
+import numpy as np
+import pytest
+from dm_control.rl import control
+from dm_control.viewer.runtime import Runtime, State
+from dm_env import TimeStep, specs
+from dm_env.test_utils import EnvironmentTestMixin
+
+from hexmj import environment, gl, insect
+from hexmj.body import Body
+from hexmj.errors import InputError
+from hexmj.kinematics import joints_to_tips
+from hexmj.legs import CENTRED, FIG1, LEGS
+from hexmj.loss_frequency import draw_starts
+from hexmj.parameters import HWS, LDVS, Network
+from hexmj.physical_walks import physical_walk
+from hexmj.physics import drive, settle
+from hexmj.stability import walk_margin
+
+ZEROS = np.zeros(18)
+KINDS = pytest.mark.parametrize("actions", ["joints", "tips"])
+
+
+class _Contract(EnvironmentTestMixin):
+    """dm_env's own checks; the sequence of actions goes beyond the end of an episode."""
+
+    def make_action_sequence(self):
+        for _ in range(30):
+            yield self.make_action()
+
+
+class TestJointsContract(_Contract, unittest.TestCase):
+    def make_object_under_test(self):
+        return environment.load(actions="joints", duration=2.0)
+
+
+class TestTipsContract(_Contract, unittest.TestCase):
+    def make_object_under_test(self):
+        return environment.load(actions="tips", duration=2.0)
+
+
+def run(walking: control.Environment, action: np.ndarray) -> list[TimeStep]:
+    """One episode with the same action throughout."""
+    steps = [walking.reset()]
+    while not steps[-1].last():
+        steps.append(walking.step(action))
+    return steps
+
+
+def folded(walking: control.Environment) -> np.ndarray:
+    """Joint targets that pull all feet up to the body."""
+    spec = walking.action_spec()
+    action = 0.5 * (spec.minimum + spec.maximum).reshape(6, 3)
+    action[:, 1] = spec.maximum.reshape(6, 3)[:, 1]
+    return action.ravel()
+
+
+@pytest.mark.parametrize("velocity", [0.3, 0.5])
+def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
+    """Until the end or the fall, which is seen at the end of its step."""
+    starts, duration, body = draw_starts(2, 0), 100.0, Body()
+    walked = physical_walk(starts, LDVS, velocity, duration)
+    settled, m = settle(starts), body.substeps(Network())
+    standing = np.zeros((2, 1000 * m + 1, 6), dtype=bool)
+    for stretch in drive(settled, LDVS, velocity, duration):
+        standing[stretch.ids, stretch.first : stretch.first + stretch.standing.shape[1]] = stretch.standing
+    margins = walk_margin(walked.measured)
+    walking = environment.load(velocity, actions="tips", duration=duration)
+    physics = walking.physics
+    for start in range(2):
+        qpos, seen = [], []
+        step = walking.reset()
+        while not step.last():
+            step = walking.step(ZEROS)
+            qpos.append(physics.position())
+            seen.append(step.observation)
+        count = len(qpos) - int(step.discount == 0)
+        np.testing.assert_array_equal(qpos[:count], walked.qpos[:count, start])
+        planned = walked.planned
+        np.testing.assert_array_equal([o["planned_stance"] for o in seen], planned.stance[: len(seen), start])
+        tips = np.array([o["planned_tips"] for o in seen])
+        np.testing.assert_allclose(tips[..., :2], planned.feet[: len(seen), start], rtol=0, atol=1e-12)
+        contact = np.array([o["contact"] for o in seen])[:count]
+        np.testing.assert_array_equal(contact, standing[start, m - 1 : m * count : m])
+        same = (contact == walked.measured.stance[:count, start]).all(axis=1)
+        assert same.mean() > 0.95
+        margin = np.array([o["margin"] for o in seen])[:count]
+        np.testing.assert_allclose(margin[same], margins[:count, start][same], rtol=0, atol=1e-9)
+        assert sum(o["out_of_reach"].sum() for o in seen) == walked.outcomes.unreachable[start]
+        fall = walked.outcomes.fall[start]
+        assert step.discount == float(np.isinf(fall))
+        assert len(qpos) == (1000 if np.isinf(fall) else np.ceil(fall / Network().dt - 1e-6))
+    assert np.isinf(walked.outcomes.fall).all() == (velocity == 0.3)
+
+
+@pytest.mark.parametrize(
+    ("body", "network"),
+    [
+        (Body(vp=200.0, friction=0.5), Network()),
+        (Body(vp=40.0, standing_height=12.0), Network(dt=0.5, geometry=CENTRED)),
+    ],
+)
+def test_other_conditions_are_those_of_the_physical_walk(body: Body, network: Network):
+    walked = physical_walk(draw_starts(1, 7, network), HWS, 0.2, 20.0, body=body, network=network)
+    walking = environment.load(0.2, actions="tips", model=HWS, body=body, network=network, duration=20.0, seed=7)
+    walking.reset()
+    qpos = []
+    for _ in range(len(walked.qpos)):
+        walking.step(ZEROS)
+        qpos.append(walking.physics.position())
+    np.testing.assert_array_equal(qpos, walked.qpos[:, 0])
+    assert np.isfinite(qpos).all()
+
+
+@KINDS
+def test_same_seed_same_bits(actions):
+    def episodes(seed: int) -> list[np.ndarray]:
+        walking = environment.load(actions=actions, duration=3.0, seed=seed)
+        bits = []
+        for _ in range(2):
+            action = ZEROS if actions == "tips" else walking.reset().observation["joint_angles"]
+            bits += [value for step in run(walking, action) for value in step.observation.values()]
+        return bits
+
+    first, second, other = episodes(3), episodes(3), episodes(4)
+    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+    assert not all(np.array_equal(a, b) for a, b in zip(first, other, strict=True))
+
+
+def test_episodes_take_the_drawn_starts_one_after_the_other():
+    walking = environment.load(seed=5)
+    tips = np.array([walking.reset().observation["planned_tips"] for _ in range(18)])
+    np.testing.assert_allclose(tips[..., 0] - FIG1.origin, draw_starts(18, 5), atol=1e-12)
+
+
+@KINDS
+def test_specs_are_named_and_bounded(actions):
+    walking = environment.load(actions=actions)
+    action = walking.action_spec()
+    assert isinstance(action, specs.BoundedArray)
+    assert len(set(action.name.split("\t"))) == 18
+    assert all(name.startswith(leg) for name, leg in zip(action.name.split("\t"), np.repeat(LEGS, 3), strict=True))
+    assert np.isfinite(action.minimum).all()
+    assert (action.minimum < action.maximum).all()
+    observations = walking.observation_spec()
+    assert list(observations) == list(walking.reset().observation)
+    assert all(spec.name == name for name, spec in observations.items())
+    for name in {"contact", "planned_stance"}:
+        assert isinstance(observations[name], specs.BoundedArray)
+
+
+def test_joint_actions_are_the_actuators_targets_in_their_order():
+    walking = environment.load(actions="joints")
+    model = walking.physics.model
+    spec = walking.action_spec()
+    assert spec.name.split("\t") == [model.id2name(i, "actuator") for i in range(18)]
+    np.testing.assert_array_equal(np.stack([spec.minimum, spec.maximum], axis=1), model.actuator_ctrlrange)
+    action = walking.reset().observation["joint_angles"] + 0.01
+    walking.step(action)
+    np.testing.assert_array_equal(walking.physics.control(), action)
+    walking.step(spec.maximum.astype(np.float32))
+
+
+def test_physics_is_reached_by_names():
+    walking = environment.load()
+    step = walking.reset()
+    named = walking.physics.named.data
+    assert named.qpos["L1_thorax_coxa"] == step.observation["joint_angles"][0]
+    assert named.qpos["R3_femur_tibia"] == step.observation["joint_angles"][17]
+    assert walking.control_timestep() == pytest.approx(Network().dt / Body().vp)
+    for _ in range(200):
+        walking.step(step.observation["joint_angles"])
+    weight = 9810 * walking.physics.model.body_mass.sum()
+    assert sum(named.sensordata[f"{leg}_touch"][0] for leg in LEGS) == pytest.approx(weight, rel=0.02)
+
+
+def test_observed_tips_are_those_of_the_joints():
+    walking = environment.load(actions="tips")
+    seen = run_steps(walking, 100).observation
+    tips = joints_to_tips(seen["joint_angles"].reshape(6, 3), insect.dimensions(walking.physics.model.ptr))
+    np.testing.assert_allclose(seen["tips"], tips, rtol=0, atol=1e-9)
+
+
+def run_steps(walking: control.Environment, count: int) -> TimeStep:
+    """The last of some steps with zeros."""
+    walking.reset()
+    return [walking.step(ZEROS) for _ in range(count)][-1]
+
+
+def test_velocity_is_seen_from_the_heading():
+    walking = environment.load()
+    walking.reset()
+    with walking.physics.reset_context():
+        data = walking.physics.data
+        data.qpos[2:7] = 20.0, np.cos(0.4), 0.0, 0.0, np.sin(0.4)
+        data.qvel[:3] = 10.0 * np.cos(0.8), 10.0 * np.sin(0.8), 3.0
+    np.testing.assert_allclose(walking.physics.velocity_from_heading(), [10.0, 0.0, 3.0], atol=1e-12)
+
+
+def test_clearance_at_home_is_that_of_the_metathorax():
+    walking = environment.load()
+    walking.physics.reset(walking.physics.model.name2id("home", "key"))
+    assert walking.physics.clearance() == pytest.approx(10.4 - 2.0 - 1.6)
+
+
+def test_no_foot_in_contact_has_a_margin_of_its_own():
+    """It lies below every margin that one foot in contact can have, at any reach of the legs."""
+    walking = environment.load()
+    walking.reset()
+    physics = walking.physics
+    one = [float(physics.margin(row)) for row in np.eye(6, dtype=bool)]
+    assert physics.margin(np.zeros(6, dtype=bool)) == environment.NO_FOOT < min(one) < 0
+    legs = insect.dimensions(physics.model.ptr)
+    reach = np.linalg.norm(legs.coxa_position[:, :2], axis=1) + legs.coxa + legs.femur + legs.tibia
+    assert reach.max() + 10.0 < -environment.NO_FOOT  # 10 mm for the shift of the centre of mass
+
+
+def test_reward_is_its_formula():
+    walking = environment.load(0.25)
+    walking.reset()
+    task, physics = walking.task, walking.physics
+    command = 0.25 * Body().vp
+    with physics.reset_context():
+        physics.data.qpos[2:7] = 20.0, 1.0, 0.0, 0.0, 0.0
+    for speed, reward in ((1, 1), (0, 0), (0.5, 0.5), (1.5, 0.5), (2, 0), (3, 0), (-1, 0)):
+        physics.data.qvel[0] = speed * command
+        assert task.get_reward(physics) == pytest.approx(reward)
+    for roll, reward in ((0.0, 1.0), (np.pi / 3, 0.5), (np.pi / 2, 0.0), (np.pi, 0.0)):
+        with physics.reset_context():
+            physics.data.qpos[2:7] = 60.0, np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0
+            physics.data.qvel[0] = command
+        assert task.get_reward(physics) == pytest.approx(reward, abs=1e-12)
+
+
+def test_a_fall_ends_the_episode_with_discount_zero():
+    walking = environment.load(actions="joints")
+    steps = run(walking, folded(walking))
+    assert len(steps) < 200
+    assert steps[-1].discount == 0.0
+    assert steps[-1].reward == 0.0
+    assert steps[-1].observation["clearance"] == pytest.approx(0.0, abs=0.5)
+    assert all(step.discount == 1.0 for step in steps[1:-1])
+    assert steps[-2].observation["contact"].sum() == 0
+    assert steps[-2].observation["margin"] == environment.NO_FOOT
+    assert walking.step(ZEROS).first()
+
+
+def test_the_end_of_the_time_keeps_the_discount():
+    steps = run(environment.load(actions="tips", duration=2.0), ZEROS)
+    assert len(steps) - 1 == 20
+    assert steps[-1].discount == 1.0
+    assert all(0.0 <= step.reward <= 1.0 for step in steps[1:])
+
+
+def test_a_leg_out_of_reach_keeps_its_angles_and_is_counted():
+    walking = environment.load(actions="tips")
+    substeps = Body().substeps(Network())
+    before = walking.reset().observation["joint_angles"].reshape(6, 3)
+    offsets = np.zeros((6, 3))
+    offsets[4] = 5.0, 5.0, 5.0  # the middle leg of the right side, folded towards the body
+    step = walking.step(offsets.ravel())
+    assert step.observation["out_of_reach"].tolist() == [0, 0, 0, 0, substeps, 0]
+    targets = walking.physics.control().reshape(6, 3)
+    np.testing.assert_array_equal(targets[4], before[4])
+    assert (targets[[0, 1, 2, 3, 5]] != before[[0, 1, 2, 3, 5]]).any(axis=1).all()
+    assert walking.step(ZEROS).observation["out_of_reach"].sum() == 0
+
+
+def test_offsets_move_the_feet():
+    """Feet pushed down lift the body."""
+    height = []
+    for up in (0.0, -1.0):
+        walking = environment.load(actions="tips")
+        step = walking.reset()
+        for _ in range(60):
+            step = walking.step(np.tile([0.0, 0.0, up], 6))
+        height.append(step.observation["clearance"])
+    assert height[1] - height[0] == pytest.approx(1.0, abs=0.3)
+
+
+def test_divergence_raises():
+    walking = environment.load(actions="tips")
+    walking.reset()
+    walking.physics.data.qvel[0] = np.nan
+    with pytest.raises(control.PhysicsError):
+        walking.step(ZEROS)
+    assert walking.reset().first()
+    assert walking.step(ZEROS).mid()
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        {"velocity": 1.5},
+        {"velocity": 0.0},
+        {"velocity": np.nan},
+        {"actions": "foo"},
+        {"duration": -1.0},
+        {"duration": np.nan},
+        {"seed": -1},
+    ],
+)
+def test_nonsense_is_refused(nonsense: dict):
+    with pytest.raises(InputError):
+        environment.load(**nonsense)
+
+
+@pytest.mark.parametrize("action", [np.zeros(3), np.full(18, np.nan), np.full(18, 5.1)])
+def test_nonsensical_actions_are_refused(action: np.ndarray):
+    walking = environment.load(actions="tips")
+    walking.reset()
+    with pytest.raises(InputError, match="action"):
+        walking.step(action)
+
+
+@pytest.mark.parametrize("policy", [None, lambda step: ZEROS])
+def test_the_viewers_runtime_runs_it(policy):
+    """The viewer without its window: ticks, a pause, single steps, the end of an episode and a restart."""
+    walking = environment.load(actions="tips", duration=5.0)
+    runtime, errors = Runtime(walking, policy), []
+    runtime.on_error += errors.append
+    runtime.tick(0.02, paused=False)
+    assert runtime.state is State.RUNNING
+    assert runtime.get_time() == pytest.approx(0.02, abs=walking.control_timestep())
+    now = runtime.get_time()
+    runtime.tick(0.02, paused=True)
+    assert runtime.get_time() == now
+    runtime.single_step()
+    assert runtime.get_time() == pytest.approx(now + walking.control_timestep())
+    np.testing.assert_array_equal(runtime.last_action, ZEROS)
+    for _ in range(4):
+        runtime.tick(0.02, paused=False)
+    assert runtime.state is State.STOPPED
+    runtime.restart()
+    runtime.tick(0.02, paused=False)
+    assert runtime.state is State.RUNNING
+    assert not errors
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+def test_it_is_rendered():
+    walking = environment.load()
+    walking.reset()
+    for camera in (-1, "side"):
+        frame = walking.physics.render(48, 64, camera_id=camera)
+        assert frame.shape == (48, 64, 3)
+        assert frame.std() > 5
+    walking.physics.free()

@@ -1,0 +1,109 @@
+"""FLSS against an independent simulation, and the laws of its windows, starts and intervals."""
+
+import numpy as np
+import pytest
+
+from hexmj.errors import InputError
+from hexmj.loss_frequency import draw_starts, flss, flss_over_range, observation_time, wilson_interval
+from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
+
+VELOCITIES = [0.1, 0.3, 0.5, 0.7]
+REFERENCE = {
+    ("uncoordinated", "walk"): [0.51, 0.94, 0.996, 1.0],
+    ("uncoordinated", "start"): [0.09, 0.67, 0.996, 1.0],
+    ("hws", "walk"): [0.025, 0.21, 0.58, 0.96],
+    ("hws", "start"): [0.017, 0.11, 0.48, 0.86],
+    ("ldvs", "walk"): [0.021, 0.23, 0.60, 0.96],
+    ("ldvs", "start"): [0.005, 0.11, 0.50, 0.88],
+}
+"""From an independent simulation with the same inferred constants, 7000 random starts, as printed there."""
+
+MODELS = {"uncoordinated": UNCOORDINATED, "hws": HWS, "ldvs": LDVS}
+
+
+@pytest.mark.parametrize(("model", "window"), REFERENCE)
+def test_reference_to_the_printed_digit(model, window):
+    """The starts of seed 1 give every number of the reference as it is printed there.
+
+    With other seeds the sampling error is added: with seed 0 the largest of the 24 differences is 0.020
+    (uncoordinated, `start`, V = 0.3: 0.650; 0.656 over 35,000 starts), the others are below 0.011.
+    """
+    printed = np.array(REFERENCE[model, window])
+    digit = np.where((printed < 0.1) | (printed > 0.99), 0.001, 0.01)
+    if (model, window) == ("uncoordinated", "start"):
+        digit[0] = 0.01
+    ours = flss(MODELS[model], VELOCITIES, window=window, seed=1).flss.values
+    assert (np.abs(ours - printed) <= digit / 2 + 1e-9).all()
+
+
+def test_acceleration_nearly_keeps_stability():
+    """The reference gives about 0.03 and 0.05 for a = 0.00008 up to V = 0.9; the paper below 0.05 and 0.1."""
+    for model, reference in ((LDVS, 0.03), (HWS, 0.05)):
+        table = flss(model, [0.9], starts=1000, window="start", acceleration=Acceleration())
+        assert table.flss.item() == pytest.approx(reference, abs=0.02)
+
+
+def test_starts_lie_in_s_and_do_not_depend_on_their_number():
+    starts = draw_starts(1000, seed=3)
+    assert starts.shape == (1000, 6)
+    assert ((starts > -10) & (starts < 10)).all()
+    assert np.array_equal(draw_starts(10, seed=3), starts[:10])
+    assert not np.array_equal(draw_starts(10, seed=4), starts[:10])
+
+
+def test_windows():
+    v = np.array([0.1, 0.5])
+    assert observation_time("walk", v, Network()) == pytest.approx([660.0, 180.0])
+    assert observation_time("start", v, Network()) == pytest.approx([40.0, 40.0])
+    assert observation_time(12.5, v, Network()) == pytest.approx([12.5, 12.5])
+    accelerated = observation_time("start", v, Network(), Acceleration(0.001, 0.1))
+    assert accelerated == pytest.approx([40.0, 440.0])
+
+
+def test_threads_do_not_matter():
+    one, two = (flss(LDVS, [0.3, 0.7], starts=500, threads=n) for n in (1, 2))
+    assert one.equals(two)
+
+
+def test_samples_of_the_protocol():
+    table = flss(LDVS, [0.5], starts=3000, window="start")
+    lost = np.isfinite(table.loss_time.values[0]).reshape(3, 1000).mean(axis=1)
+    assert table.sample_sd.item() == pytest.approx(lost.std(ddof=1))
+    assert table.flss.item() == pytest.approx(lost.mean())
+    assert np.isnan(flss(LDVS, [0.5], starts=100, window="start").sample_sd.item())
+
+
+def test_wilson_interval_by_its_formula():
+    z, k, n = 1.959963984540054, 7, 200
+    p = k / n
+    centre, half = p + z**2 / 2 / n, z * np.sqrt(p * (1 - p) / n + z**2 / 4 / n**2)
+    assert wilson_interval(k, n) == pytest.approx(((centre - half) / (1 + z**2 / n), (centre + half) / (1 + z**2 / n)))
+    assert wilson_interval(0, 10)[0] == 0.0
+
+
+def test_generalised_flss_averages_over_velocities():
+    """J_N over a range lies between I_N at its ends, and is I_N where the range is a point."""
+    ends = flss(LDVS, [0.2, 0.6], starts=2000, window="start").flss.values
+    inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, starts=2000, window="start")
+    assert ends[0] < low < inside < high < ends[1]
+    assert flss_over_range(LDVS, 0.6, 0.6, starts=2000, window="start")[0] == ends[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"velocities": []}, "at least one"),
+        ({"velocities": [0.1, 0.1]}, "twice"),
+        ({"velocities": [1.0]}, "0 <= V < 1"),
+        ({"velocities": [0.0]}, "no period"),
+        ({"window": "long"}, "valid names: walk, start"),
+        ({"window": -1.0}, "at least one step"),
+        ({"starts": 0}, "at least 1"),
+        ({"seed": -1}, "at least 0"),
+        ({"threads": 0}, "at least 1"),
+    ],
+)
+def test_nonsense_gets_a_clear_sentence(change, words):
+    arguments = {"velocities": [0.5], "starts": 10} | change
+    with pytest.raises(InputError, match=words):
+        flss(LDVS, **arguments)

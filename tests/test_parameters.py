@@ -1,0 +1,125 @@
+"""Weights, symmetric forms, presets and parameter files."""
+
+import numpy as np
+import pytest
+
+from hexmj.errors import InputError
+from hexmj.legs import N1, N2, N3, N4
+from hexmj.network import walk
+from hexmj.parameters import HWS, LDVS, NEIGHBOURS, PRESETS, Network, Symmetric, Weights, load_model, weights
+
+
+def test_neighbours_are_the_paper_s():
+    """Section 2, in the paper's own numbers."""
+    paper_n1 = {1: {2, 4}, 2: {3, 5}, 3: {6}, 4: {5, 1}, 5: {6, 2}, 6: {3}}
+    paper_n2 = {1: {2}, 2: {3}, 3: set(), 4: {5}, 5: {6}, 6: set()}
+    paper_n3 = {1: {4}, 2: {1, 5}, 3: {2, 6}, 4: {1}, 5: {4, 2}, 6: {5, 3}}
+    paper_n4 = {1: set(), 2: {1}, 3: {2}, 4: set(), 5: {4}, 6: {5}}
+    for ours, paper in ((N1, paper_n1), (N2, paper_n2), (N3, paper_n3), (N4, paper_n4)):
+        assert {d + 1: {e + 1 for e in sources} for d, sources in enumerate(ours)} == paper
+
+
+def test_number_of_parameters():
+    """58 for the LDVS form, 48 for the HWS form (Section 2): 10, 4, 40 and 4 by mechanism."""
+    pairs = {kind: sum(map(len, n)) for kind, n in NEIGHBOURS.items()}
+    assert pairs["p1"] == 10
+    assert pairs["p2"] == pairs["p4"] == 4
+    assert sum(pairs[kind] for kind in ("p31", "p32", "p33", "p34")) == 40
+    assert sum(pairs.values()) == 58
+    assert len(weights(LDVS).to_vector()) == 58
+    assert len(weights(HWS).to_vector(48)) == 48
+
+
+@pytest.mark.parametrize("model", PRESETS.values())
+def test_vectors_go_back_and_forth(model):
+    assert Symmetric.from_vector(model.to_vector()) == model
+    general = weights(model)
+    again = Weights.from_vector(general.to_vector())
+    assert all(np.array_equal(getattr(general, kind), getattr(again, kind)) for kind in NEIGHBOURS)
+
+
+def test_short_forms_leave_out_the_velocity_dependence():
+    assert Symmetric.from_vector(HWS.to_vector(9)) == HWS
+    assert not Weights.from_vector(weights(LDVS).to_vector(48)).p34.any()
+    assert weights(LDVS).p34.any()
+
+
+def test_appendix_a():
+    p = weights(LDVS)
+    assert p.p1[0, 1] == p.p1[4, 5] == LDVS.p1_i
+    assert p.p1[0, 3] == p.p1[5, 2] == LDVS.p1_c
+    assert p.p31[1, 0] == p.p31[5, 4] == LDVS.p31_i
+    assert p.p32[3, 0] == p.p33[3, 0] == LDVS.p32_c
+    assert p.p34[2, 1] == LDVS.p34_i
+    assert p.p34[2, 5] == 0.0
+    assert p.p4[1, 0] == 1.0
+
+
+def test_files_give_the_same_walk_as_the_preset(tmp_path):
+    symmetric = tmp_path / "symmetric.toml"
+    symmetric.write_text("[symmetric]\n" + "\n".join(f"{k} = {v}" for k, v in vars(HWS).items()))
+    general = tmp_path / "general.toml"
+    tables = []
+    for kind, neighbours in NEIGHBOURS.items():
+        matrix = getattr(weights(HWS), kind)
+        tables.append(f"[weights.{kind}]")
+        tables += [f'"{d + 1},{e + 1}" = {matrix[d, e]}' for d, sources in enumerate(neighbours) for e in sources]
+    general.write_text("\n".join(tables))
+    start = np.random.default_rng(0).uniform(-10, 10, (3, 6))
+    expected = walk(start, HWS, 0.3, 80.0).x
+    for path in (symmetric, general):
+        assert np.array_equal(walk(start, load_model(str(path)), 0.3, 80.0).x, expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[symmetric]\np5_i = 1.0", "unknown key 'p5_i'; valid keys: p1_i"),
+        ("[symmetric]\np1_i = 'ten'", "p1_i = 'ten'; expected a number"),
+        ("[symmetric]\np1_i = true", "expected a number"),
+        ("[symmetric]\np1_i = nan", "finite"),
+        ("[symmetric]\np2 = 0.5", "expected 0 or 1"),
+        ("[symmetric", "cannot be read as TOML"),
+        ("[other]\na = 1", "expected one table"),
+        ("", "holds nothing"),
+        ("[weights.p9]\n'1,2' = 1.0", r"unknown table \[weights.p9\]; valid names: p1"),
+        ("[weights.p1]\n'1,6' = 1.0", "unknown key '1,6'; valid keys: 1,2"),
+        ("[weights.p4]\n'2,1' = 2", "binary"),
+        ("weights = 3", "expected one table"),
+        ("[weights]\np1 = 3", "expected a table with the keys"),
+    ],
+)
+def test_files_that_make_no_sense(tmp_path, text, words):
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_model(str(path))
+
+
+def test_names_that_do_not_exist():
+    with pytest.raises(InputError, match="neither a preset .hws, ldvs, uncoordinated. nor a TOML file"):
+        load_model("lvds")
+
+
+def test_weights_off_the_neighbour_sets():
+    p1 = np.zeros((6, 6))
+    p1[0, 5] = 1.0
+    with pytest.raises(InputError, match="p1 of leg 1 from leg 6"):
+        Weights(p1, *(np.zeros((6, 6)) for _ in range(6)))
+    with pytest.raises(InputError, match="expected 58"):
+        Weights.from_vector([0.0] * 10)
+    with pytest.raises(InputError, match="expected 10"):
+        Symmetric.from_vector([0.0] * 8)
+
+
+@pytest.mark.parametrize("change", [{"dt": 0.0}, {"aep0": -11.0}, {"pep_min": 0.0}, {"order": "random"}, {"pep0": float("nan")}])
+def test_network_constants_that_make_no_sense(change):
+    with pytest.raises(InputError):
+        Network(**change)
+
+
+def test_weights_copy_their_input():
+    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+    general = Weights(**matrices)
+    matrices["p1"][0, 1] = 3.0
+    assert not general.p1.any()
