@@ -61,15 +61,25 @@ def run_compare(options: "Compare") -> None:
         settings |= {"duration": result.duration.values.tolist()}
         _print_json(summary | {"report": report, "settings": settings, "files": files})
     else:
-        table = _table("model", "V", "t", *(f"{m} FLSS" for m in MEASURES), "agreement", *AGREEMENT)
+        frequencies = _table("model", "V", "t", *MEASURES)
+        answers = _table("model", "V", "agree", "both", "only kin.", "only phys.", "none", "speed")
         for name in models:
             for v in result.velocity.values:
                 one = result.sel(model=name, velocity=v)
-                flss_cells = [_interval(one, m) for m in MEASURES]
-                counts = [str(int(one[case])) for case in AGREEMENT]
-                table.add_row(name, f"{v:g}", f"{float(one.duration):.0f}", *flss_cells, f"{float(one.agreement):.2f}",
-                              *counts)  # fmt: skip
-        _print(table, _conditions_line(conditions, physical=True), _report_line(report), *map(str, files))
+                frequencies.add_row(
+                    name, f"{v:g}", f"{one.duration.item():.0f}", *(_interval(one, m) for m in MEASURES)
+                )
+                counts = [str(one[case].item()) for case in AGREEMENT]
+                answers.add_row(name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, _speeds(one))
+        _print(
+            "Frequency of the loss of static stability, with 95 % intervals",
+            frequencies,
+            "Starts by what happened: lost on paper (kin.), fell (phys.); speed over command",
+            answers,
+            _conditions_line(conditions, physical=True),
+            "; ".join(f"{key}: {value:.3g}" for key, value in report.items()),
+            *map(str, files),
+        )
     if not options.no_video and sentence:
         print(f"hexmj: no video: {sentence}", file=sys.stderr)
 
@@ -104,7 +114,7 @@ def run_flss(options: "Flss") -> None:
             _save_figure(figures.flss_figure(table, title), out / "flss.png"),
             save_manifest(settings, out / "manifest.json"),
         ]
-    columns = [name for name, values in table.items() if values.dims == ("velocity",)]
+    columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]
     if options.json:
         lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
         _print_json(lists | {"settings": settings, "files": files})
@@ -134,7 +144,7 @@ def run_walk(options: "Walk") -> None:
     if options.json:
         _print_json(summary | {"settings": settings, "files": files})
     else:
-        _print(title, *(f"{key}: {value}" for key, value in summary.items()),
+        _print(title, *(f"{key}: {_short(value)}" for key, value in summary.items()),
                _conditions_line(options.conditions, options.physical), *map(str, files))  # fmt: skip
 
 
@@ -154,9 +164,7 @@ def run_render(options: "Render") -> None:
     if shown is None:
         conditions, v, start = options.conditions, options.velocity, options.start
         names = [Path(name).stem for name in (options.model, options.beside) if name and name != "planned"]
-        shown = [
-            _recorded(model, v, start, conditions, name, True) for model, name in zip(models, names, strict=True)
-        ]
+        shown = [_recorded(model, v, start, conditions, name, True) for model, name in zip(models, names, strict=True)]
         if options.beside == "planned":
             shown.insert(0, _recorded(models[0], v, start, conditions, f"{names[0]}, planned", False))
         for i, one in enumerate(shown):
@@ -226,25 +234,21 @@ def _summary(walked: "xr.Dataset") -> dict[str, Any]:
     return summary
 
 
-def _physical_report(result: "xr.Dataset") -> dict[str, Any]:
+def _physical_report(result: "xr.Dataset") -> dict[str, float]:
     """How far the bodies did what they were told, over all models and velocities."""
-    upright = result.speed.where(np.isinf(result.fall)).values
-    walked = upright[np.isfinite(upright)]
-    low, high = (float(walked.min()), float(walked.max())) if walked.size else (float("nan"), float("nan"))
     return {
-        "speed reached over commanded, starts that did not fall": [low, high],
-        "mean slip [mm/s]": float(result.slip.mean()),
-        "joints at their torque limit": float(result.saturation.mean()),
-        "tip targets out of reach": int(result.unreachable.sum()),
-        "simulator warnings": 0,
+        "mean slip [mm/s]": result.slip.mean().item(),
+        "joints at their torque limit": result.saturation.mean().item(),
+        "tip targets out of reach": result.unreachable.sum().item(),
+        "least clearance [mm]": result.clearance.min().item(),
+        "greatest tilt [rad]": result.tilt.max().item(),
     }
 
 
-def _report_line(report: dict[str, Any]) -> str:
-    def show(value: Any) -> str:
-        return " to ".join(f"{v:.3g}" for v in value) if isinstance(value, list) else f"{value:.3g}"
-
-    return "; ".join(f"{key}: {show(value)}" for key, value in report.items())
+def _speeds(one: "xr.Dataset") -> str:
+    """Least and greatest speed of the starts that did not fall, over the commanded one."""
+    speed = one.speed.values[np.isinf(one.fall.values)]
+    return f"{speed.min():.2f}-{speed.max():.2f}" if len(speed) else "-"
 
 
 def _conditions_line(conditions: "Conditions", physical: bool) -> str:
@@ -257,8 +261,13 @@ def _conditions_line(conditions: "Conditions", physical: bool) -> str:
     return line
 
 
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
 def _interval(one: "xr.Dataset", measure: str) -> str:
-    return f"{float(one[measure]):.3f} [{float(one[measure + '_low']):.2f}, {float(one[measure + '_high']):.2f}]"
+    flss, low, high = (one[measure + end].item() for end in ("", "_low", "_high"))
+    return f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
 
 
 def _save_figure(figure: "Figure", path: Path) -> Path:
@@ -269,9 +278,9 @@ def _table(*columns: str) -> "Table":
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for column in columns:
-        table.add_column(column.replace("_", " "))
+        table.add_column(column.replace("_", " "), overflow="fold")
     return table
 
 

@@ -78,7 +78,10 @@ def compare(
     share = duration / duration.sum() / len(named)
 
     def outcomes(model: Model, i: int) -> Outcomes:
-        tick: Progress | None = (lambda done: progress(done * share[i])) if progress else None
+        def tick(done: float) -> None:
+            if progress:
+                progress(done * share[i])
+
         return physical_outcomes(
             settled, model, v[i], duration[i], acceleration=acceleration, threads=threads, progress=tick
         )
@@ -98,12 +101,12 @@ def compare(
         data[field.name] = (("model", "velocity", "start"), values, {"units": _UNITS.get(field.name, "1")})
     data.fall_part.attrs["flag_meanings"] = " ".join(TRUNK)
     for measure, outcome in MEASURES.items():
-        lost = np.isfinite(data[outcome])
+        lost = data[outcome] < np.inf
         data[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
         interval = np.array([[wilson_interval(int(n), starts) for n in row] for row in lost.sum("start").values])
         data[f"{measure}_low"] = (("model", "velocity"), interval[..., 0], {"units": "1"})
         data[f"{measure}_high"] = (("model", "velocity"), interval[..., 1], {"units": "1"})
-    kinematic, physical = np.isfinite(data.planned_loss), np.isfinite(data.fall)
+    kinematic, physical = data.planned_loss < np.inf, data.fall < np.inf
     cases = (kinematic & physical, kinematic & ~physical, ~kinematic & physical, ~kinematic & ~physical)
     for case, true in zip(AGREEMENT, cases, strict=True):
         data[case] = true.sum("start").assign_attrs(units="1", long_name="number of starts")

@@ -193,7 +193,7 @@ class Walking(control.Task):
         settled = settle(start, self._body, self._network, threads=1)
         physics.data.qpos[:], physics.data.qvel[:] = settled.qpos[0], settled.qvel[0]
         physics.data.qacc_warmstart[:] = settled.warmstart[0]
-        physics.set_control(settled.qpos[0, insect.ROOT_QPOS :])
+        physics.set_control(settled.ctrl[0])
         self._plan = NetworkRun(start, self._model, self._velocity, network=self._network, threads=1)
         self._targets = TipTargets(start, self._body, self._network)
         origin, y = self._network.geometry.origin, self._network.geometry.y

@@ -93,4 +93,4 @@ def _spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
     """Begin and length of each stretch of time in which `on`, (step,), holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     step = time[1] - time[0] if len(time) > 1 else 0.0
-    return [(time[a] - step, (b - a) * step) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -105,7 +105,7 @@ def dimensions(model: mujoco.MjModel) -> LegDimensions:
 def trunk_corners(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the trunk's capsules in the root frame, (corner, axis) [mm], and their radii, (corner,) [mm]."""
     data = mujoco.MjData(model)
-    data.qpos[: ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_kinematics(model, data)
     ends, radii = [], []
     for part in TRUNK:

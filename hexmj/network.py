@@ -311,7 +311,9 @@ def checked_velocities(velocity: ArrayLike, starts: int, acceleration: Accelerat
     return np.broadcast_to(v, starts).copy()
 
 
-def _settings(model: Model, network: Network, acceleration: Acceleration | None) -> tuple:
+def _settings(
+    model: Model, network: Network, acceleration: Acceleration | None
+) -> tuple[float, float, int, np.ndarray, np.ndarray]:
     """V_r(0), a, the order of updates, weights and constants, as the kernel reads them."""
     v_start, rate = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
     w, d, g = weights(model), np.arange(6), network.geometry

@@ -156,9 +156,7 @@ class Symmetric:
 
 Model = Symmetric | Weights
 
-HWS = Symmetric(
-    p1_i=10.85, p1_c=6.73, p31_i=-2.48, p32_i=4.75, p33_i=0.191, p31_c=-0.34, p32_c=0.09, p4_i=1.0
-)
+HWS = Symmetric(p1_i=10.85, p1_c=6.73, p31_i=-2.48, p32_i=4.75, p33_i=0.191, p31_c=-0.34, p32_c=0.09, p4_i=1.0)
 """The hard-wired system: printed in the caption of Fig. 3; P^2 and P^4 from Section 5.1.1."""
 
 LDVS = Symmetric(

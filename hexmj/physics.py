@@ -50,6 +50,8 @@ class Settled:
     """(start, 25) positions."""
     qvel: np.ndarray
     """(start, 24) velocities."""
+    ctrl: np.ndarray
+    """(start, 18) joint targets of the planned tips [rad]."""
     warmstart: np.ndarray
     """(start, 24) accelerations from which the solver goes on."""
     mujoco_model: mujoco.MjModel
@@ -126,7 +128,8 @@ def settle(
     }.items():
         if failed.any():
             raise SimulationError(f"start {np.argmax(failed)} did not settle in {body.settling_time:g} ms: {name}")
-    return Settled(x, qpos.copy(), qvel.copy(), warmstart.copy(), model, body, network)
+    ctrl = joints.reshape(len(x), -1)
+    return Settled(x, qpos.copy(), qvel.copy(), ctrl, warmstart.copy(), model, body, network)
 
 
 def drive(
@@ -151,7 +154,7 @@ def drive(
     batch = Batch(settled.mujoco_model, len(starts), thread_count(threads))
     batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
     batch.bind("qacc_warmstart")[:] = settled.warmstart
-    commands = settled.qpos[:, insect.ROOT_QPOS :].reshape(-1, 6, 3).copy()
+    commands = settled.ctrl.reshape(-1, 6, 3).copy()
     columns = insect.sensors(settled.mujoco_model)
     unloaded = np.zeros((len(starts), 6), dtype=int)
     longest_gap = CONTACT_GAP / 1000.0 / settled.mujoco_model.opt.timestep
@@ -253,7 +256,7 @@ def _raise_if_diverged(batch: Batch, ids: np.ndarray, time: float, when: str, st
     path = Path(f"diverged-start-{ids[i]}.npz").resolve()
     model = batch.model
     saved = {name: values[i] for name, values in state.items()}
-    np.savez(path, **saved, timestep=model.opt.timestep, friction=model.geom_friction[0, 0])
+    np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, friction=model.geom_friction[0, 0])
     raise SimulationError(
         f"start {ids[i]} diverged {when}, at {time:.4g} time units: {', '.join(kinds)};"
         f" its last good state is in {path} (hexmj.physics.replay)"

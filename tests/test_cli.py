@@ -93,7 +93,9 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
 
 
 def test_compare_makes_a_video_of_a_gait(run, tmp_path):
-    code, out, _ = run("compare", "--models", "ldvs", "--velocities", 0.5, "--starts", 4, "--window", 30, "--out", tmp_path)
+    code, out, _ = run(
+        "compare", "--models", "ldvs", "--velocities", 0.5, "--starts", 4, "--window", 30, "--out", tmp_path
+    )
     assert code == 0
     assert "agreement" in out
     video = mediapy.read_video(tmp_path / "gait.mp4")
@@ -102,7 +104,19 @@ def test_compare_makes_a_video_of_a_gait(run, tmp_path):
 
 def test_without_rendering_compare_still_delivers(tmp_path):
     """MuJoCo is told to use a screen that is not there: numbers and figure come, and a sentence on what is missing."""
-    words = ["compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--window", "20", "--out", str(tmp_path)]
+    words = [
+        "compare",
+        "--models",
+        "ldvs",
+        "--velocities",
+        "0.5",
+        "--starts",
+        "4",
+        "--window",
+        "20",
+        "--out",
+        str(tmp_path),
+    ]
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "MUJOCO_GL": "glfw"}
     done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, env=environment)
     assert done.returncode == 0
@@ -127,7 +141,9 @@ def test_physical_flss(run, tmp_path):
 
 
 def test_accelerated_flss(run):
-    code, text, _ = run("flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--window", "start", "--json")
+    code, text, _ = run(
+        "flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--window", "start", "--json"
+    )
     assert code == 0
     assert json.loads(text)["duration"] == [pytest.approx(240.0)]
 
@@ -183,7 +199,9 @@ NONSENSE = [
 ]
 
 
-@pytest.mark.parametrize(("words", "sentence"), NONSENSE, ids=lambda value: " ".join(value) if isinstance(value, list) else "")
+@pytest.mark.parametrize(
+    ("words", "sentence"), NONSENSE, ids=lambda value: " ".join(value) if isinstance(value, list) else ""
+)
 def test_nonsense_gets_a_sentence_and_code_2_and_leaves_results_alone(run, tmp_path, monkeypatch, words, sentence):
     monkeypatch.chdir(tmp_path)
     results = [tmp_path / "results" / words[0] / name for name in ("manifest.json", "recording.nc", "gait.mp4")]

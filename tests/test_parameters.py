@@ -97,7 +97,7 @@ def test_files_that_make_no_sense(tmp_path, text, words):
 
 
 def test_names_that_do_not_exist():
-    with pytest.raises(InputError, match="neither a preset .hws, ldvs, uncoordinated. nor a TOML file"):
+    with pytest.raises(InputError, match=r"neither a preset .hws, ldvs, uncoordinated. nor a TOML file"):
         load_model("lvds")
 
 
@@ -112,7 +112,9 @@ def test_weights_off_the_neighbour_sets():
         Symmetric.from_vector([0.0] * 8)
 
 
-@pytest.mark.parametrize("change", [{"dt": 0.0}, {"aep0": -11.0}, {"pep_min": 0.0}, {"order": "random"}, {"pep0": float("nan")}])
+@pytest.mark.parametrize(
+    "change", [{"dt": 0.0}, {"aep0": -11.0}, {"pep_min": 0.0}, {"order": "random"}, {"pep0": float("nan")}]
+)
 def test_network_constants_that_make_no_sense(change):
     with pytest.raises(InputError):
         Network(**change)

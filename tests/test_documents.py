@@ -1,0 +1,57 @@
+"""Every command and snippet of the README, and every example, runs."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexmj.parameters import LDVS, load_model
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^    hexmj (.+)$", README, flags=re.MULTILINE)
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+
+def block(language: str) -> str:
+    (text,) = re.findall(rf"```{language}\n(.+?)```", README, flags=re.DOTALL)
+    return text
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """One working folder for all commands: some read what an earlier one wrote."""
+    return tmp_path_factory.mktemp("readme")
+
+
+def test_there_is_something_to_run():
+    assert len(COMMANDS) >= 10
+    assert len(EXAMPLES) >= 4
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command(command, folder):
+    if "recording.nc" in command and not (folder / "results/walk/recording.nc").exists():
+        subprocess.run([sys.executable, "-m", "hexmj", "walk", "--physical"], cwd=folder, check=True)
+    subprocess.run([sys.executable, "-m", "hexmj", *command.split()], cwd=folder, check=True)
+
+
+def test_snippet(folder):
+    done = subprocess.run(
+        [sys.executable, "-c", block("python")], cwd=folder, check=True, capture_output=True, text=True
+    )
+    kinematic, physical = map(float, done.stdout.splitlines()[:2])
+    assert 0 < physical < kinematic < 1
+
+
+def test_parameter_file(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(block("toml"))
+    assert load_model(str(path)) == LDVS
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example(example, folder):
+    subprocess.run([sys.executable, str(example)], cwd=folder, check=True)
