@@ -258,7 +258,8 @@ def test_the_end_of_the_time_keeps_the_discount():
 def test_a_leg_out_of_reach_keeps_its_angles_and_is_counted():
     walking = environment.load(actions="tips")
     substeps = Body().substeps(Network())
-    before = walking.reset().observation["joint_angles"].reshape(6, 3)
+    walking.reset()
+    before = walking.physics.control().reshape(6, 3).copy()
     offsets = np.zeros((6, 3))
     offsets[4] = 5.0, 5.0, 5.0  # the middle leg of the right side, folded towards the body
     step = walking.step(offsets.ravel())
