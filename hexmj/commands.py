@@ -9,6 +9,7 @@ import numpy as np
 
 from hexmj import figures, gl, recording
 from hexmj.comparison import AGREEMENT, MEASURES, compare, physical_flss
+from hexmj.errors import InputError, RenderingError
 from hexmj.film import Film
 from hexmj.insect import TRUNK
 from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
 
 def run_compare(options: "Compare") -> None:
     """`hexmj compare`: both FLSS, the measured polygon's, and the agreement per start."""
-    models = {Path(name).stem: load_model(name) for name in options.models}
+    models = {name: load_model(name) for name in options.models}
+    if len(models) < max(1, len(options.models)):
+        raise InputError(f"models = {list(options.models)}; expected at least one, and none of them twice")
     conditions, out = options.conditions, results_folder(options.out)
     settings = conditions.settings | {"models": list(options.models), "starts": options.starts}
     with progress_bar("comparing") as progress:
@@ -150,7 +153,6 @@ def run_walk(options: "Walk") -> None:
 
 def run_render(options: "Render") -> None:
     """`hexmj render`: record if there is nothing to render yet, then render from the recordings."""
-    from hexmj.errors import InputError, RenderingError
     from hexmj.video import render
 
     if len(options.recordings) > 2:
@@ -183,8 +185,6 @@ def _recorded(
     model: Model, velocity: float, start: int, conditions: "Conditions", title: str, physical: bool
 ) -> "xr.Dataset":
     """A recording of one of the seed's starts."""
-    from hexmj.errors import InputError
-
     if start < 0:
         raise InputError(f"start = {start}; expected at least 0")
     starts = draw_starts(start + 1, conditions.seed, conditions.network)[start:]

@@ -37,7 +37,7 @@ def missing() -> str | None:
             context.free()
     except Exception as error:  # each library and driver raises another type of its own
         return _sentence(textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip("."))
-    return None if made else _sentence("no screen was found, and MUJOCO_GL is not egl")
+    return None if made else _sentence("there is no screen, and MuJoCo was imported without MUJOCO_GL=egl")
 
 
 def _sentence(reason: str) -> str:

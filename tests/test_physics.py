@@ -119,7 +119,7 @@ def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_p
 
 
 def test_starts_out_of_reach_are_refused():
-    with pytest.raises(InputError, match="start 0, leg 3: the tip at -30 mm is out of reach"):
+    with pytest.raises(InputError, match="start 0, leg 1: the tip at -30 mm is out of reach"):
         settle(np.full((1, 6), -30.0), network=Network(pep_min=-30.0))
 
 

@@ -1,0 +1,205 @@
+"""Films: what is in the MP4 files, and how rendering is found to be possible."""
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+import xarray as xr
+
+from film_reader import read_film
+from hexmj import gl, insect
+from hexmj.errors import InputError
+from hexmj.film import CAMERAS, Film
+from hexmj.loss_frequency import draw_starts
+from hexmj.parameters import UNCOORDINATED
+from hexmj.physical_walks import PhysicalWalk, physical_walk
+from hexmj.recording import load_recording, record, record_plan, save_recording
+from hexmj.video import render
+
+DURATION = 24.0  # time units, 0.3 s
+
+
+def scene(frames: np.ndarray) -> np.ndarray:
+    """Frames without caption and diagram."""
+    height = frames.shape[-3]
+    return frames[..., round(0.11 * height) : round(0.82 * height), :, :].astype(int)
+
+
+def green(pixels: np.ndarray) -> int:
+    red, middle, blue = np.moveaxis(pixels, -1, 0)
+    return int(((middle - red > 60) & (middle - blue > 30)).sum())
+
+
+def red(pixels: np.ndarray) -> int:
+    first, middle, blue = np.moveaxis(pixels, -1, 0)
+    return int(((first - middle > 80) & (first - blue > 80)).sum())
+
+
+@pytest.fixture(scope="module")
+def walked() -> PhysicalWalk:
+    return physical_walk(draw_starts(3, seed=1), UNCOORDINATED, 0.5, DURATION)
+
+
+@pytest.fixture(scope="module")
+def start(walked: PhysicalWalk) -> int:
+    """One that is stable at first and falls in the end."""
+    late = np.isfinite(walked.outcomes.fall) & (walked.outcomes.measured_loss > 5)
+    assert late.any(), "this test needs a start that falls, but not at once"
+    return int(np.argmax(late))
+
+
+@pytest.fixture(scope="module")
+def fallen(walked: PhysicalWalk, start: int) -> xr.Dataset:
+    return record(walked, start, "a fall")
+
+
+@pytest.fixture(scope="module")
+def plan(walked: PhysicalWalk, start: int) -> xr.Dataset:
+    return record_plan(walked.planned, walked.body, walked.network, start, "its plan")
+
+
+def test_a_film_has_the_frames_of_its_walk_in_its_colours(fallen, tmp_path):
+    """Each frame shows the walk's time; the polygon is green while the margin is positive, then red."""
+    path = save_recording(fallen, tmp_path / "recording.nc")
+    film = Film(slow_motion=4.0, camera="top")
+    told: list[float] = []
+    with load_recording(path) as recording:
+        frames = render([recording], tmp_path / "film.mp4", film, told.append)
+    assert frames == 36  # 0.3 s * 4 * 30
+    assert sum(told) == pytest.approx(1.0)
+    played, fps = read_film(tmp_path / "film.mp4")
+    assert played.shape == (frames, 480, 640, 3)
+    assert fps == 30
+    assert frames / fps == pytest.approx(4.0 * float(fallen.seconds[-1]), abs=1 / fps)
+    shots = scene(played)
+    assert np.abs(np.diff(shots[:10], axis=0)).max(axis=(1, 2, 3)).min() > 20
+    vp, dt = fallen.attrs["vp"], fallen.attrs["dt"]
+    shown = np.isfinite(fallen.measured_margin.values).sum()
+    for frame in range(frames):
+        row = int(np.clip(round(frame / 120 * vp / dt) - 1, 0, shown - 1))
+        stable = bool(fallen.measured_margin[row] > 0)
+        assert (green(shots[frame]) > 1000) == stable, frame
+        assert (red(shots[frame]) > 300) == (not stable), frame
+    after = round(float(fallen.fall_time) / vp * 120) + 2
+    assert np.abs(shots[after] - shots[-1]).mean() < 1.0, "it freezes after the fall"
+
+
+def test_slow_motion_multiplies_the_frames(fallen, tmp_path):
+    films = [Film(slow_motion=slow, width=320, height=240) for slow in (1.0, 2.0, 3.5)]
+    counts = [render([fallen], tmp_path / "film.mp4", film) for film in films]
+    assert counts == [9, 18, round(0.3 * 3.5 * 30)]
+    assert len(read_film(tmp_path / "film.mp4")[0]) == counts[-1]
+
+
+def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen, tmp_path):
+    film = Film(slow_motion=2.0, width=320, height=240)
+    shorter = plan.isel(step=slice(None, 160))
+    assert render([shorter, fallen], tmp_path / "two.mp4", film) == 18
+    render([fallen], tmp_path / "one.mp4", film)
+    two, one = read_film(tmp_path / "two.mp4")[0], read_film(tmp_path / "one.mp4")[0]
+    assert two.shape == (18, 240, 640, 3)
+    assert np.abs(two[:, :, 320:].astype(int) - one).mean() < 2.0
+    left = scene(two)[:, :, :320]
+    assert np.abs(left[5] - left[2]).mean() > 2 * np.abs(left[17] - left[14]).mean(), "the shorter one freezes"
+
+
+def test_high_quality_has_shadows(fallen, tmp_path):
+    dark = {}
+    for film in (Film(quality="fast", slow_motion=0.2), Film(quality="high", slow_motion=0.2)):
+        render([fallen], tmp_path / "film.mp4", film)
+        shot = scene(read_film(tmp_path / "film.mp4")[0][0])
+        dark[film.quality] = ((shot < 150).all(axis=-1) & (np.ptp(shot, axis=-1) < 25)).mean()
+    assert dark["high"] > 2 * dark["fast"]
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_the_insect_keeps_clear_of_the_diagram(camera, plan, tmp_path):
+    """Around the scene, above the diagram and below the caption, there are neither legs nor polygon."""
+    render([plan], tmp_path / "film.mp4", Film(camera=camera, slow_motion=0.5))
+    for shot in scene(read_film(tmp_path / "film.mp4")[0]):
+        for strip in (shot[:8], shot[-8:]):
+            assert np.ptp(strip, axis=-1).max() < 30
+
+
+def test_cameras_are_those_of_the_insect():
+    model = insect.load()
+    assert {model.camera(i).name for i in range(model.ncam)} == set(CAMERAS)
+
+
+def test_films_that_make_no_sense(fallen, tmp_path):
+    changes: dict[str, Any] = {"width": 641, "height": 0, "camera": "behind", "quality": "best", "fps": 0.0}
+    for name, value in changes.items():
+        with pytest.raises(InputError, match=f"{name} = {value!r}; "):
+            Film(**{name: value})
+    with pytest.raises(InputError, match="3 recordings were given; expected one, or two"):
+        render([fallen] * 3, tmp_path / "film.mp4")
+    for path in (tmp_path / "film.gif", tmp_path / "nowhere" / "film.mp4"):
+        with pytest.raises(InputError, match=r"expected a name with \.mp4 in a folder that exists"):
+            render([fallen], path)
+    with pytest.raises(InputError, match="'a fall' holds no pose"):
+        render([fallen.assign(qpos=fallen.qpos * np.nan)], tmp_path / "film.mp4")
+
+
+def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
+    path = tmp_path / "film.mp4"
+    path.write_text("old")
+
+    def fail(done: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render([fallen], path, Film(width=320, height=240), fail)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [
+        ({}, "egl"),
+        ({"MUJOCO_GL": "osmesa"}, "osmesa"),
+        ({"DISPLAY": ":0"}, None),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, None),
+    ],
+)
+def test_egl_is_preferred_where_there_is_no_screen(environment, expected, monkeypatch):
+    for name in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    gl.prefer_egl()
+    assert os.environ.get("MUJOCO_GL") == expected
+
+
+def test_egl_is_not_chosen_where_its_libraries_are_missing(monkeypatch):
+    for name in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(gl, "LIBRARIES", ("libEGL.so.1", "libNoSuchThing.so.0"))
+    gl.prefer_egl()
+    assert "MUJOCO_GL" not in os.environ
+
+
+def test_whether_anything_can_be_rendered_is_known():
+    assert gl.missing() is None
+    kept = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
+    for backend in ("glfw", "disable"):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", "from hexmj import gl; gl.missing(); print(gl.missing())"],
+            env=kept | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "libegl1 libgl1-mesa-dri libopengl0" in done.stdout
+        assert done.stderr == ""
+
+
+def test_nothing_is_left_in_memory_of_the_graphics(fallen, tmp_path):
+    """Films one after the other: every renderer is closed, and a new context still works."""
+    for _ in range(3):
+        render([fallen], tmp_path / "film.mp4", Film(width=64, height=64, slow_motion=0.2))
+    mujoco.GLContext(16, 16).free()
