@@ -117,10 +117,12 @@ def settle(
     qpos, qvel, warmstart = batch.bind("qpos"), batch.bind("qvel"), batch.bind("qacc_warmstart")
     qpos[:, : insect.ROOT_QPOS] = (0.0, 0.0, body.standing_height + legs.foot, 1.0, 0.0, 0.0, 0.0)
     qpos[:, insect.ROOT_QPOS :] = joints.reshape(len(x), -1)
-    batch.bind("ctrl")[:] = joints.reshape(len(x), -1)
+    ctrl = joints.reshape(len(x), -1)
+    batch.bind("ctrl")[:] = ctrl
+    before = {"qpos": qpos.copy(), "qvel": qvel.copy(), "qacc_warmstart": warmstart.copy(), "ctrl": ctrl[:, None]}
     sensordata, columns = batch.bind("sensordata"), insect.sensors(model)
     batch.step(nstep=max(1, round(body.settling_time / 1000.0 / model.opt.timestep)), stage=mujoco.mjtStage.mjSTAGE_ACC)
-    _raise_if_diverged(batch, np.arange(len(x)), 0.0, "while settling", {"qpos": qpos, "qvel": qvel})
+    _raise_if_diverged(batch, np.arange(len(x)), 0.0, "while settling", before)
     for name, failed in {
         "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,
         "a foot is off the ground": (sensordata[:, columns.touch] <= 0).any(axis=1),
@@ -128,7 +130,6 @@ def settle(
     }.items():
         if failed.any():
             raise SimulationError(f"start {np.argmax(failed)} did not settle in {body.settling_time:g} ms: {name}")
-    ctrl = joints.reshape(len(x), -1)
     return Settled(x, qpos.copy(), qvel.copy(), ctrl, warmstart.copy(), model, body, network)
 
 
