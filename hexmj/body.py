@@ -25,22 +25,26 @@ class Body:
     """Coefficient of sliding friction between the ground and feet or trunk."""
     longest_substep: float = 1.0
     """Longest physics step [ms]; the network's step is divided into the fewest whole substeps within it."""
+    contact_gap: float = 10.0
+    """A foot that leaves the ground for no longer still stands in the measured polygon [ms]; 0 counts every bounce."""
     settling_time: float = 200.0
     """Time for which the insect stands before it walks [ms]; whether it has come to rest is checked."""
 
     def __post_init__(self) -> None:
         bounds = {
-            "vp": (0.0, 2000.0, "mm/s"),
+            "vp": (0.1, 2000.0, "mm/s"),
             "step_height": (0.0, 14.0, "mm"),
             "standing_height": (0.0, 14.0, "mm"),
             "lift_time": (0.0, 1000.0, "ms"),
-            "longest_substep": (0.0, 1.0, "ms"),
+            "longest_substep": (0.001, 1.0, "ms"),
             "settling_time": (0.0, 10000.0, "ms"),
         }
         for name, (low, high, unit) in bounds.items():
             value = getattr(self, name)
             if not low < value <= high:
                 raise InputError(f"{name} = {value}; expected above {low:g} and at most {high:g} {unit}")
+        if not 0 <= self.contact_gap <= 1000:
+            raise InputError(f"contact_gap = {self.contact_gap}; expected 0 to 1000 ms")
         if not 0 <= self.friction < math.inf:
             raise InputError(f"friction = {self.friction}; expected a finite number of at least 0")
 

@@ -1,7 +1,7 @@
 """The command line: typed options in, one call to the package, tables and files out."""
 
 import sys
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,11 +48,6 @@ class Conditions:
             return float(self.window)
         except ValueError:
             return self.window
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All of this but the threads, on which no result depends."""
-        return {key: value for key, value in asdict(self).items() if key != "threads"}
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj import figures, gl, recording
-from hexmj.comparison import AGREEMENT, MEASURES, compare, physical_flss
 from hexmj.errors import InputError, RenderingError
 from hexmj.film import Film
-from hexmj.insect import TRUNK
-from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time
+from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time, settings
 from hexmj.network import walk
 from hexmj.parameters import Model, load_model
-from hexmj.physical_walks import physical_walk
 from hexmj.progress import progress_bar
 from hexmj.results import json_text, results_folder, save_dataset, save_manifest, write_whole
 
@@ -29,11 +25,16 @@ if TYPE_CHECKING:
 
 def run_compare(options: "Compare") -> None:
     """`hexmj compare`: both FLSS, the measured polygon's, and the agreement per start."""
+    from hexmj import figures
+    from hexmj.comparison import AGREEMENT, MEASURES, compare
+
     models = {name: load_model(name) for name in options.models}
     if len(models) < max(1, len(options.models)):
         raise InputError(f"models = {list(options.models)}; expected at least one, and none of them twice")
-    conditions, out = options.conditions, results_folder(options.out)
-    settings = conditions.settings | {"models": list(options.models), "starts": options.starts}
+    if clash := set(models) & {"velocity", "report", "settings", "files"}:
+        raise InputError(f"a parameter file has the name {min(clash)!r}, which the results need; rename it")
+    names = ("comparison.nc", "comparison.png", "manifest.json", "recording.nc", "gait.mp4")
+    conditions, out = options.conditions, results_folder(options.out, names)
     with progress_bar("comparing") as progress:
         result = compare(
             models,
@@ -45,15 +46,17 @@ def run_compare(options: "Compare") -> None:
             progress=progress,
             **conditions.options,
         )
-    result.attrs = settings | {"vp": conditions.body.vp}
     files = [
         save_dataset(result, out / "comparison.nc"),
         _save_figure(figures.comparison_figure(result), out / "comparison.png"),
-        save_manifest(settings, out / "manifest.json"),
+        save_manifest(result.attrs, out / "manifest.json"),
     ]
-    sentence = gl.missing()
-    if not options.no_video and sentence is None:
-        files.append(_typical_gait(models, result, conditions, out))
+    no_video = None
+    if not options.no_video:
+        try:
+            files.append(_typical_gait(models, result, conditions, out))
+        except RenderingError as error:
+            no_video = error
     report = _physical_report(result)
     if options.json:
         summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
@@ -61,17 +64,16 @@ def run_compare(options: "Compare") -> None:
             one = result.sel(model=name)
             keys = [m + end for m in MEASURES for end in ("", "_low", "_high")] + ["agreement", *AGREEMENT]
             summary[name] = {key: one[key].values.tolist() for key in keys}
-        settings |= {"duration": result.duration.values.tolist()}
-        _print_json(summary | {"report": report, "settings": settings, "files": files})
+        durations = {"duration": result.duration.values.tolist()}
+        _print_json(summary | {"report": report, "settings": result.attrs | durations, "files": files})
     else:
         frequencies = _table("model", "V", "t", *MEASURES)
         answers = _table("model", "V", "agree", "both", "only kin.", "only phys.", "none", "speed")
         for name in models:
             for v in result.velocity.values:
                 one = result.sel(model=name, velocity=v)
-                frequencies.add_row(
-                    name, f"{v:g}", f"{one.duration.item():.0f}", *(_interval(one, m) for m in MEASURES)
-                )
+                intervals = (_interval(one, measure) for measure in MEASURES)
+                frequencies.add_row(name, f"{v:g}", f"{one.duration.item():.0f}", *intervals)
                 counts = [str(one[case].item()) for case in AGREEMENT]
                 answers.add_row(name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, _speeds(one))
         _print(
@@ -80,23 +82,25 @@ def run_compare(options: "Compare") -> None:
             "Starts by what happened: lost on paper (kin.), fell (phys.); speed over command",
             answers,
             _conditions_line(conditions, physical=True),
-            "; ".join(f"{key}: {value:.3g}" for key, value in report.items()),
+            _report_line(report),
             *map(str, files),
         )
-    if not options.no_video and sentence:
-        print(f"hexmj: no video: {sentence}", file=sys.stderr)
+    if no_video:
+        print(f"hexmj: no video: {no_video}", file=sys.stderr)
 
 
 def run_flss(options: "Flss") -> None:
     """`hexmj flss`: one FLSS over velocities."""
     model, conditions = load_model(options.model), options.conditions
-    out = results_folder(options.out) if options.out else None
+    if options.out:
+        results_folder(options.out, ("flss.nc", "flss.png", "manifest.json"))
     starts = options.starts if options.starts is not None else 200 if options.physical else 7 * SAMPLE
-    settings = conditions.settings | {"model": options.model, "physical": options.physical, "starts": starts}
-    if not options.physical:
-        del settings["body"]
-    measure, extra = (physical_flss, {"body": conditions.body}) if options.physical else (flss, {})
-    with progress_bar("physical FLSS" if options.physical else "FLSS") as progress:
+    kind, measure, extra = "kinematic", flss, {}
+    if options.physical:
+        from hexmj.comparison import physical_flss
+
+        kind, measure, extra = "physical", physical_flss, {"body": conditions.body}
+    with progress_bar(f"{kind} FLSS") as progress:
         table = measure(
             model,
             options.velocities,
@@ -107,84 +111,101 @@ def run_flss(options: "Flss") -> None:
             **extra,
             **conditions.options,
         )
-    table.attrs = settings
-    kind = "physical" if options.physical else "kinematic"
+    table.attrs = {"model": options.model, "physical": options.physical} | table.attrs
     files = []
-    if out:
+    if options.out:
+        from hexmj import figures
+
         title = f"{Path(options.model).stem}, {kind} FLSS, {starts} starts, window {conditions.window}"
         files = [
-            save_dataset(table, out / "flss.nc"),
-            _save_figure(figures.flss_figure(table, title), out / "flss.png"),
-            save_manifest(settings, out / "manifest.json"),
+            save_dataset(table, options.out / "flss.nc"),
+            _save_figure(figures.flss_figure(table, title), options.out / "flss.png"),
+            save_manifest(table.attrs, options.out / "manifest.json"),
         ]
     columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]
+    report = _physical_report(table) if options.physical else {}
     if options.json:
         lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
-        _print_json(lists | {"settings": settings, "files": files})
+        _print_json(lists | ({"report": report} if report else {}) | {"settings": table.attrs, "files": files})
     else:
         rows = _table("V", *columns)
         for v in table.velocity.values:
             one = table.sel(velocity=v)
-            rows.add_row(f"{v:g}", *(f"{float(one[c]):.4g}" for c in columns))
-        head = f"{kind} FLSS of {options.model}, {starts} starts"
-        _print(head, rows, _conditions_line(conditions, options.physical), *map(str, files))
+            rows.add_row(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns))
+        lines = [_conditions_line(conditions, options.physical), *([_report_line(report)] if report else [])]
+        _print(f"{kind} FLSS of {options.model}, {starts} starts", rows, *lines, *map(str, files))
 
 
 def run_walk(options: "Walk") -> None:
     """`hexmj walk`: one walk with its footfall diagram and stability margin."""
-    model, out = load_model(options.model), results_folder(options.out)
+    from hexmj import figures, recording
+
+    model, conditions = load_model(options.model), options.conditions
+    out = results_folder(options.out, ("recording.nc", "walk.png", "manifest.json"))
     title = f"{Path(options.model).stem}, V = {options.velocity:g}"
-    walked = _recorded(model, options.velocity, options.start, options.conditions, title, options.physical)
-    settings = options.conditions.settings | {
-        "model": options.model, "velocity": options.velocity, "physical": options.physical, "start": options.start,
-    }  # fmt: skip
+    walked = _recorded(model, options.velocity, options.start, conditions, title, options.physical)
+    told = {"velocity": options.velocity, "start": options.start, "physical": options.physical}
+    acceleration, body = conditions.options["acceleration"], conditions.body
+    told |= settings({options.model: model}, conditions.time, options.start + 1, conditions.seed, conditions.network,
+                     acceleration, body)  # fmt: skip
     files = [
         recording.save_recording(walked, out / "recording.nc"),
         _save_figure(figures.walk_figure(walked), out / "walk.png"),
-        save_manifest(settings, out / "manifest.json"),
+        save_manifest(told, out / "manifest.json"),
     ]
     summary = _summary(walked)
     if options.json:
-        _print_json(summary | {"settings": settings, "files": files})
+        _print_json(summary | {"settings": told, "files": files})
     else:
-        _print(title, *(f"{key}: {_short(value)}" for key, value in summary.items()),
-               _conditions_line(options.conditions, options.physical), *map(str, files))  # fmt: skip
+        lines = [f"{key}: {_short(value)}" for key, value in summary.items()]
+        _print(title, *lines, _conditions_line(conditions, options.physical), *map(str, files))
 
 
 def run_render(options: "Render") -> None:
     """`hexmj render`: record if there is nothing to render yet, then render from the recordings."""
+    from hexmj import gl, recording
     from hexmj.video import render
 
     if len(options.recordings) > 2:
         raise InputError(f"{len(options.recordings)} recordings were given; expected one, or two for side by side")
+    if options.recordings and options.beside:
+        raise InputError("--beside was given with recordings; expected a second recording instead, or no recording")
+    names = [name for name in (options.model, options.beside) if name and name != "planned"]
+    models = [load_model(name) for name in names]
+    shown = [recording.load_recording(path) for path in options.recordings]
+    out = results_folder(options.out, ("gait.mp4", "recording-1.nc", "recording-2.nc"))
     if sentence := gl.missing():
         raise RenderingError(sentence)
-    shown = [recording.load_recording(path) for path in options.recordings] or None
-    models = [load_model(name) for name in (options.model, options.beside) if name and name != "planned"]
-    out = results_folder(options.out)
     files = []
-    if shown is None:
-        conditions, v, start = options.conditions, options.velocity, options.start
-        names = [Path(name).stem for name in (options.model, options.beside) if name and name != "planned"]
-        shown = [_recorded(model, v, start, conditions, name, True) for model, name in zip(models, names, strict=True)]
+    if not shown:
+        titles = [Path(name).stem for name in names]
+        how = [(model, title, True) for model, title in zip(models, titles, strict=True)]
         if options.beside == "planned":
-            shown.insert(0, _recorded(models[0], v, start, conditions, f"{names[0]}, planned", False))
-        for i, one in enumerate(shown):
+            how.insert(0, (models[0], f"{titles[0]}, planned", False))
+        for i, (model, title, physical) in enumerate(how):
+            one = _recorded(model, options.velocity, options.start, options.conditions, title, physical)
             files.append(recording.save_recording(one, out / f"recording-{i + 1}.nc"))
+            shown.append(one)
+    out.mkdir(parents=True, exist_ok=True)
     with progress_bar("rendering") as progress:
         frames = render(shown, out / "gait.mp4", options.film, progress)
     files.append(out / "gait.mp4")
-    summary = {"frames": frames, "fps": options.film.fps, "film": asdict(options.film), "files": files}
+    summary = {"frames": frames, "film": asdict(options.film), "files": files}
     if options.json:
         _print_json(summary | {"recordings": [_summary(one) for one in shown]})
     else:
         _print(f"{frames} frames at {options.film.fps:g} per second", *map(str, files))
+    for one in shown:
+        one.close()
 
 
 def _recorded(
     model: Model, velocity: float, start: int, conditions: "Conditions", title: str, physical: bool
 ) -> "xr.Dataset":
     """A recording of one of the seed's starts."""
+    from hexmj import recording
+    from hexmj.physical_walks import physical_walk
+
     if start < 0:
         raise InputError(f"start = {start}; expected at least 0")
     starts = draw_starts(start + 1, conditions.seed, conditions.network)[start:]
@@ -202,8 +223,11 @@ def _recorded(
 
 def _typical_gait(models: dict[str, Model], result: "xr.Dataset", conditions: "Conditions", out: Path) -> Path:
     """A video of the first model near V = 0.3, of the first start that neither fell nor lost stability, if any."""
+    from hexmj import gl, recording
     from hexmj.video import render
 
+    if sentence := gl.missing():
+        raise RenderingError(sentence)
     name, model = next(iter(models.items()))
     velocities = result.velocity.values
     v = float(velocities[np.abs(velocities - 0.3).argmin()])
@@ -218,6 +242,9 @@ def _typical_gait(models: dict[str, Model], result: "xr.Dataset", conditions: "C
 
 def _summary(walked: "xr.Dataset") -> dict[str, Any]:
     """When a recorded walk lost stability or fell [time units], and its least margins [mm]."""
+    from hexmj.comparison import REPORTED
+    from hexmj.insect import TRUNK
+
     summary: dict[str, Any] = {
         "time units": float(walked.time[-1]),
         "planned loss": float(walked.planned_loss_time),
@@ -231,11 +258,12 @@ def _summary(walked: "xr.Dataset") -> dict[str, Any]:
             "fall": float(walked.fall_time),
             "fell on": TRUNK[part] if part >= 0 else None,
         }
+        summary |= {_named(walked[name]): walked[name].item() for name in REPORTED}
     return summary
 
 
 def _physical_report(result: "xr.Dataset") -> dict[str, float]:
-    """How far the bodies did what they were told, over all models and velocities."""
+    """How far the bodies did what they were told, over all walks of a comparison or a physical FLSS."""
     return {
         "mean slip [mm/s]": result.slip.mean().item(),
         "joints at their torque limit": result.saturation.mean().item(),
@@ -245,10 +273,20 @@ def _physical_report(result: "xr.Dataset") -> dict[str, float]:
     }
 
 
+def _report_line(report: dict[str, float]) -> str:
+    return "; ".join(f"{key}: {value:.3g}" for key, value in report.items())
+
+
+def _named(value: "xr.DataArray") -> str:
+    """Name and unit of one of a recording's numbers."""
+    unit = value.attrs["units"]
+    return f"{value.name} [{unit}]" if unit != "1" else str(value.name)
+
+
 def _speeds(one: "xr.Dataset") -> str:
     """Least and greatest speed of the starts that did not fall, over the commanded one."""
     speed = one.speed.values[np.isinf(one.fall.values)]
-    return f"{speed.min():.2f}-{speed.max():.2f}" if len(speed) else "-"
+    return f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
 
 
 def _conditions_line(conditions: "Conditions", physical: bool) -> str:

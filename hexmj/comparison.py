@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.body import Body
+from hexmj.errors import InputError
 from hexmj.insect import TRUNK
-from hexmj.loss_frequency import checked_list, draw_starts, frequency_table, observation_time, wilson_interval
+from hexmj.legs import LEGS
+from hexmj.loss_frequency import (
+    checked_list,
+    draw_starts,
+    frequency_table,
+    observation_time,
+    settings,
+    wilson_interval,
+)
 from hexmj.measurement import Outcomes
 from hexmj.parameters import PRESETS, Acceleration, Model, Network
 from hexmj.physical_walks import physical_outcomes
-from hexmj.physics import Progress, settle
+from hexmj.physics import settle
+from hexmj.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +32,9 @@ MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical"
 
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
 """What a start can do: lose stability on paper, touch the ground, both or none."""
+
+REPORTED = ("clearance", "tilt", "speed", "slip", "saturation", "unreachable")
+"""Outcomes that tell how far the bodies did what they were told."""
 
 _UNITS = {
     "planned_loss": "time unit",
@@ -71,8 +84,10 @@ def compare(
     """
     import xarray as xr
 
-    network, v = network or Network(), checked_list(velocities)
+    network, body, v = network or Network(), body or Body(), checked_list(velocities)
     named = dict(models) if isinstance(models, Mapping) else {_name(models): models}
+    if not named:
+        raise InputError("no model was given; expected at least one")
     duration = observation_time(window, v, network, acceleration)
     settled = settle(draw_starts(starts, seed, network), body, network, threads)
     share = duration / duration.sum() / len(named)
@@ -92,7 +107,7 @@ def compare(
             "model": list(named),
             "velocity": ("velocity", v, {"units": "V_p", "long_name": "velocity V_r"}),
             "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
-            "leg": ["L1", "L2", "L3", "R1", "R2", "R3"],
+            "leg": list(LEGS),
             "starts": (("start", "leg"), settled.starts, {"units": "mm", "long_name": "tips at the start"}),
         }
     )
@@ -111,6 +126,7 @@ def compare(
     for case, true in zip(AGREEMENT, cases, strict=True):
         data[case] = true.sum("start").assign_attrs(units="1", long_name="number of starts")
     data["agreement"] = (kinematic == physical).mean("start").assign_attrs(units="1")
+    data.attrs = settings(named, window, starts, seed, network, acceleration, body)
     return data
 
 
@@ -130,7 +146,8 @@ def physical_flss(
     """Physical FLSS: the frequency with which the trunk touches the ground; arguments as for `compare`.
 
     Returns:
-        The table of `loss_frequency.flss`, with the time of the fall in `loss_time`.
+        The table of `loss_frequency.flss`, with the time of the fall in `loss_time`, and the outcomes
+        `REPORTED` of every start.
     """
     result = compare(
         model,
@@ -144,7 +161,10 @@ def physical_flss(
         threads=threads,
         progress=progress,
     )
-    return frequency_table(result.fall.values[0], result.velocity.values, result.duration.values)
+    table = frequency_table(result.fall.values[0], result.velocity.values, result.duration.values)
+    return table.assign(result.isel(model=0, drop=True)[list(REPORTED)].drop_vars("duration").data_vars).assign_attrs(
+        result.attrs
+    )
 
 
 def _name(model: Model) -> str:

@@ -13,7 +13,7 @@ Observations, all float64:
 - angular_velocity: of the root, in its own frame [rad/s]
 - clearance: height of the trunk's lowest point [mm]
 - tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `physics.CONTACT_GAP`
+- contact: (leg,) 1 where the ground carried the foot within the last `Body.contact_gap`
 - margin: measured stability margin [mm], from the feet in contact and the insect's own centre of mass;
   `NO_FOOT`, out of any foot's reach, where no foot is in contact
 - command: velocity to walk at [mm/s]
@@ -47,7 +47,7 @@ from hexmj.legs import LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun, steps_within
 from hexmj.parameters import LDVS, Model, Network
-from hexmj.physics import CONTACT_GAP, settle
+from hexmj.physics import settle
 from hexmj.stability import stability_margin
 from hexmj.targets import TipTargets
 
@@ -236,7 +236,7 @@ class Walking(control.Task):
     def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
         """The observations, in the order of their specs."""
         qpos, qvel = physics.position(), physics.velocity()
-        standing = self._unloaded <= CONTACT_GAP / 1000.0 / physics.timestep()
+        standing = self._unloaded <= self._body.contact_gap / 1000.0 / physics.timestep()
         return OrderedDict(
             joint_angles=qpos[insect.ROOT_QPOS :],
             joint_velocities=qvel[insect.ROOT_QVEL :],

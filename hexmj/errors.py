@@ -1,7 +1,7 @@
 """What can go wrong, each with one clear sentence."""
 
 
-class InputError(ValueError):
+class InputError(Exception):
     """A value that makes no sense: says what was given, what is expected and the valid names."""
 
 

@@ -33,9 +33,13 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
             )  # fmt: skip
     _flss_axes(axes)
     axes.legend(frameon=False, fontsize=9)
-    starts, vp = result.sizes["start"], result.attrs.get("vp")
-    conditions = f"{starts} starts" + (f", $V_p$ = {vp:g} mm/s" if vp else "")
-    axes.set_title(f"Loss of static stability on paper, under the feet, and falls ({conditions})", fontsize=10)
+    body, window = result.attrs["body"], result.attrs["window"]
+    axes.set_title(
+        "Loss of static stability on paper (kinematic), under the feet (measured), and falls (physical)\n"
+        f"{result.sizes['start']} starts, window {window}, $V_p$ = {body['vp']:g} mm/s, step height"
+        f" {body['step_height']:g} mm, standing height {body['standing_height']:g} mm, friction {body['friction']:g}",
+        fontsize=9,
+    )
     return figure
 
 

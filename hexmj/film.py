@@ -1,6 +1,5 @@
 """How a walk is filmed."""
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -34,6 +33,6 @@ class Film:
         for name, size, most in (("width", self.width, 1920), ("height", self.height, 1080)):
             if not (64 <= size <= most and size % 2 == 0):
                 raise InputError(f"{name} = {size}; expected an even number of pixels from 64 to {most}")
-        for name, value in (("fps", self.fps), ("slow_motion", self.slow_motion)):
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} = {value}; expected a finite number above 0")
+        for name, value, most in (("fps", self.fps, 240), ("slow_motion", self.slow_motion, 1000)):
+            if not 0 < value <= most:
+                raise InputError(f"{name} = {value}; expected above 0 and at most {most}")

@@ -13,16 +13,18 @@ PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 def prefer_egl() -> None:
     """Let MuJoCo render through EGL if there is no screen, EGL is installed and nothing else was asked for.
 
-    Only works before MuJoCo is first imported, which fails if EGL is chosen and its libraries are missing.
+    Only works before MuJoCo is first imported.  MuJoCo cannot even be imported where EGL is asked for and its
+    libraries are missing: then the wish is dropped, and `missing` says what to install.
     """
-    if {"MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+    wanted = os.environ.get("MUJOCO_GL")
+    if wanted != "egl" and (wanted or {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ)):
         return
     try:
         for library in LIBRARIES:
             ctypes.CDLL(library)
+        os.environ["MUJOCO_GL"] = "egl"
     except OSError:
-        return
-    os.environ["MUJOCO_GL"] = "egl"
+        os.environ.pop("MUJOCO_GL", None)
 
 
 def missing() -> str | None:

@@ -4,7 +4,10 @@ The only place that knows which leg is which.  Index ``i`` of every ``leg`` axis
 paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
 """
 
+import math
 from dataclasses import dataclass
+
+from hexmj.errors import InputError
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
 """Names by index: side, then segment from front (1) to rear (3)."""
@@ -36,6 +39,10 @@ class Geometry:
     """Origins O_1, O_2, O_3 of the leg axes ahead of the centre of mass [mm]; inferred from Fig. 1's D4, D5, D6."""
     lateral: tuple[float, float, float] = (18.0, 20.0, 15.0)
     """Distance of the lines of legs 1, 2, 3 from the body axis [mm]; Fig. 1's D1, D2, D3."""
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, self.origins + self.lateral)) or not min(self.lateral) > 0:
+            raise InputError(f"{self}; expected finite origins and lateral distances above 0 mm")
 
     @property
     def origin(self) -> tuple[float, ...]:

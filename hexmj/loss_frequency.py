@@ -1,20 +1,27 @@
 """FLSS, the frequency of the loss of static stability (paper, Section 3): starts, windows, I_N and J_N."""
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.network import first_loss
-from hexmj.parameters import Acceleration, Model, Network
+from hexmj.parameters import Acceleration, Model, Network, Symmetric
+from hexmj.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hexmj.body import Body
+
 WINDOWS = ("walk", "start")
 SAMPLE = 1000
 """Starts of one sample of the paper's protocol; it takes seven of them."""
+
+MOST_STARTS = 10**8
+"""Most starts in one call; their tips alone take 5 GB."""
 
 
 def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndarray:
@@ -24,9 +31,9 @@ def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndar
         (start, leg) [mm].  The first k of n starts are the same for every n.
     """
     network = network or Network()
-    if size < 1:
-        raise InputError(f"starts = {size}; expected at least 1")
-    if seed < 0:
+    if not (isinstance(size, int) and 1 <= size <= MOST_STARTS):
+        raise InputError(f"starts = {size}; expected a whole number of at least 1 and at most {MOST_STARTS}")
+    if not (isinstance(seed, int) and seed >= 0):
         raise InputError(f"seed = {seed}; expected an integer of at least 0")
     return np.random.default_rng(seed).uniform(network.pep0, network.aep0, (size, 6))
 
@@ -70,7 +77,7 @@ def flss(
     network: Network | None = None,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
@@ -98,7 +105,9 @@ def flss(
         lost.append(first_loss(x, model, one, t, network=network, acceleration=acceleration, threads=threads))
         if progress:
             progress(1 / len(v))
-    return frequency_table(np.array(lost), v, duration)
+    return frequency_table(np.array(lost), v, duration).assign_attrs(
+        settings({"model": model}, window, starts, seed, network, acceleration)
+    )
 
 
 def flss_over_range(
@@ -112,7 +121,24 @@ def flss_over_range(
     network: Network | None = None,
     threads: int | None = None,
 ) -> tuple[float, tuple[float, float]]:
-    """J_N^t of Eq. 10 with its 95 % interval: each start has a velocity of its own, uniform on [low, high]."""
+    """Kinematic FLSS over a range of velocities, J_N^t of Eq. 10: each start has one of its own.
+
+    Args:
+        model: coupling weights.
+        low: least velocity of the range W, uniform, 0 <= V < 1.
+        high: greatest velocity of the range W.
+        starts: N.
+        window: 'walk', 'start' or the observation time itself [time units]; the named ones follow each velocity.
+        seed: of the starts and their velocities.
+        network: the constants that the paper leaves out.
+        threads: one per core unless given; the result does not depend on it.
+
+    Returns:
+        The frequency and its 95 % Wilson interval.
+
+    Raises:
+        InputError: a range, window, seed or number of starts that makes no sense.
+    """
     network = network or Network()
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
@@ -123,11 +149,38 @@ def flss_over_range(
     return count / starts, wilson_interval(count, starts)
 
 
+def settings(
+    models: Mapping[str, Model],
+    window: str | float,
+    starts: int,
+    seed: int,
+    network: Network,
+    acceleration: Acceleration | None,
+    body: "Body | None" = None,
+) -> dict[str, Any]:
+    """All that is needed to run a measure again, as plain numbers and texts; it stands in every result's `attrs`."""
+    plain = {
+        "weights": {
+            name: asdict(m) if isinstance(m, Symmetric) else {k: v.tolist() for k, v in vars(m).items()}
+            for name, m in models.items()
+        },
+        "window": window,
+        "starts": starts,
+        "seed": seed,
+        "network": asdict(network),
+        "acceleration": asdict(acceleration) if acceleration else None,
+    }
+    return plain | ({"body": asdict(body)} if body else {})
+
+
 def checked_list(velocities: Sequence[float]) -> np.ndarray:
     """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
-    v = np.array(velocities, dtype=float)
+    try:
+        v = np.array(velocities, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"velocities = {velocities!r}; expected a list of numbers") from None
     if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
-        raise InputError(f"velocities = {list(velocities)}; expected at least one, and none of them twice")
+        raise InputError(f"velocities = {velocities}; expected a list of at least one, and none of them twice")
     if not ((v >= 0) & (v < 1)).all():
         raise InputError(f"velocities = {v.tolist()}; expected 0 <= V < 1, fractions of V_p")
     return v

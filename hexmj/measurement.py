@@ -105,7 +105,7 @@ class Tally:
         self._fall_part[ids[fell]] = np.argmax(trunk, axis=1)[fell]
         self._unreachable[ids] += stretch.unreachable
         self._walked[ids] = stretch.qpos[n, last, 0] - settled.qpos[ids, 0]
-        share = np.clip(stretch.valid / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
+        share = np.clip(np.where(fell, last, stretch.valid) / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
         self._commanded[ids] += (share * stretch.plan.velocity[:, ids]).sum(axis=0) * dt
         _, measured, _ = measured_walk(stretch, settled)
         lost = walk_margin(measured, self._threads) <= 0.0

@@ -9,18 +9,22 @@ One step goes from the states at t to those at t + dt with V_r(t).  A walk begin
 AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent.
 """
 
+from typing import get_args
+
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
-from hexmj.parameters import Acceleration, Model, Network, weights
+from hexmj.parameters import Acceleration, Model, Network, Order, weights
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
 LANES = 64
-ORDERS = ("printed", "undelayed", "sequential")
+MOST_STEPS = 10**9
+"""Longest walk [steps]; far beyond any use, and within the kernel's integers."""
+ORDERS = get_args(Order)
 _UNDELAYED, _SEQUENTIAL = 1, 2
 
 # A leg without the neighbour in question names itself, with weight 0.
@@ -313,8 +317,11 @@ def first_loss(
 def steps_within(duration: ArrayLike, network: Network) -> np.ndarray:
     """Whole steps of the network within an observation time [time units]."""
     duration = np.asarray(duration, dtype=float)
-    if not (np.isfinite(duration).all() and (duration >= network.dt).all()):
-        raise InputError(f"duration = {duration}; expected a finite time of at least one step, {network.dt} time units")
+    if not ((duration >= network.dt) & (duration <= MOST_STEPS * network.dt)).all():
+        raise InputError(
+            f"duration = {duration}; expected at least one step, {network.dt:g}, and at most"
+            f" {MOST_STEPS * network.dt:g} time units"
+        )
     return np.floor(duration / network.dt + 1e-6).astype(int)
 
 

@@ -9,17 +9,20 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.legs import FIG1, N1, N2, N3, N4, Geometry
+from hexmj.legs import FIG1, GEOMETRIES, N1, N2, N3, N4, Geometry
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
 
 BINARY = ("p2", "p4")
+
+Order = Literal["printed", "undelayed", "sequential"]
+"""Orders in which the legs are updated, see `Network.order`."""
 
 
 def _pairs(kind: str) -> list[tuple[int, int]]:
@@ -182,7 +185,7 @@ class Network:
     """Rearmost posterior extreme position [mm]."""
     dt: float = 0.1
     """Time step of Eq. 6 [time units; in one, a protracting tip moves 1 mm]."""
-    order: Literal["printed", "undelayed", "sequential"] = "printed"
+    order: Order = "printed"
     """Order of updates: 'printed', all legs at once, PEP(t+dt) from Delta(t) as Eq. 6 has it; 'undelayed', from
     Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
     geometry: Geometry = field(default=FIG1)
@@ -197,8 +200,12 @@ class Network:
             )
         if not 0 < self.dt <= 1:
             raise InputError(f"dt = {self.dt}; expected a time step above 0 and at most 1 time unit")
-        if self.order not in (orders := ("printed", "undelayed", "sequential")):
-            raise InputError(f"order = {self.order!r}; valid names: {', '.join(orders)}")
+        if self.order not in get_args(Order):
+            raise InputError(f"order = {self.order!r}; valid names: {', '.join(get_args(Order))}")
+        if not isinstance(self.geometry, Geometry):
+            raise InputError(
+                f"geometry = {self.geometry!r}; expected a Geometry, as {', '.join(GEOMETRIES)} in hexmj.legs"
+            )
 
 
 @dataclass(frozen=True)
@@ -219,7 +226,11 @@ class Acceleration:
 
 def weights(model: Model) -> Weights:
     """The general weights of either form."""
-    return model.expand() if isinstance(model, Symmetric) else model
+    if isinstance(model, Symmetric):
+        return model.expand()
+    if isinstance(model, Weights):
+        return model
+    raise InputError(f"model = {model!r}; expected Symmetric or Weights, as a preset or load_model gives them")
 
 
 def load_model(name: str) -> Model:
@@ -234,7 +245,11 @@ def load_model(name: str) -> Model:
     if name in PRESETS:
         return PRESETS[name]
     path = Path(name)
-    if not path.is_file():
+    try:
+        exists = path.is_file()
+    except OSError:
+        exists = False
+    if not exists:
         raise InputError(f"model {name!r} is neither a preset ({', '.join(PRESETS)}) nor a TOML file that exists")
     try:
         table = tomllib.loads(path.read_text())
@@ -265,6 +280,6 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
     for key, value in table.items():
         if key not in valid:
             raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(f"{where}: {key} = {value!r}; expected a number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
+            raise InputError(f"{where}: {key} = {str(value)[:40]!r}; expected a number, finite and below 1e100")
     return {key: float(value) for key, value in table.items()}

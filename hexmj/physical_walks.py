@@ -9,7 +9,8 @@ from hexmj.body import Body
 from hexmj.measurement import Outcomes, Tally, measured_walk
 from hexmj.network import first_loss, walk
 from hexmj.parameters import Acceleration, Model, Network
-from hexmj.physics import Progress, Settled, drive, settle
+from hexmj.physics import Settled, drive, settle
+from hexmj.progress import Progress
 from hexmj.walks import Walk
 
 

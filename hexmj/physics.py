@@ -6,7 +6,7 @@ stretch shows the insect before each of its physics steps: what MuJoCo's sensors
 belongs to the state before it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from hexmj.errors import InputError, SimulationError
 from hexmj.kinematics import LegDimensions, tips_to_joints
 from hexmj.network import NetworkRun, checked_starts, steps_within
 from hexmj.parameters import Acceleration, Model, Network
+from hexmj.progress import Progress
 from hexmj.targets import TipTargets
 from hexmj.threads import run_blocks, thread_count
 from hexmj.walks import Walk
@@ -30,14 +31,8 @@ from hexmj.walks import Walk
 STRETCH = 40
 """Physics steps in a stretch, about: fewer cost more calls, more waste steps after a fall."""
 
-CONTACT_GAP = 10.0
-"""A foot that bounces off the ground for less than this still stands [ms]."""
-
 AT_REST = 5.0
 """Speed of the root below which a start counts as settled [mm/s]."""
-
-Progress = Callable[[float], None]
-"""Told the fraction of a walk's steps that has been done since the last call."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +70,7 @@ class Stretch:
     sensors: np.ndarray
     """(n, substep, column), see `insect.Sensors`."""
     standing: np.ndarray
-    """(n, substep, leg) whether the ground carried the foot within the last `CONTACT_GAP`."""
+    """(n, substep, leg) whether the ground carried the foot within the last `Body.contact_gap`."""
     force: np.ndarray
     """(n, substep, actuator) torques of the joints [g mm^2/s^2]."""
     valid: np.ndarray
@@ -122,7 +117,7 @@ def settle(
     before = {"qpos": qpos.copy(), "qvel": qvel.copy(), "qacc_warmstart": warmstart.copy(), "ctrl": ctrl[:, None]}
     sensordata, columns = batch.bind("sensordata"), insect.sensors(model)
     batch.step(nstep=max(1, round(body.settling_time / 1000.0 / model.opt.timestep)), stage=mujoco.mjtStage.mjSTAGE_ACC)
-    _raise_if_diverged(batch, np.arange(len(x)), 0.0, "while settling", before)
+    _raise_if_diverged(batch, np.arange(len(x)), 0.0, None, before)
     for name, failed in {
         "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,
         "a foot is off the ground": (sensordata[:, columns.touch] <= 0).any(axis=1),
@@ -155,21 +150,22 @@ def drive(
     batch = Batch(settled.mujoco_model, len(starts), thread_count(threads))
     batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
     batch.bind("qacc_warmstart")[:] = settled.warmstart
+    speeds = np.broadcast_to(np.asarray(velocity, dtype=float), len(starts))
     commands = settled.ctrl.reshape(-1, 6, 3).copy()
     columns = insect.sensors(settled.mujoco_model)
     unloaded = np.zeros((len(starts), 6), dtype=int)
-    longest_gap = CONTACT_GAP / 1000.0 / settled.mujoco_model.opt.timestep
+    longest_gap = body.contact_gap / 1000.0 / settled.mujoco_model.opt.timestep
     total, ids = int(steps_within(duration, network)), np.arange(len(starts))
     while plan.done < total and len(ids):
         first = plan.done * m
         steps = min(max(1, STRETCH // m), total - plan.done)
         ahead = plan.advance(steps)
-        joints, unreachable = _commands(targets.follow(ahead, ids, threads), legs, commands, ids, threads)
+        joints, missed = _commands(targets.follow(ahead, ids, threads), legs, commands, ids, threads)
         if plan.done == total:  # one substep more shows the state at the end
             joints = np.concatenate([joints, joints[:, -1:]], axis=1)
         before = {name: batch.bind(name)[ids] for name in ("qpos", "qvel", "qacc_warmstart")}
         seen = batch.rollout(joints.shape[1], joints, record=("qpos", "sensordata", "actuator_force"), ids=ids)
-        _raise_if_diverged(batch, ids, first / m * network.dt, "while walking", before | {"ctrl": joints})
+        _raise_if_diverged(batch, ids, first / m * network.dt, speeds, before | {"ctrl": joints})
         standing = _standing(seen["sensordata"][:, :, columns.touch] > 0, unloaded, ids, longest_gap)
         touching = (seen["sensordata"][:, :, columns.trunk] > 0).any(axis=2)
         fell = touching.any(axis=1)
@@ -185,7 +181,7 @@ def drive(
             force=seen["actuator_force"],
             valid=valid,
             fell=fell,
-            unreachable=unreachable,
+            unreachable=np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1),
         )
         ids = ids[~fell]
         if progress:
@@ -207,17 +203,17 @@ def replay(path: Path | str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 def _commands(
     tips: np.ndarray, legs: LegDimensions, commands: np.ndarray, ids: np.ndarray, threads: int | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint targets (n, substep, actuator) [rad] and the number of tips out of reach, (n,).
+    """Joint targets (n, substep, actuator) [rad] and the number of tips out of reach, (n, substep).
 
     A leg whose tip is out of reach keeps its last angles; `commands`, (start, leg, joint), keeps them for
     the next stretch.
     """
-    joints, missed = np.empty(tips.shape), np.zeros(len(ids), dtype=int)
+    joints, missed = np.empty(tips.shape), np.zeros(tips.shape[:2], dtype=int)
 
     def work(begin: int, end: int) -> None:
         joints[begin:end], reachable = tips_to_joints(tips[begin:end], legs)
-        missed[begin:end] = (~reachable).sum(axis=(1, 2))
-        for i in begin + np.flatnonzero(missed[begin:end]):
+        missed[begin:end] = (~reachable).sum(axis=2)
+        for i in begin + np.flatnonzero(missed[begin:end].any(axis=1)):
             _hold(joints[i], commands[ids[i]])
 
     run_blocks(work, len(ids), 64, threads)
@@ -245,8 +241,13 @@ def _standing(touches: Any, unloaded: Any, ids: Any, longest_gap: float) -> Any:
     return standing
 
 
-def _raise_if_diverged(batch: Batch, ids: np.ndarray, time: float, when: str, state: dict[str, np.ndarray]) -> None:
-    """A MuJoCo warning or a number that is not finite in one of `ids` ends everything; its state is written."""
+def _raise_if_diverged(
+    batch: Batch, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
+) -> None:
+    """A MuJoCo warning or a number that is not finite in one of `ids` ends everything; its state is written.
+
+    `speeds` are the velocities V_r of all starts, none while they settle.
+    """
     warned = batch.warning[ids, :, 1] > 0
     broken = ~np.isfinite(batch.bind("qpos")[ids]).all(axis=1)
     failed = np.flatnonzero(warned.any(axis=1) | broken)
@@ -255,10 +256,12 @@ def _raise_if_diverged(batch: Batch, ids: np.ndarray, time: float, when: str, st
     i = failed[0]
     kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
     path = Path(f"diverged-start-{ids[i]}.npz").resolve()
+    when = "while settling" if speeds is None else f"while walking at V = {speeds[ids[i]]:g}"
     model = batch.model
     saved = {name: values[i] for name, values in state.items()}
-    np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, friction=model.geom_friction[0, 0])
-    raise SimulationError(
-        f"start {ids[i]} diverged {when}, at {time:.4g} time units: {', '.join(kinds)};"
-        f" its last good state is in {path} (hexmj.physics.replay)"
-    )
+    try:
+        np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, friction=model.geom_friction[0, 0])
+        written = f"its last good state is in {path} (hexmj.physics.replay)"
+    except OSError as error:
+        written = f"its last good state could not be written to {path}: {error.strerror}"
+    raise SimulationError(f"start {ids[i]} diverged {when}, at {time:.4g} time units: {', '.join(kinds)}; {written}")

@@ -9,6 +9,7 @@ import xarray as xr
 
 from hexmj import insect
 from hexmj.body import Body
+from hexmj.comparison import REPORTED
 from hexmj.errors import InputError
 from hexmj.kinematics import LegDimensions, tips_to_joints
 from hexmj.legs import LEGS
@@ -43,6 +44,12 @@ MEASURED = {
     "measured_loss_time": (_ONCE, "time unit", "first loss of measured static stability, or inf"),
     "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
     "fall_part": (_ONCE, "1", f"part that touched the ground first: {', '.join(insect.TRUNK)} from 0; -1 for none"),
+    "clearance": (_ONCE, "mm", "least height of the trunk's lowest point"),
+    "tilt": (_ONCE, "rad", "greatest tilt of the trunk"),
+    "speed": (_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
+    "slip": (_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
+    "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
+    "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }
 """Variables of a recorded physical insect; a puppet that only shows the plan has none of them."""
 
@@ -76,6 +83,7 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
         measured_loss_time=outcomes.measured_loss[start],
         fall_time=outcomes.fall[start],
         fall_part=outcomes.fall_part[start],
+        **{name: getattr(outcomes, name)[start] for name in REPORTED},
         qpos=qpos,
         centre_of_mass=walk.centre_of_mass[:, start],
     )
@@ -124,10 +132,12 @@ def load_recording(path: Path | str) -> xr.Dataset:
     Raises:
         InputError: no recording of ours.
     """
+    if not Path(path).is_file():
+        raise InputError(f"{path} is no file; expected a recording")
     try:
         recording = xr.open_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as NetCDF ({error}); expected a recording") from None
+    except (OSError, ValueError, KeyError, RuntimeError):
+        raise InputError(f"{path} cannot be read as NetCDF; expected a recording") from None
     expected = _TIMES | PLANNED | (MEASURED if set(MEASURED) & set(recording.variables) else {})
     missing = [name for name in expected if name not in recording.variables]
     settings = ("title", *asdict(Body()), *_settings(Network()))
@@ -135,6 +145,13 @@ def load_recording(path: Path | str) -> xr.Dataset:
     if missing:
         recording.close()
         raise InputError(f"{path} is no recording; missing: {', '.join(missing)}")
+    for name, (dimensions, *_) in expected.items():
+        if recording[name].dims != dimensions or recording[name].dtype.kind not in "fib":
+            recording.close()
+            raise InputError(f"{path} is no recording: {name} is not a table of numbers over {dimensions}")
+    if recording.sizes["leg"] != len(LEGS) or recording.sizes["position"] != insect.ROOT_QPOS + 18:
+        recording.close()
+        raise InputError(f"{path} is no recording of this insect, with 6 legs and 25 positions")
     return recording
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,29 +17,38 @@ if TYPE_CHECKING:
 PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "dm-control", "xarray")
 
 
-def results_folder(path: Path) -> Path:
-    """The folder for results, made if it is missing.
+def results_folder(path: Path, names: Sequence[str]) -> Path:
+    """The folder for results, if the files `names` can be written to it; it is made when the first one is.
 
     Raises:
-        InputError: the path is a file, or cannot be written to.
+        InputError: the path or a name in it is taken by something else, or cannot be written to.
     """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {path} cannot be made: {error.strerror}; expected a folder") from None
-    if not os.access(path, os.W_OK):
-        raise InputError(f"--out {path} is not writable; expected a folder that is")
+    nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
+    if not nearest.is_dir():
+        raise InputError(f"--out {path}: {nearest} is a file; expected a folder")
+    if not os.access(nearest, os.W_OK):
+        raise InputError(f"--out {path}: {nearest} is not writable; expected a folder that is")
+    if taken := [name for name in names if (path / name).is_dir()]:
+        raise InputError(f"--out {path}: {taken[0]} is a folder there; expected a file or nothing")
     return path
 
 
 def write_whole(path: Path, write: Callable[[Path], Any]) -> Path:
-    """Let `write` make a file beside `path`, then put it in the place of `path`; on failure `path` stays as it was."""
+    """Let `write` make a file beside `path`, then put it in the place of `path`; on failure `path` stays as it was.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     part = path.with_name(f".part-{path.name}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         write(part)
         os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:
-        part.unlink(missing_ok=True)
+        if part.exists():
+            part.unlink()
     return path
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
+from hexmj.errors import InputError
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
@@ -26,9 +27,16 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     Returns:
         (...) [mm]: positive if and only if the centre of mass lies strictly within the polygon (Section 3),
         negative outside, where fewer than three feet stand too; -inf where none does.
+
+    Raises:
+        InputError: shapes that do not fit.
     """
     points = np.ascontiguousarray(feet, dtype=float)
     stands = np.ascontiguousarray(stance, dtype=bool)
+    if points.shape[-2:] != (6, 2) or stands.shape != points.shape[:-1]:
+        raise InputError(
+            f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
+        )
     shape = stands.shape[:-1]
     points, stands = points.reshape(-1, *points.shape[-2:]), stands.reshape(-1, stands.shape[-1])
     margin = np.empty(len(points))
@@ -75,15 +83,17 @@ def _margins(feet: Any, stance: Any, margin: Any) -> None:
     """
     for n in range(len(feet)):
         f, s = feet[n], stance[n]
-        nearest, inside, standing = np.inf, True, 0
+        nearest, inside = np.inf, True
         for a in range(6):
             if not s[a]:
                 continue
-            standing += 1
             for b in range(a):
                 if not s[b]:
                     continue
                 ex, ey = f[b, 0] - f[a, 0], f[b, 1] - f[a, 1]
+                length = ex * ex + ey * ey
+                if length == 0.0:
+                    continue
                 left = right = False
                 for c in range(6):
                     if s[c]:
@@ -94,12 +104,12 @@ def _margins(feet: Any, stance: Any, margin: Any) -> None:
                     continue
                 side = ey * f[a, 0] - ex * f[a, 1]  # of the centre of mass
                 inside &= (left and side > 0.0) or (right and side < 0.0)
-                length = ex * ex + ey * ey
-                along = -(f[a, 0] * ex + f[a, 1] * ey) / length if length > 0.0 else 0.0
+                along = -(f[a, 0] * ex + f[a, 1] * ey) / length
                 along = min(max(along, 0.0), 1.0)
                 nearest = min(nearest, np.hypot(f[a, 0] + along * ex, f[a, 1] + along * ey))
-        if standing == 1:
+        if nearest == np.inf:  # all standing feet are in one place
+            inside = False
             for a in range(6):
                 if s[a]:
                     nearest = np.hypot(f[a, 0], f[a, 1])
-        margin[n] = nearest if inside and standing > 2 else -nearest
+        margin[n] = nearest if inside else -nearest

@@ -13,7 +13,7 @@ from hexmj import gl, insect
 from hexmj.errors import InputError, RenderingError
 from hexmj.film import Film
 from hexmj.overlay import Overlay
-from hexmj.physics import Progress
+from hexmj.progress import Progress
 from hexmj.results import write_whole
 from hexmj.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.stability import support_polygon
@@ -48,7 +48,10 @@ def render(
         raise InputError(f"the film cannot be written to {path}; expected a name with .mp4 in a folder that exists")
     if reason := gl.missing():
         raise RenderingError(reason)
-    takes = [Take.of(recording) for recording in recordings]
+    try:
+        takes = [Take.of(recording) for recording in recordings]
+    except (KeyError, IndexError, TypeError, ValueError, OSError, RuntimeError) as error:
+        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
     frames = max(1, round(max(take.duration for take in takes) * film.slow_motion * film.fps))
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     write_whole(path, lambda part: _write(takes, part, frames, film, progress))

@@ -194,6 +194,15 @@ NONSENSE = [
     (["walk", "--physical", "--vp", "nan"], "vp = nan; expected"),
     (["compare", "--models", "nowhere.toml"], "nor a TOML file"),
     (["compare", "--models", "ldvs", "ldvs"], "none of them twice"),
+    (["flss", "--window", "1e300"], "at most"),
+    (["flss", "--starts", "100000000000000"], "at most 100000000"),
+    (["flss", "--physical", "--contact-gap", "-1"], "contact_gap = -1.0; expected 0 to 1000 ms"),
+    (["flss", "--pep-min", "5"], "hexmj: pep_min = 5.0, pep0 = -10.0, aep0 = 10.0 mm; expected"),
+    (["flss", "--model", "x" * 400], "neither a preset"),
+    (["flss", "--out", "results/flss/manifest.json"], "is a file; expected a folder"),
+    (["render", "a.nc", "b.nc", "c.nc"], "expected one, or two"),
+    (["render", "a.nc", "--beside", "planned"], "--beside was given with recordings"),
+    (["render", "--slow-motion", "1e12"], "at most 1000"),
     (["render", "--camera", "behind"], "following"),
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
@@ -224,6 +233,16 @@ def test_a_folder_that_is_a_file(run, tmp_path):
     assert code == 2
     assert "expected a folder" in error
     assert (tmp_path / "taken").read_text() == "precious"
+    (tmp_path / "results" / "manifest.json").mkdir(parents=True)
+    code, _, error = run("walk", "--out", tmp_path / "results")
+    assert code == 2
+    assert "manifest.json is a folder there" in error
+    assert [path.name for path in (tmp_path / "results").iterdir()] == ["manifest.json"]
+
+
+def test_bad_input_makes_no_folder(run, tmp_path):
+    assert run("walk", "--velocity", 2, "--out", tmp_path / "new")[0] == 2
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):

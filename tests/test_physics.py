@@ -57,6 +57,14 @@ def test_measured_tips_follow_the_plan(walked):
     assert walked.outcomes.saturation.max() < 0.02
 
 
+def test_every_bounce_counts_without_a_contact_gap():
+    """Measured stability is stricter the shorter the gap; what the body does is the same."""
+    gaps = [physical_outcomes(settle(draw_starts(20, 0), Body(contact_gap=ms)), LDVS, 0.5, 40.0) for ms in (0.0, 10.0)]
+    assert np.array_equal(gaps[0].fall, gaps[1].fall)
+    assert (gaps[0].measured_loss <= gaps[1].measured_loss).all()
+    assert np.isfinite(gaps[0].measured_loss).sum() > np.isfinite(gaps[1].measured_loss).sum()
+
+
 def test_nothing_is_measured_after_a_fall():
     walked = physical_walk(draw_starts(6, 0), UNCOORDINATED, 0.7, 60.0)
     fall = walked.outcomes.fall
@@ -109,7 +117,9 @@ def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_p
     monkeypatch.chdir(tmp_path)
     broken = settle(draw_starts(3, 0))
     broken.qvel[1] = 1e12
-    with pytest.raises(SimulationError, match=r"start 1 diverged while walking, at 0 time units: mjWARN_\w+") as error:
+    with pytest.raises(
+        SimulationError, match=r"start 1 diverged while walking at V = 0.3, at 0 time units: mjWARN_\w+"
+    ) as error:
         list(drive(broken, LDVS, 0.3, 10.0))
     path = tmp_path / "diverged-start-1.npz"
     assert str(path) in str(error.value)

@@ -121,12 +121,14 @@ def test_files_that_are_no_recordings(walked, tmp_path):
     text, other, part = tmp_path / "text.nc", tmp_path / "other.nc", tmp_path / "part.nc"
     text.write_text("no numbers")
     xr.Dataset({"flss": ("velocity", [0.5])}).to_netcdf(other, engine="h5netcdf")
+    record(walked).isel(leg=slice(3)).to_netcdf(short := tmp_path / "short.nc", engine="h5netcdf")
     record(walked).drop_vars("fall_time").drop_attrs(deep=False).to_netcdf(part, engine="h5netcdf")
     for path, said in {
         text: "cannot be read as NetCDF",
-        tmp_path / "nothing.nc": "cannot be read as NetCDF",
+        tmp_path / "nothing.nc": "is no file; expected a recording",
         other: "missing: .*planned_x.*qpos.*attribute title",
         part: "missing: fall_time, attribute title",
+        short: "no recording of this insect, with 6 legs",
     }.items():
         with pytest.raises(InputError, match=said) as error:
             load_recording(path)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import plain_network as plain
+from hexmj.errors import InputError
 from hexmj.legs import FIG1, MIRROR
 from hexmj.network import first_loss, walk
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Network
@@ -80,6 +81,19 @@ def test_few_feet_are_never_stable():
     on_the_edge = feet - np.array([4.0, 0.0])
     assert stability_margin(on_the_edge, two) == 0.0
     assert len(support_polygon(feet, two)) == 2
+
+
+def test_feet_in_one_place():
+    corners = np.array([[10.0, 10.0], [10.0, -10.0], [-10.0, -10.0], [-10.0, 10.0], [10.0, 10.0], [0.0, 1.0]])
+    assert stability_margin(corners, np.ones(6, dtype=bool)) == pytest.approx(10.0)
+    assert stability_margin(np.full((6, 2), 3.0), np.ones(6, dtype=bool)) == pytest.approx(-np.hypot(3.0, 3.0))
+
+
+def test_shapes_that_do_not_fit():
+    with pytest.raises(InputError, match="expected"):
+        stability_margin(np.zeros((8, 2)), np.ones(8, dtype=bool))
+    with pytest.raises(InputError, match="expected"):
+        stability_margin(np.zeros((4, 6, 2)), np.ones(6, dtype=bool))
 
 
 def test_support_polygon_is_the_hull_counter_clockwise():
