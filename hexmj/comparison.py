@@ -162,9 +162,8 @@ def physical_flss(
         progress=progress,
     )
     table = frequency_table(result.fall.values[0], result.velocity.values, result.duration.values)
-    return table.assign(result.isel(model=0, drop=True)[list(REPORTED)].drop_vars("duration").data_vars).assign_attrs(
-        result.attrs
-    )
+    reported = result.isel(model=0, drop=True)[list(REPORTED)].drop_vars("duration")
+    return table.assign(reported.data_vars).assign_attrs(result.attrs)
 
 
 def _name(model: Model) -> str:
