@@ -58,7 +58,7 @@ class Compare:
     """Presets (hws, ldvs, uncoordinated) or parameter files (TOML)."""
     velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 <= V < 1."""
-    starts: int = 100
+    starts: int = 60
     """Number of random starts, the same for every model and velocity."""
     out: Path = Path("results/compare")
     """Folder for the results."""

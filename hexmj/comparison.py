@@ -50,7 +50,7 @@ def compare(
     models: Model | Mapping[str, Model],
     velocities: Sequence[float],
     *,
-    starts: int = 100,
+    starts: int = 60,
     window: str | float = "walk",
     seed: int = 0,
     body: Body | None = None,
