@@ -111,7 +111,7 @@ def walk(
 
 
 def stable(x: list[float], s: list[int], network: Network) -> bool:
-    """The closed form of strict static stability, see shared constants: u = x / |y| of the standing feet."""
+    """Strict static stability in closed form, by u = x / |y| of the standing feet on either side."""
     geometry = network.geometry
     u = [(o + x_d) * (1 / abs(y)) for o, x_d, y in zip(geometry.origin, x, geometry.y, strict=True)]
     left = [u[d] for d in LEGS if s[d] and geometry.y[d] > 0]
