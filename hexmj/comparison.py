@@ -21,8 +21,8 @@ from hexmj.loss_frequency import (
 from hexmj.measurement import Outcomes
 from hexmj.parameters import PRESETS, Acceleration, Model, Network
 from hexmj.physical_walks import physical_outcomes
-from hexmj.physics import settle
 from hexmj.progress import Progress
+from hexmj.settling import settle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +80,7 @@ def compare(
         start) every field of `Outcomes`.
 
     Raises:
-        InputError, SimulationError: see `physics.settle` and `physics.drive`.
+        InputError, SimulationError: see `settling.settle` and `physics.drive`.
     """
     import xarray as xr
 

@@ -47,7 +47,7 @@ from hexmj.legs import LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun, steps_within
 from hexmj.parameters import LDVS, Model, Network
-from hexmj.physics import settle
+from hexmj.settling import settle
 from hexmj.stability import stability_margin
 from hexmj.targets import TipTargets
 
@@ -215,7 +215,7 @@ class Walking(control.Task):
                 f" expected {spec.minimum[i]:.4g} to {spec.maximum[i]:.4g}"
             )
         ahead = self._plan.advance(1)
-        tips = self._targets.follow(ahead, np.zeros(1, dtype=int), threads=1)[0]
+        tips = self._targets.follow(ahead, np.zeros(1, dtype=int))[0]
         self._planned_stance, self._planned_tips = ahead.stance[0, 0].astype(float), tips[-1]
         physics.set_control(self.joint_targets(action, tips, physics))
 

@@ -49,20 +49,21 @@ class Sensors:
     """Centre of mass of the whole insect in the world, (..., axis) [mm]."""
 
 
-def load(timestep: float = 0.001, friction: float = 1.0) -> mujoco.MjModel:
+def load(timestep: float = 0.001, friction: float = 1.0, *, looks: bool = True) -> mujoco.MjModel:
     """The compiled insect on its plane; every call gives a copy of its own.
 
     Args:
         timestep: integration step [s], at most the 0.001 that gains and contacts are made for.
         friction: coefficient of sliding friction between the ground and feet or trunk.
+        looks: with the geoms that are only to look at; without them it walks to the same bits, 2 % faster.
     """
     if not 0 < timestep <= LONGEST_STEP:
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {LONGEST_STEP} s")
     if not 0 <= friction < math.inf:
         raise InputError(f"friction = {friction}; expected a finite number, at least 0")
-    model = copy.copy(_compiled())
+    model = copy.copy(_compiled(looks))
     model.opt.timestep = timestep
-    model.geom_friction[:, 0] = friction
+    model.pair_friction[:, :2] = friction
     return model
 
 
@@ -118,5 +119,7 @@ def trunk_corners(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _compiled() -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(mjcf())
+def _compiled(looks: bool) -> mujoco.MjModel:
+    spec = mujoco.MjSpec.from_string(mjcf())
+    spec.compiler.discardvisual = not looks
+    return spec.compile()

@@ -7,9 +7,9 @@ import numpy as np
 from numba import njit
 
 from hexmj import insect
-from hexmj.physics import Settled, Stretch
+from hexmj.physics import Stretch
+from hexmj.settling import Settled
 from hexmj.stability import walk_margin
-from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
 
@@ -73,10 +73,10 @@ def measured_walk(stretch: Stretch, settled: Settled) -> tuple[np.ndarray, Walk,
 class Tally:
     """Adds up the outcomes of all starts, stretch by stretch."""
 
-    def __init__(self, settled: Settled, planned_loss: np.ndarray, threads: int | None = None) -> None:
+    def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:
         """Begin with nothing but the plan's losses, (start,) [time units]."""
         size = len(settled.starts)
-        self._settled, self._threads = settled, threads
+        self._settled = settled
         self._planned_loss = planned_loss
         self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
@@ -92,12 +92,8 @@ class Tally:
         columns, limit = insect.sensors(model), model.actuator_forcerange[:, 1]
         feet, touch = columns.foot.start, columns.touch.start
 
-        def work(begin: int, end: int) -> None:
-            part = slice(begin, end)
-            seen = stretch.qpos[part], stretch.sensors[part], stretch.force[part], stretch.valid[part]
-            _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids[part])
-
-        run_blocks(work, len(ids), 64, self._threads)
+        seen = stretch.qpos, stretch.sensors, stretch.force, stretch.valid
+        _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids)
         n, last = np.arange(len(ids)), stretch.valid - 1
         trunk = stretch.sensors[n, last, columns.trunk] > 0
         fell = stretch.fell
@@ -108,7 +104,7 @@ class Tally:
         share = np.clip(np.where(fell, last, stretch.valid) / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
         self._commanded[ids] += (share * stretch.plan.velocity[:, ids]).sum(axis=0) * dt
         _, measured, _ = measured_walk(stretch, settled)
-        lost = walk_margin(measured, self._threads) <= 0.0
+        lost = walk_margin(measured, threads=1) <= 0.0
         if lost.size:
             time = np.where(lost.any(axis=0), measured.time[np.argmax(lost, axis=0)], np.inf)
             self._measured_loss[ids] = np.minimum(self._measured_loss[ids], time)

@@ -9,8 +9,9 @@ from hexmj.body import Body
 from hexmj.measurement import Outcomes, Tally, measured_walk
 from hexmj.network import first_loss, walk
 from hexmj.parameters import Acceleration, Model, Network
-from hexmj.physics import Settled, drive, settle
+from hexmj.physics import drive
 from hexmj.progress import Progress
+from hexmj.settling import Settled, settle
 from hexmj.walks import Walk
 
 
@@ -47,7 +48,7 @@ def physical_outcomes(
     """How every settled start goes; only outcomes are kept.
 
     Args:
-        settled: starts at rest, see `physics.settle`.
+        settled: starts at rest, see `settling.settle`.
         model: coupling weights.
         velocity: V_r, or its final value; one number or (start,).
         duration: observation time [time units of the network].
@@ -94,7 +95,7 @@ def physical_walk(
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError, SimulationError: see `physics.settle` and `physics.drive`.
+        InputError, SimulationError: see `settling.settle` and `physics.drive`.
     """
     body, network = body or Body(), network or Network()
     body = body if vp is None else replace(body, vp=vp)
@@ -134,4 +135,4 @@ def _tally(
         acceleration=acceleration,
         threads=threads,
     )
-    return Tally(settled, planned_loss, threads)
+    return Tally(settled, planned_loss)

@@ -13,7 +13,6 @@ from numba import njit
 
 from hexmj.body import Body
 from hexmj.parameters import Network
-from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
 
@@ -28,13 +27,12 @@ class TipTargets:
         self._body, self._network = body, network
         self._origin, self._y = np.array(network.geometry.origin), np.array(network.geometry.y)
 
-    def follow(self, plan: Walk, ids: np.ndarray, threads: int | None = None) -> np.ndarray:
+    def follow(self, plan: Walk, ids: np.ndarray) -> np.ndarray:
         """Tips in the root frame at the end of each substep of the plan's steps.
 
         Args:
             plan: the next steps of the walk, of all starts.
             ids: the starts that are still wanted, (n,).
-            threads: one per core unless given.
 
         Returns:
             (n, substep, leg, 3) [mm]: forward, left, up.
@@ -43,11 +41,7 @@ class TipTargets:
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
         rate = 1000.0 * self._body.seconds(self._network) / m / self._body.lift_time
         shape = m, rate, self._body.step_height, self._body.standing_height, self._origin, self._y
-
-        def work(begin: int, end: int) -> None:
-            _follow(plan.x, plan.stance, ids[begin:end], self._x, self._stance, self._lift, *shape, tips[begin:end])
-
-        run_blocks(work, len(ids), 64, threads)
+        _follow(plan.x, plan.stance, ids, self._x, self._stance, self._lift, *shape, tips)
         self._x[ids], self._stance[ids] = plan.x[-1, ids], plan.stance[-1, ids]
         return tips
 

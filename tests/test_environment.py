@@ -17,7 +17,8 @@ from hexmj.legs import CENTRED, FIG1, LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.parameters import HWS, LDVS, Network
 from hexmj.physical_walks import physical_walk
-from hexmj.physics import drive, settle
+from hexmj.physics import drive
+from hexmj.settling import settle
 from hexmj.stability import walk_margin
 
 ZEROS = np.zeros(18)

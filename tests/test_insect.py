@@ -179,9 +179,9 @@ def test_the_part_of_the_trunk_that_touches_the_ground_is_known(model: mujoco.Mj
 
 
 def test_only_the_ground_is_touched(model: mujoco.MjModel):
-    touching = [model.geom(i).name for i in range(model.ngeom) if model.geom_conaffinity[i]]
-    assert sorted(touching) == sorted(["ground", *TRUNK, *(f"{leg}_foot" for leg in LEGS)])
-    assert [model.geom(i).name for i in range(model.ngeom) if model.geom_contype[i]] == ["ground"]
+    assert not model.geom_contype.any() and not model.geom_conaffinity.any()
+    assert {model.geom(i).name for i in model.pair_geom1} == {"ground"}
+    assert sorted(model.geom(i).name for i in model.pair_geom2) == sorted([*TRUNK, *(f"{leg}_foot" for leg in LEGS)])
 
 
 def test_every_target_of_the_step_range_is_reachable(model: mujoco.MjModel):
@@ -207,9 +207,8 @@ def test_targets_are_limited_to_the_joint_ranges(model: mujoco.MjModel):
 
 
 def test_lengths_in_the_solvers_settings_are_in_mm(model: mujoco.MjModel):
-    solid = [i for i in range(model.ngeom) if model.geom_conaffinity[i]]
-    assert (model.geom_solimp[solid, 2] == 0.1).all()
-    assert (model.geom_solref[solid, 0] >= 2 * insect.LONGEST_STEP).all()
+    assert (model.pair_solimp[:, 2] == 0.1).all()
+    assert (model.pair_solref[:, 0] >= 2 * insect.LONGEST_STEP).all()
     assert model.opt.gravity.tolist() == [0, 0, -9810]
     assert model.opt.tolerance == 1e-5
     assert model.opt.ccd_tolerance == 1e-3
@@ -252,8 +251,20 @@ def test_standing_does_not_depend_on_the_time_step(standing: mujoco.MjData):
 def test_every_load_is_a_copy_of_its_own():
     first, second = insect.load(timestep=0.0005, friction=0.3), insect.load()
     assert (first.opt.timestep, second.opt.timestep) == (0.0005, 0.001)
-    assert set(first.geom_friction[:, 0]) == {0.3}
-    assert set(second.geom_friction[:, 0]) == {1.0}
+    assert set(first.pair_friction[:, :2].flat) == {0.3}
+    assert set(second.pair_friction[:, :2].flat) == {1.0}
+
+
+def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):
+    bare = insect.load(looks=False)
+    assert bare.ngeom == 1 + len(TRUNK) + len(LEGS)
+    seen = []
+    for one in (model, bare):
+        data = at_home(one)
+        data.ctrl[::3] += 0.3
+        mujoco.mj_step(one, data, nstep=500)
+        seen.append(data.qpos.copy())
+    assert np.array_equal(*seen)
 
 
 @pytest.mark.parametrize(
@@ -261,4 +272,4 @@ def test_every_load_is_a_copy_of_its_own():
 )
 def test_values_without_sense_are_refused(name: str, value: float):
     with pytest.raises(InputError, match=name):
-        insect.load(**{name: value})
+        insect.load(**{"timestep": 0.001, "friction": 1.0} | {name: value}, looks=True)

@@ -6,13 +6,15 @@ import pytest
 from hexmj import insect
 from hexmj.body import Body
 from hexmj.comparison import compare, physical_flss
+from hexmj.divergence import replay
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
 from hexmj.loss_frequency import draw_starts
 from hexmj.measurement import Outcomes
 from hexmj.parameters import LDVS, UNCOORDINATED, Network
 from hexmj.physical_walks import physical_outcomes, physical_walk
-from hexmj.physics import drive, replay, settle
+from hexmj.physics import drive
+from hexmj.settling import settle
 
 OUTCOMES = tuple(Outcomes.__dataclass_fields__)
 
