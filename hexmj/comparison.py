@@ -14,6 +14,7 @@ from hexmj.loss_frequency import (
     checked_list,
     draw_starts,
     frequency_table,
+    losses_by_sample,
     observation_time,
     settings,
     wilson_interval,
@@ -146,8 +147,7 @@ def physical_flss(
     """Physical FLSS: the frequency with which the trunk touches the ground; arguments as for `compare`.
 
     Returns:
-        The table of `loss_frequency.flss`, with the time of the fall in `loss_time`, and the outcomes
-        `REPORTED` of every start.
+        The table of `loss_frequency.flss`, and the time of the fall and the outcomes `REPORTED` of every start.
     """
     result = compare(
         model,
@@ -161,8 +161,9 @@ def physical_flss(
         threads=threads,
         progress=progress,
     )
-    table = frequency_table(result.fall.values[0], result.velocity.values, result.duration.values)
-    reported = result.isel(model=0, drop=True)[list(REPORTED)].drop_vars("duration")
+    fell = losses_by_sample(np.isfinite(result.fall.values[0]))
+    table = frequency_table(fell, starts, result.velocity.values, result.duration.values)
+    reported = result.isel(model=0, drop=True)[["fall", *REPORTED]].drop_vars("duration")
     return table.assign(reported.data_vars).assign_attrs(result.attrs)
 
 

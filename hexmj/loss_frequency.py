@@ -1,6 +1,6 @@
 """FLSS, the frequency of the loss of static stability (paper, Section 3): starts, windows, I_N and J_N."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,14 @@ WINDOWS = ("walk", "start")
 SAMPLE = 1000
 """Starts of one sample of the paper's protocol; it takes seven of them."""
 
-MOST_STARTS = 10**8
-"""Most starts in one call; their tips alone take 5 GB."""
+SLAB = 64 * SAMPLE
+"""Starts that FLSS holds in memory at a time; only counts are kept of them."""
+
+MOST_STARTS = 10**12
+"""Most starts of one FLSS; on two cores they would take weeks."""
+
+MOST_DRAWN = 10**8
+"""Most starts in one array; their tips take 5 GB."""
 
 
 def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndarray:
@@ -30,12 +36,20 @@ def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndar
     Returns:
         (start, leg) [mm].  The first k of n starts are the same for every n.
     """
-    network = network or Network()
+    if isinstance(size, int) and size > MOST_DRAWN:
+        raise InputError(f"starts = {size}; expected at most {MOST_DRAWN} in one array")
+    return np.concatenate(list(_slabs(size, seed, network or Network())))
+
+
+def _slabs(size: int, seed: int, network: Network) -> Iterator[np.ndarray]:
+    """The starts of `draw_starts`, (start, leg) [mm], a slab at a time."""
     if not (isinstance(size, int) and 1 <= size <= MOST_STARTS):
         raise InputError(f"starts = {size}; expected a whole number of at least 1 and at most {MOST_STARTS}")
     if not (isinstance(seed, int) and seed >= 0):
         raise InputError(f"seed = {seed}; expected an integer of at least 0")
-    return np.random.default_rng(seed).uniform(network.pep0, network.aep0, (size, 6))
+    rng = np.random.default_rng(seed)
+    for first in range(0, size, SLAB):
+        yield rng.uniform(network.pep0, network.aep0, (min(SLAB, size - first), 6))
 
 
 def observation_time(
@@ -81,6 +95,9 @@ def flss(
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
+    Starts are drawn, walked and counted slab by slab, so any number of them takes the same memory; the time
+    of every loss is had from `network.first_loss` of `draw_starts`.
+
     Args:
         model: coupling weights.
         velocities: V_r (when accelerating, its final value), each 0 <= V < 1.
@@ -93,19 +110,22 @@ def flss(
         progress: told the fraction done since it was last called.
 
     Returns:
-        `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples of 1000
-        starts, the observation time `duration` and every start's `loss_time`.
+        Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
+        of 1000 starts, and the observation time `duration`.
     """
     network = network or Network()
     v = checked_list(velocities)
-    x = draw_starts(starts, seed, network)
     duration = observation_time(window, v, network, acceleration)
-    lost = []
-    for one, t in zip(v, duration, strict=True):
-        lost.append(first_loss(x, model, one, t, network=network, acceleration=acceleration, threads=threads))
-        if progress:
-            progress(1 / len(v))
-    return frequency_table(np.array(lost), v, duration).assign_attrs(
+    counts = []
+    for x in _slabs(starts, seed, network):
+        lost = np.empty((len(v), len(x)), dtype=bool)
+        for i, one in enumerate(v):
+            times = first_loss(x, model, one, duration[i], network=network, acceleration=acceleration, threads=threads)
+            lost[i] = np.isfinite(times)
+            if progress:
+                progress(len(x) / starts / len(v))
+        counts.append(losses_by_sample(lost))
+    return frequency_table(np.concatenate(counts, axis=1), starts, v, duration).assign_attrs(
         settings({"model": model}, window, starts, seed, network, acceleration)
     )
 
@@ -142,10 +162,11 @@ def flss_over_range(
     network = network or Network()
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
-    x = draw_starts(starts, seed, network)
-    v = np.random.default_rng([seed, 1]).uniform(low, high, starts)
-    lost = first_loss(x, model, v, observation_time(window, v, network), network=network, threads=threads)
-    count = int(np.isfinite(lost).sum())
+    rng, count = np.random.default_rng([seed, 1]), 0
+    for x in _slabs(starts, seed, network):
+        v = rng.uniform(low, high, len(x))
+        lost = first_loss(x, model, v, observation_time(window, v, network), network=network, threads=threads)
+        count += int(np.isfinite(lost).sum())
     return count / starts, wilson_interval(count, starts)
 
 
@@ -186,24 +207,27 @@ def checked_list(velocities: Sequence[float]) -> np.ndarray:
     return v
 
 
-def frequency_table(loss_time: np.ndarray, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
-    """FLSS with its intervals, from the time of every loss, (velocity, start) [time units], inf for none."""
+def losses_by_sample(lost: np.ndarray) -> np.ndarray:
+    """Number of losses in each sample of 1000 starts, (velocity, sample), from (velocity, start)."""
+    return np.add.reduceat(lost, np.arange(0, lost.shape[1], SAMPLE), axis=1, dtype=int)
+
+
+def frequency_table(losses: np.ndarray, starts: int, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
+    """FLSS with its intervals, from the number of losses in each sample of `starts` starts, (velocity, sample)."""
     import xarray as xr
 
-    lost = np.isfinite(loss_time)
-    size = lost.shape[1]
-    intervals = np.array([wilson_interval(int(row.sum()), size) for row in lost])
-    samples = lost[:, : size // SAMPLE * SAMPLE].reshape(len(lost), -1, SAMPLE).mean(axis=2)
-    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(lost), np.nan)
+    total = losses.sum(axis=1)
+    intervals = np.array([wilson_interval(int(n), starts) for n in total])
+    samples = losses[:, : starts // SAMPLE] / SAMPLE
+    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
     unit = {"units": "1"}
     return xr.Dataset(
         {
-            "flss": ("velocity", lost.mean(axis=1), unit | {"long_name": "frequency of the loss of static stability"}),
+            "flss": ("velocity", total / starts, unit | {"long_name": "frequency of the loss of static stability"}),
             "low": ("velocity", intervals[:, 0], unit | {"long_name": "lower end of the 95 % Wilson interval"}),
             "high": ("velocity", intervals[:, 1], unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             "sample_sd": ("velocity", spread, unit | {"long_name": "standard deviation over samples of 1000 starts"}),
             "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
-            "loss_time": (("velocity", "start"), loss_time, {"units": "time unit", "long_name": "first loss, or inf"}),
         },
         coords={"velocity": ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})},
     )

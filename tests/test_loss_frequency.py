@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.loss_frequency import draw_starts, flss, flss_over_range, observation_time, wilson_interval
+from hexmj.loss_frequency import SLAB, draw_starts, flss, flss_over_range, observation_time, wilson_interval
+from hexmj.network import first_loss
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]
@@ -67,10 +68,23 @@ def test_threads_do_not_matter():
 
 def test_samples_of_the_protocol():
     table = flss(LDVS, [0.5], starts=3000, window="start")
-    lost = np.isfinite(table.loss_time.values[0]).reshape(3, 1000).mean(axis=1)
+    times = first_loss(draw_starts(3000, 0), LDVS, 0.5, 40.0)
+    lost = np.isfinite(times).reshape(3, 1000).mean(axis=1)
     assert table.sample_sd.item() == pytest.approx(lost.std(ddof=1))
     assert table.flss.item() == pytest.approx(lost.mean())
     assert np.isnan(flss(LDVS, [0.5], starts=100, window="start").sample_sd.item())
+
+
+def test_slabs_are_one_stream():
+    """More starts than a slab holds are those of one draw, and so is their measure."""
+    size = SLAB + 1500
+    starts = draw_starts(size, 2)
+    assert np.array_equal(starts, np.random.default_rng(2).uniform(-10.0, 10.0, (size, 6)))
+    table = flss(LDVS, [0.7], starts=size, window="start", seed=2)
+    assert table.flss.item() == np.isfinite(first_loss(starts, LDVS, 0.7, 40.0)).mean()
+    v = np.random.default_rng([2, 1]).uniform(0.5, 0.9, size)
+    over_range, _ = flss_over_range(LDVS, 0.5, 0.9, starts=size, window="start", seed=2)
+    assert over_range == np.isfinite(first_loss(starts, LDVS, v, 40.0)).mean()
 
 
 def test_wilson_interval_by_its_formula():

@@ -1,14 +1,20 @@
 """Laws of the network: it equals its plain form to the last bit, whatever the number of starts and threads."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import hexmj.network as network_module
 import plain_network as plain
+from hexmj import lanes
 from hexmj.errors import InputError
+from hexmj.lanes import LANES
 from hexmj.legs import CENTRED, FIG1, MIRROR
-from hexmj.network import LANES, NetworkRun, first_loss, walk
+from hexmj.network import NetworkRun, first_loss, walk
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network, Weights, weights
 
 
@@ -71,6 +77,36 @@ def test_does_not_depend_on_threads_batch_or_neighbours_in_the_batch():
     assert np.array_equal(whole.x, threaded.x)
     assert np.array_equal(whole.x[:, 70:101], part.x)
     assert np.array_equal(whole.stance[:, 70:101], part.stance)
+
+
+@pytest.mark.parametrize("width", [5, 16])
+def test_does_not_depend_on_the_number_of_lanes(width, tmp_path, monkeypatch):
+    """The same kernel compiled for blocks of another width; 203 starts leave remainders."""
+    source = Path(lanes.__file__).read_text(encoding="utf-8")
+    path = tmp_path / f"lanes_{width}.py"
+    path.write_text(source.replace(f"LANES = {LANES}\n", f"LANES = {width}\n"), encoding="utf-8")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec and spec.loader
+    other = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(other)
+    assert width == other.LANES
+    starts = random_starts(np.random.default_rng(7), 203)
+    speeds = np.linspace(0.1, 0.9, 203)
+    usual = first_loss(starts, LDVS, speeds, 60.0), walk(starts, LDVS, speeds, 20.0).x
+    monkeypatch.setattr(network_module, "lanes", other)
+    assert np.array_equal(first_loss(starts, LDVS, speeds, 60.0), usual[0])
+    assert np.array_equal(walk(starts, LDVS, speeds, 20.0).x, usual[1])
+
+
+@pytest.mark.parametrize("size", [1, LANES - 1, 8 * LANES, 8 * LANES + 1, 3000])
+def test_a_loss_does_not_depend_on_who_had_the_lane_before(size):
+    """Lanes are handed on at different times: with other starts around it every start keeps its answer."""
+    starts = random_starts(np.random.default_rng(8), size)
+    together = first_loss(starts, LDVS, 0.6, 100.0)
+    assert np.array_equal(together, first_loss(starts[::-1], LDVS, 0.6, 100.0, threads=1)[::-1])
+    some = np.random.default_rng(9).choice(size, min(size, 5), replace=False)
+    alone = [first_loss(starts[i : i + 1], LDVS, 0.6, 100.0)[0] for i in some]
+    assert np.array_equal(together[some], alone)
 
 
 def test_advancing_in_parts_is_one_walk():
