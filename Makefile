@@ -1,5 +1,6 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       the tests
+# make bench      every speed beside its bar and its peers, about 12 minutes; ARGS="..." goes to pytest
 # make lint       style and types
 # PYTHON=...      the Python, 3.11 or newer, that .venv is made from
 
@@ -8,7 +9,7 @@ PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 
-.PHONY: compare test lint system
+.PHONY: compare test bench lint system
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
@@ -17,6 +18,16 @@ compare: .venv/project system
 test: export MUJOCO_GL ?= egl
 test: .venv/dev system
 	.venv/bin/python -m pytest $(ARGS)
+
+bench: export MUJOCO_GL ?= egl
+bench: .venv/dev system
+	mkdir -p results/bench
+	$(MAKE) .venv-flygym/ready || echo "flygym could not be installed; its rows are left out."
+	.venv/bin/python -m pytest benchmarks --override-ini "python_files=bench_*.py" \
+	    --benchmark-quiet --benchmark-json results/bench/benchmark.json $(ARGS)
+	.venv/bin/python -m benchmarks.solver_settings results/bench
+	.venv/bin/python -m benchmarks.scaling --out results/bench
+	.venv/bin/python -m benchmarks.table results/bench
 
 lint: .venv/dev
 	.venv/bin/ruff check
@@ -42,6 +53,14 @@ system:
 	    { echo "$(PYTHON) cannot make virtual environments: apt-get install python3-venv."; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(PIP) install --constraint constraints.txt --editable .
+	touch $@
+
+# A peer with other versions of MuJoCo; its OpenCV is replaced by the one that needs no libGL.
+.venv-flygym/ready: benchmarks/flygym.txt
+	$(PYTHON) -m venv .venv-flygym
+	.venv-flygym/bin/python -m pip --disable-pip-version-check --quiet install --requirement benchmarks/flygym.txt
+	.venv-flygym/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --force-reinstall \
+	    "opencv-python-headless<5"
 	touch $@
 
 .venv/dev: .venv/project

@@ -9,7 +9,7 @@ from numba import njit
 from hexmj import insect
 from hexmj.physics import Stretch
 from hexmj.settling import Settled
-from hexmj.stability import walk_margin
+from hexmj.stability import loss_time
 from hexmj.walks import Walk
 
 
@@ -39,35 +39,64 @@ class Outcomes:
     """(start,) tip targets out of reach; such a leg keeps its last angles and is counted here."""
 
 
-def measured_walk(stretch: Stretch, settled: Settled) -> tuple[np.ndarray, Walk, np.ndarray]:
+def measured_walk(
+    stretch: Stretch, settled: Settled, rows: np.ndarray | None = None
+) -> tuple[np.ndarray, Walk, np.ndarray]:
     """The measured walk at the network's steps that fall within a stretch.
 
+    Args:
+        stretch: of `physics.drive`.
+        settled: what it began with.
+        rows: which of the stretch's starts, (n,); all unless given.
+
     Returns:
-        Columns of the stretch's substeps, (step,), the walk of the stretch's starts, and the centre of
-        mass in the world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall.
+        Columns of the stretch's substeps, (step,), the walk of these starts, and the centre of mass in the
+        world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall.
     """
     m, network = settled.body.substeps(settled.network), settled.network
+    rows = np.arange(len(stretch.ids)) if rows is None else rows
     substep = np.arange(stretch.qpos.shape[1])
     shown = substep[((stretch.first + substep) % m == 0) & (stretch.first + substep > 0)]
     columns = insect.sensors(settled.mujoco_model)
-    sensors = stretch.sensors[:, shown].swapaxes(0, 1)
-    w, x, y, z = np.moveaxis(stretch.qpos[:, shown, 3:7].swapaxes(0, 1), -1, 0)
-    heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))[..., None]
-    centre = sensors[..., columns.centre_of_mass]
-    away = sensors[..., columns.foot].reshape(*sensors.shape[:2], 6, 3) - centre[..., None, :]
-    ahead = np.cos(heading) * away[..., 0] + np.sin(heading) * away[..., 1]
-    left = np.cos(heading) * away[..., 1] - np.sin(heading) * away[..., 0]
-    over = (shown[:, None] >= stretch.valid)[..., None]
+    shape = len(shown), len(rows)
+    x, y = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan)
+    stance, centre = np.zeros((*shape, 6), dtype=bool), np.full((*shape, 3), np.nan)
+    seen = stretch.qpos, stretch.sensors, stretch.standing, stretch.valid
+    _look(*seen, rows, shown, columns.foot.start, columns.centre_of_mass.start, x, y, stance, centre)
     step = (stretch.first + shown) // m
     walk = Walk(
         time=step * network.dt,
-        velocity=stretch.plan.velocity[np.maximum(step - 1 - stretch.first // m, 0)][:, stretch.ids],
-        x=np.where(over, np.nan, ahead - np.array(network.geometry.origin)),
-        y=np.where(over, np.nan, left),
-        stance=stretch.standing[:, shown].swapaxes(0, 1) & ~over,
+        velocity=stretch.plan.velocity[np.maximum(step - 1 - stretch.first // m, 0)][:, stretch.ids[rows]],
+        x=x - np.array(network.geometry.origin),
+        y=y,
+        stance=stance,
         geometry=network.geometry,
     )
-    return shown, walk, np.where(over, np.nan, centre)
+    return shown, walk, centre
+
+
+@njit(cache=True, nogil=True)
+def _look(
+    qpos: Any, sensors: Any, standing: Any, valid: Any, rows: Any, shown: Any, foot: int, centre_of_mass: int,
+    x: Any, y: Any, stance: Any, centre: Any,
+) -> None:  # fmt: skip
+    """Feet ahead of and beside the centre of mass, seen along the root's heading, up to the fall."""
+    for n, column in enumerate(shown):
+        for i, row in enumerate(rows):
+            if column >= valid[row]:
+                continue
+            w, q, r, s = qpos[row, column, 3], qpos[row, column, 4], qpos[row, column, 5], qpos[row, column, 6]
+            along, across = 1 - 2 * (r * r + s * s), 2 * (w * s + q * r)
+            length = np.hypot(along, across)
+            cosine, sine = along / length, across / length
+            for axis in range(3):
+                centre[n, i, axis] = sensors[row, column, centre_of_mass + axis]
+            for leg in range(6):
+                forward = sensors[row, column, foot + 3 * leg] - centre[n, i, 0]
+                left = sensors[row, column, foot + 3 * leg + 1] - centre[n, i, 1]
+                x[n, i, leg] = cosine * forward + sine * left
+                y[n, i, leg] = cosine * left - sine * forward
+                stance[n, i, leg] = standing[row, column, leg]
 
 
 class Tally:
@@ -91,7 +120,6 @@ class Tally:
         model, dt, m = settled.mujoco_model, settled.network.dt, settled.body.substeps(settled.network)
         columns, limit = insect.sensors(model), model.actuator_forcerange[:, 1]
         feet, touch = columns.foot.start, columns.touch.start
-
         seen = stretch.qpos, stretch.sensors, stretch.force, stretch.valid
         _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids)
         n, last = np.arange(len(ids)), stretch.valid - 1
@@ -103,11 +131,10 @@ class Tally:
         self._walked[ids] = stretch.qpos[n, last, 0] - settled.qpos[ids, 0]
         share = np.clip(np.where(fell, last, stretch.valid) / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
         self._commanded[ids] += (share * stretch.plan.velocity[:, ids]).sum(axis=0) * dt
-        _, measured, _ = measured_walk(stretch, settled)
-        lost = walk_margin(measured, threads=1) <= 0.0
-        if lost.size:
-            time = np.where(lost.any(axis=0), measured.time[np.argmax(lost, axis=0)], np.inf)
-            self._measured_loss[ids] = np.minimum(self._measured_loss[ids], time)
+        stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
+        _, measured, _ = measured_walk(stretch, settled, stable)
+        if measured.stance.size:
+            self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
         """How every start went, as far as the stretches reach."""

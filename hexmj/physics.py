@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from hexmj import insect
+from hexmj.clock import stopped_clock
 from hexmj.divergence import raise_if_diverged
 from hexmj.joint_targets import JointTargets, Orders
 from hexmj.network import NetworkRun
@@ -88,7 +89,7 @@ def drive(
         raise_if_diverged(batch, ids, time, speed, before | {"ctrl": orders.joints})
         return before["qpos"], seen
 
-    with ThreadPoolExecutor(1) as stepper:
+    with stopped_clock(), ThreadPoolExecutor(1) as stepper:
         now = targets.ahead(np.arange(len(settled.starts)))
         stepping = now and stepper.submit(step, now)
         while now and stepping:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from hexmj import insect
 from hexmj.body import Body
+from hexmj.clock import stopped_clock
 from hexmj.divergence import raise_if_diverged
 from hexmj.errors import InputError, SimulationError
 from hexmj.kinematics import tips_to_joints
@@ -75,7 +76,9 @@ def settle(
     batch.bind("ctrl")[:] = ctrl
     before = {"qpos": qpos.copy(), "qvel": qvel.copy(), "qacc_warmstart": warmstart.copy(), "ctrl": ctrl[:, None]}
     sensordata, columns = batch.bind("sensordata"), insect.sensors(model)
-    batch.step(nstep=max(1, round(body.settling_time / 1000.0 / model.opt.timestep)), stage=mujoco.mjtStage.mjSTAGE_ACC)
+    steps = max(1, round(body.settling_time / 1000.0 / model.opt.timestep))
+    with stopped_clock():
+        batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
     raise_if_diverged(batch, np.arange(len(x)), 0.0, None, before)
     for name, failed in {
         "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,

@@ -5,6 +5,7 @@ and knows nothing of lanes and blocks; the compiled network must agree with it t
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from hexmj.legs import N1, N2, N3, N4
 from hexmj.parameters import Acceleration, Network, Weights
@@ -117,3 +118,13 @@ def stable(x: list[float], s: list[int], network: Network) -> bool:
     left = [u[d] for d in LEGS if s[d] and geometry.y[d] > 0]
     right = [u[d] for d in LEGS if s[d] and geometry.y[d] < 0]
     return bool(left and right) and max(left) + max(right) > 0 and min(left) + min(right) < 0
+
+
+def first_loss(start: list[float], p: Weights, velocity: float, steps: int, network: Network) -> float:
+    """Time of the first loss of static stability at constant velocity, inf where there is none."""
+    state = begin(start, velocity, network, None)
+    for n in range(1, steps + 1):
+        step(state, p, network)
+        if not stable(state.x, state.s, network):
+            return n * network.dt
+    return inf

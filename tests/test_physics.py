@@ -1,7 +1,9 @@
 """Laws of the physical walks: they do not depend on threads or batch, and tend to the plan as V_p falls."""
 
+import mujoco
 import numpy as np
 import pytest
+from numba import cfunc
 
 from hexmj import insect
 from hexmj.body import Body
@@ -57,6 +59,19 @@ def test_measured_tips_follow_the_plan(walked):
     assert np.percentile(off, 95) < 2.0
     assert walked.outcomes.unreachable.sum() == 0
     assert walked.outcomes.saturation.max() < 0.02
+
+
+def test_mujocos_clock_stops_only_while_insects_walk(settled):
+    assert mujoco.get_mjcb_time() is None
+    for _ in drive(settled, LDVS, 0.3, 4.0):
+        assert mujoco.get_mjcb_time() is not None
+    assert mujoco.get_mjcb_time() is None
+    mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
+    try:
+        list(drive(settled, LDVS, 0.3, 4.0))
+        assert mujoco.get_mjcb_time() is ours
+    finally:
+        mujoco.set_mjcb_time(None)
 
 
 def test_every_bounce_counts_without_a_contact_gap():

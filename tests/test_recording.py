@@ -32,6 +32,17 @@ def fallen(walked: PhysicalWalk) -> int:
     return int(fell[0])
 
 
+def test_a_recording_is_read_lazily(walked, tmp_path):
+    """Opening reads no table; taking one of them reads that one only."""
+    path = save_recording(record(walked, 0), tmp_path / "recording.nc")
+    with load_recording(path) as recording:
+        tables = [name for name, values in recording.variables.items() if values.ndim and name not in recording.indexes]
+        assert "qpos" in tables
+        assert not any(recording.variables[name]._in_memory for name in tables)
+        assert np.isfinite(recording.qpos.values[0]).all()
+        assert [name for name in tables if recording.variables[name]._in_memory] == ["qpos"]
+
+
 def test_a_recording_comes_back_from_its_file(walked, fallen, tmp_path):
     for recording in (
         record(walked, fallen, "a fall"),

@@ -1,0 +1,135 @@
+"""Physical FLSS and steps/s for other solver settings: how the settings of the insect were chosen.
+
+    python -m benchmarks.solver_settings [FOLDER] [STARTS]
+
+Each row changes one setting, and LDVS walks the same starts from rest at V = 0.5.  A setting qualifies if its
+FLSS lies within the 95 % interval of the finest physics, a quarter of the shipped time step, and if its slip and
+speed are those of the others.  Written to FOLDER/solver_settings.json.
+"""
+
+import sys
+from collections.abc import Iterator
+from contextlib import chdir
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from benchmarks.table import print_table
+from hexmj import LDVS, Body, SimulationError, draw_starts, insect
+from hexmj.loss_frequency import wilson_interval
+from hexmj.physical_walks import physical_outcomes
+from hexmj.results import json_text, write_whole
+from hexmj.settling import Settled, settle
+
+VELOCITY, DURATION = 0.5, 40.0
+FINEST = "time step / 4"
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "as shipped": {},
+    "dense Jacobian": {"jacobian": mujoco.mjtJacobian.mjJAC_DENSE},
+    "islands": {"disableflags": 0},
+    "pyramidal cone": {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL},
+    **{f"impratio {ratio}": {"impratio": ratio} for ratio in (1, 2, 5, 10, 30, 100)},
+    **{f"at most {n} iterations": {"iterations": n} for n in (3, 5, 8)},
+    "tolerance 1": {"tolerance": 1.0},
+    "solver CG": {"solver": mujoco.mjtSolver.mjSOL_CG},
+    "Euler": {"integrator": mujoco.mjtIntegrator.mjINT_EULER},
+}
+"""Values of `mjOption` that differ from the shipped ones."""
+
+
+def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
+    """Name of a setting, and the starts at rest."""
+    settled = settle(starts)
+    for name, options in OPTIONS.items():
+        yield name, with_model(settled, **options)
+    yield "pairs searched for", with_model(settled, searched=True)
+    yield "time step / 2", settle(starts, Body(longest_substep=0.3125))
+    yield FINEST, settle(starts, Body(longest_substep=0.15625))
+
+
+def with_model(settled: Settled, searched: bool = False, **options: Any) -> Settled:
+    """The same starts with other values in `mjOption`, or with pairs of geoms that MuJoCo must search for."""
+    model = insect.load(settled.mujoco_model.opt.timestep, settled.body.friction, looks=False)
+    if searched:
+        spec = mujoco.MjSpec.from_string(insect.mjcf())
+        spec.compiler.discardvisual = False
+        for pair in list(spec.pairs):
+            geom = spec.geom(pair.geomname2)
+            geom.conaffinity, geom.condim, geom.friction = 1, pair.condim, pair.friction[[0, 2, 3]]
+            geom.solref, geom.solimp = pair.solref, pair.solimp
+            spec.delete(pair)
+        ground = spec.geom("ground")
+        ground.contype, ground.solref, ground.solimp = 1, spec.geom("head").solref, spec.geom("head").solimp
+        ground.friction = spec.geom("head").friction
+        spec.option.timestep = model.opt.timestep
+        model = spec.compile()
+    for name, value in options.items():
+        setattr(model.opt, name, value)
+    return replace(settled, mujoco_model=model)
+
+
+def measure(settled: Settled) -> dict[str, float]:
+    """FLSS with its interval, thousand physics steps/s, mean slip [mm/s], mean speed over the commanded one."""
+    physical_outcomes(settled, LDVS, VELOCITY, 2.0)
+    begin = perf_counter()
+    outcomes = physical_outcomes(settled, LDVS, VELOCITY, DURATION)
+    seconds = perf_counter() - begin
+    fell = np.isfinite(outcomes.fall)
+    low, high = wilson_interval(int(fell.sum()), len(fell))
+    walked = np.minimum(outcomes.fall, DURATION) / settled.network.dt * settled.body.substeps(settled.network)
+    return {
+        "flss": float(fell.mean()),
+        "low": low,
+        "high": high,
+        "steps_per_s": float(walked.sum() / seconds / 1e3),
+        "walks_per_s": len(fell) / seconds,
+        "slip": float(outcomes.slip.mean()),
+        "speed": float(np.nanmean(outcomes.speed)),
+    }
+
+
+def table(starts: np.ndarray) -> dict[str, dict[str, float] | None]:
+    """What each setting measures; none where the simulation diverged."""
+    results: dict[str, dict[str, float] | None] = {}
+    for name, settled in variants(starts):
+        try:
+            results[name] = measure(settled)
+        except SimulationError:
+            results[name] = None
+    return results
+
+
+def rows(results: dict[str, dict[str, float] | None]) -> list[list[str]]:
+    """The table's rows as texts; a qualifying FLSS lies within the interval of the finest physics."""
+    finest = results[FINEST]
+    assert finest
+    lines = []
+    for name, one in results.items():
+        if one is None:
+            lines.append([name, "diverges", "", "", "", "", "no"])
+            continue
+        qualifies = finest["low"] <= one["flss"] <= finest["high"]
+        flss = f"{one['flss']:.3f} ({one['low']:.2f}-{one['high']:.2f})"
+        figures = [f"{one[key]:.{digits}f}" for key, digits in (("slip", 1), ("speed", 3), ("steps_per_s", 0))]
+        lines.append([name, flss, *figures, f"{one['walks_per_s']:.0f}", "yes" if qualifies else "no"])
+    return lines
+
+
+def main(folder: str = "results/bench", starts: str = "400") -> None:
+    """Measure, print and write the table."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    with chdir(folder):  # where the states of what diverges are written
+        results = table(draw_starts(int(starts), 0))
+    columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
+    print_table(columns, rows(results))
+    text = json_text(results)
+    write_whole(Path(folder) / "solver_settings.json", lambda part: part.write_text(text, encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
