@@ -36,18 +36,23 @@ def rows(benchmarks: list[dict[str, Any]]) -> list[list[str]]:
             continue
         more_is_better = info["unit"] not in ("s", "MB")
         met = "" if info["bar"] is None else _met(info["bar"], (ours >= info["bar"]) == more_is_better)
-        row = [info["what"], f"{ours:.3g} {info['unit']}", met]
+        row = [info["what"], f"{short(ours)} {info['unit']}", met]
         peers = [p for p in benchmarks if p["extra_info"]["what"] == info["what"] and p is not one]
         for peer in peers:
             theirs = figure(peer)
             ratio = ours / theirs if more_is_better else theirs / ours
             if info["ratio"] is not None:
                 row[2] = "ratio " + _met(info["ratio"], ratio >= info["ratio"])
-            lines.append([*row, f"{peer['extra_info']['who']}: {theirs:.3g}", f"{ratio:.3g}"])
+            lines.append([*row, f"{peer['extra_info']['who']}: {short(theirs)}", short(ratio)])
             row = ["", "", ""]
         if not peers:
             lines.append([*row, "", ""])
     return lines
+
+
+def short(number: float) -> str:
+    """Three digits, without an exponent."""
+    return f"{float(f'{number:.3g}'):,g}" if number < 1e6 else f"{number:,.0f}"
 
 
 def _met(bar: float, met: bool) -> str:
