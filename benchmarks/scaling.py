@@ -1,6 +1,6 @@
 """How the time of kinematic and of physical FLSS grows with starts, velocities, threads and the observation time t.
 
-``python benchmarks/scaling.py [--out results/bench] [--share 1.0]`` prints a table and writes the figure
+``python -m benchmarks.scaling [--out results/bench] [--share 1.0]`` prints a table and writes the figure
 ``scaling.png`` and all measured points, ``scaling.json``; about a minute and a half on two cores.
 """
 
