@@ -1,6 +1,6 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       the tests
-# make bench      every speed beside its bar and its peers, about 12 minutes; ARGS="..." goes to pytest
+# make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types
 # PYTHON=...      the Python, 3.11 or newer, that .venv is made from
 

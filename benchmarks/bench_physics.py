@@ -9,12 +9,12 @@ import pytest
 from mujoco.batch import Batch
 
 from hexmj import LDVS, compare, draw_starts, insect
+from hexmj.clock import stopped_clock
 from hexmj.kinematics import tips_to_joints
 from hexmj.network import NetworkRun
 from hexmj.physical_walks import physical_outcomes
 from hexmj.settling import Settled, settle
 from hexmj.targets import TipTargets
-from hexmj.threads import thread_count
 
 FLYGYM = Path(__file__).parents[1] / ".venv-flygym" / "bin" / "python"
 VELOCITY, DURATION = 0.1, 20.0  # nobody falls, so both loops take the same steps
@@ -33,13 +33,13 @@ def controls(settled: Settled) -> np.ndarray:
     return np.ascontiguousarray(joints.reshape(*tips.shape[:2], -1).swapaxes(0, 1))
 
 
-@pytest.mark.parametrize("who", ["hexmj", "bare Batch.step"])
+@pytest.mark.parametrize("who", ["hexmj", "bare Batch.step", "the same, MuJoCo's clock stopped"])
 def test_steps(measure, settled, who):
     """The same model, controls and threads; ours plans, measures and watches for falls besides."""
     steps = controls(settled)
 
     def bare() -> None:
-        batch = Batch(settled.mujoco_model, len(settled.starts), thread_count())
+        batch = Batch(settled.mujoco_model, len(settled.starts), 2)
         batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
         batch.bind("qacc_warmstart")[:] = settled.warmstart
         ctrl = batch.bind("ctrl")
@@ -47,7 +47,14 @@ def test_steps(measure, settled, who):
             ctrl[:] = now
             batch.step()
 
-    work = {"hexmj": lambda: physical_outcomes(settled, LDVS, VELOCITY, DURATION), "bare Batch.step": bare}[who]
+    def without_clock() -> None:
+        with stopped_clock():
+            bare()
+
+    def ours() -> None:
+        physical_outcomes(settled, LDVS, VELOCITY, DURATION, threads=2)
+
+    work = {"hexmj": ours, "bare Batch.step": bare}.get(who, without_clock)
     amount = steps.shape[0] * steps.shape[1] / 1e3
     measure(work, "physical walks", who, amount=amount, unit="thousand physics steps/s", ratio=0.95, rounds=5)
 
@@ -55,7 +62,7 @@ def test_steps(measure, settled, who):
 @pytest.mark.parametrize(("window", "bar"), [("start", 50.0), ("walk", 240.0)])
 def test_curve(measure, window, bar):
     measure(
-        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], starts=1000, window=window),
+        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], starts=1000, window=window, threads=2),
         f"physical FLSS, 1000 starts, V = 0.1 to 0.9, window {window}",
         bar=bar,
         rounds=1,

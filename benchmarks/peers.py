@@ -22,9 +22,14 @@ CONTRA = MIRROR
 
 
 def numba_first_loss(
-    starts: np.ndarray, model: Model, velocity: float, duration: float, acceleration: Acceleration | None = None
+    starts: np.ndarray,
+    model: Model,
+    velocity: float,
+    duration: float,
+    acceleration: Acceleration | None = None,
+    threads: int = 2,
 ) -> np.ndarray:
-    """Start after start, leg after leg, on all cores: (start,) [time units], inf where there is no loss."""
+    """Start after start, leg after leg, on two threads: (start,) [time units], inf where there is no loss."""
     w = weights(model)
     tables = np.stack([w.p1, w.p2, w.p31, w.p32, w.p33, w.p34, w.p4])
     v_start, rate = (acceleration.start, acceleration.rate) if acceleration else (velocity, 0.0)
@@ -33,7 +38,7 @@ def numba_first_loss(
     def work(begin: int, end: int) -> None:
         _loop(starts[begin:end], tables, v_start, velocity, rate, int(duration / DT + 1e-6), lost[begin:end])
 
-    run_blocks(work, len(starts), 64)
+    run_blocks(work, len(starts), 64, threads)
     return lost
 
 

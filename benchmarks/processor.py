@@ -38,14 +38,14 @@ def clock(turns: int = 20_000_000) -> float:
 
 
 def operations() -> tuple[int, int]:
-    """Arithmetic operations that the compiled kernel does for each start and step, and how many at a time."""
+    """Arithmetic operations of the compiled kernel for each start and step (0 without AVX), and how many at a time."""
     block, p, k = np.zeros(lanes.ROWS * lanes.LANES), (0.0,) * 72, (1.0,) * 18
     step = lanes._step_printed
     step(block, p, k)
     code = step.inspect_asm(step.signatures[0])
     lines = [line for line in code.splitlines() if re.match(rf"\s+{ARITHMETIC}\s", line)]
     counts = Counter(register for line in lines for register in WIDTHS if register in line)
-    register, number = counts.most_common(1)[0]
+    register, number = max(counts.items(), key=lambda item: item[1], default=("xmm", 0))
     return number, WIDTHS[register]
 
 

@@ -41,7 +41,7 @@ def rows(benchmarks: list[dict[str, Any]]) -> list[list[str]]:
         for peer in peers:
             theirs = figure(peer)
             ratio = ours / theirs if more_is_better else theirs / ours
-            if info["ratio"] is not None:
+            if info["ratio"] is not None and peer is peers[0]:
                 row[2] = "ratio " + _met(info["ratio"], ratio >= info["ratio"])
             lines.append([*row, f"{peer['extra_info']['who']}: {short(theirs)}", short(ratio)])
             row = ["", "", ""]
@@ -61,8 +61,11 @@ def _met(bar: float, met: bool) -> str:
 
 def limit(benchmarks: list[dict[str, Any]]) -> str:
     """The processor's limit beside what the network reaches on one core, in a sentence."""
-    rate = next(figure(one) for one in benchmarks if one["extra_info"]["what"] == ONE_CORE)
-    (count, width), hertz = operations(), clock()
+    rates = [figure(one) for one in benchmarks if one["extra_info"]["what"] == ONE_CORE]
+    count, width = operations()
+    if not (rates and count):
+        return "The processor's limit needs the network's figure on one core, and a processor with AVX."
+    rate, hertz = rates[0], clock()
     reached = rate * 1e6 * count / width / hertz
     return (
         f"The compiled kernel does {count} arithmetic operations for each start and step, {width} at a time, at a"

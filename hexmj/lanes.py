@@ -6,8 +6,8 @@ fills the vector units; weights and constants come as tuples, whose numbers it k
 that has its answer gets the next start, so blocks stay full.  No multiplication is fused with an addition:
 ``tests/plain_network.py`` holds the same equations in their readable form, and both agree to the last bit.
 
-Measured on one core of an AMD EPYC (Zen 5): 8 to 32 lanes are slower, 128 no faster; with one pass for
-each leg, or with the starts one after the other, it is slower too (see `make bench`).
+Measured on one core of an AMD EPYC (Zen 5): 8 to 32 lanes are slower, 128 no faster; the starts one after the
+other are five times slower (`make bench`).
 """
 
 from typing import Any
@@ -272,10 +272,10 @@ def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None
 
 
 @njit(cache=True, nogil=True)
-def record(blocks: Any, order: int, p: Any, k: Any, velocity: Any, x: Any, stance: Any) -> None:
-    """Step every block on; write V_r of each step, (step, start), tips and states after it, (step, start, leg)."""
+def record(blocks: Any, begin: int, end: int, order: int, p: Any, k: Any, velocity: Any, x: Any, stance: Any) -> None:
+    """Step blocks `begin` to `end` on; write V_r of each step, tips and states after it, (step, start, leg)."""
     steps, starts = velocity.shape
-    for b in range(len(blocks)):
+    for b in range(begin, end):
         z = blocks[b]
         first = b * LANES
         lanes = min(LANES, starts - first)

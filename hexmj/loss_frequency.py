@@ -27,8 +27,8 @@ SLAB = 64 * SAMPLE
 WILSON_Z = 1.959963984540054
 """Standard normal quantile of 97.5 %."""
 
-MOST_STARTS = 10**12
-"""Most starts of one FLSS; on two cores they would take weeks."""
+MOST_STARTS = 10**10
+"""Most starts of one FLSS; on two cores they take hours to days."""
 
 MOST_DRAWN = 10**8
 """Most starts in one array; their tips take 5 GB."""
@@ -40,20 +40,24 @@ def draw_starts(size: int, seed: int, network: Network | None = None) -> np.ndar
     Returns:
         (start, leg) [mm].  The first k of n starts are the same for every n.
     """
-    if isinstance(size, int) and size > MOST_DRAWN:
+    _check_draw(size, seed)
+    if size > MOST_DRAWN:
         raise InputError(f"starts = {size}; expected at most {MOST_DRAWN} in one array")
     return np.concatenate(list(_slabs(size, seed, network or Network())))
 
 
 def _slabs(size: int, seed: int, network: Network) -> Iterator[np.ndarray]:
     """The starts of `draw_starts`, (start, leg) [mm], a slab at a time."""
+    rng = np.random.default_rng(seed)
+    for first in range(0, size, SLAB):
+        yield rng.uniform(network.pep0, network.aep0, (min(SLAB, size - first), 6))
+
+
+def _check_draw(size: int, seed: int) -> None:
     if not (isinstance(size, int) and 1 <= size <= MOST_STARTS):
         raise InputError(f"starts = {size}; expected a whole number of at least 1 and at most {MOST_STARTS}")
     if not (isinstance(seed, int) and seed >= 0):
         raise InputError(f"seed = {seed}; expected an integer of at least 0")
-    rng = np.random.default_rng(seed)
-    for first in range(0, size, SLAB):
-        yield rng.uniform(network.pep0, network.aep0, (min(SLAB, size - first), 6))
 
 
 def observation_time(
@@ -100,8 +104,8 @@ def flss(
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
-    Starts are drawn, walked and counted slab by slab, so any number of them takes the same memory; the time
-    of every loss is had from `network.first_loss` of `draw_starts`.
+    Starts are drawn, walked and counted slab by slab; of 1000 starts 8 bytes a velocity are kept.  The time of
+    every loss is had from `network.first_loss` of `draw_starts`.
 
     Args:
         model: coupling weights.
@@ -120,6 +124,7 @@ def flss(
     """
     network = network or Network()
     v = checked_list(velocities)
+    _check_draw(starts, seed)
     duration = observation_time(window, v, network, acceleration)
     counts = []
     for x in _slabs(starts, seed, network):
@@ -167,6 +172,7 @@ def flss_over_range(
     network = network or Network()
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
+    _check_draw(starts, seed)
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in _slabs(starts, seed, network):
         v = rng.uniform(low, high, len(x))

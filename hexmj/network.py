@@ -17,7 +17,7 @@ from hexmj.threads import run_blocks, thread_count
 from hexmj.walks import Walk
 
 MOST_STEPS = 10**9
-"""Longest walk [steps]; far beyond any use, and within the kernel's integers."""
+"""Longest walk [steps]; far beyond any use."""
 ORDERS = get_args(Order)
 """Names of the orders of updates, in the kernel's numbers."""
 
@@ -51,9 +51,7 @@ class NetworkRun:
         velocity, x, stance = np.empty(shape), np.empty((*shape, 6)), np.empty((*shape, 6), dtype=bool)
 
         def work(begin: int, end: int) -> None:
-            starts = slice(begin * lanes.LANES, end * lanes.LANES)
-            out = velocity[:, starts], x[:, starts], stance[:, starts]
-            lanes.record(self._blocks[begin:end], *self._settings, *out)
+            lanes.record(self._blocks, begin, end, *self._settings, velocity, x, stance)
 
         run_blocks(work, len(self._blocks), 1, self._threads)
         self.done += steps
@@ -108,7 +106,10 @@ def first_loss(
     network = network or Network()
     starts = checked_starts(starts, network)
     velocity = checked_velocities(velocity, len(starts), acceleration)
-    steps = np.broadcast_to(steps_within(duration, network), len(starts))
+    steps = steps_within(duration, network)
+    if steps.shape not in ((), (len(starts),)):
+        raise InputError(f"durations have the shape {steps.shape}; expected one number or ({len(starts)},)")
+    steps = np.broadcast_to(steps, len(starts)).copy()
     settings = _settings(model, network, acceleration)
     first_velocity = _first_velocity(velocity, acceleration)
     lost = np.empty(len(starts))

@@ -74,7 +74,7 @@ def test_solver_settings_of_a_few_starts(tmp_path, capsys):
     solver_settings.main(str(tmp_path), "4")
     results = json.loads((tmp_path / "solver_settings.json").read_text(encoding="utf-8"))
     assert results["pairs searched for"]["flss"] == results["as shipped"]["flss"]
-    assert results["pairs searched for"]["slip"] == pytest.approx(results["as shipped"]["slip"], rel=1e-6)
+    assert results["pairs searched for"]["slip"] == results["as shipped"]["slip"]
     assert results["solver CG"]["slip"] == pytest.approx(results["as shipped"]["slip"], rel=0.05)
     assert "time step / 4" in capsys.readouterr().out
 

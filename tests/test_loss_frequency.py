@@ -63,7 +63,7 @@ def test_windows():
 
 
 def test_threads_do_not_matter():
-    one, two = (flss(LDVS, [0.3, 0.7], starts=500, threads=n) for n in (1, 2))
+    one, two = (flss(LDVS, [0.3, 0.7], starts=3000, threads=n) for n in (1, 2))
     assert one.equals(two)
 
 
@@ -106,6 +106,7 @@ def test_generalised_flss_averages_over_velocities():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        ({"seed": -1}, "seed = -1"),
         ({"velocities": []}, "at least one"),
         ({"velocities": [0.1, 0.1]}, "twice"),
         ({"velocities": [1.0]}, "0 <= V < 1"),
@@ -121,3 +122,9 @@ def test_nonsense_gets_a_clear_sentence(change, words):
     arguments = {"velocities": [0.5], "starts": 10} | change
     with pytest.raises(InputError, match=words):
         flss(LDVS, **arguments)
+
+
+@pytest.mark.parametrize(("change", "words"), [({"seed": -1}, "seed = -1"), ({"starts": 0}, "at least 1")])
+def test_nonsense_for_a_range_gets_a_clear_sentence(change, words):
+    with pytest.raises(InputError, match=words):
+        flss_over_range(LDVS, 0.1, 0.5, **change)

@@ -165,10 +165,12 @@ def test_tips_stay_within_the_step_range():
         ({"starts": np.zeros((0, 6))}, "at least one start"),
         ({"starts": np.zeros((3, 5))}, "6 legs"),
         ({"starts": np.full((1, 6), np.nan)}, "step range"),
+        ({"duration": [10.0, 20.0]}, "durations have the shape"),
         ({"velocity": 0.05, "acceleration": Acceleration()}, "at least V_r"),
     ],
 )
 def test_nonsense_gets_a_clear_sentence(change, words):
     arguments = {"starts": np.zeros((1, 6)), "model": LDVS, "velocity": 0.3, "duration": 10.0} | change
+    measure = first_loss if np.ndim(arguments["duration"]) else walk
     with pytest.raises(InputError, match=words):
-        walk(**arguments)
+        measure(**arguments)
