@@ -1,0 +1,296 @@
+"""Gaits (paper, Section 5.3): limit regimes, their period, duty factors and relative phases; reference gaits.
+
+A leg's movement is timed by its onsets, the instants at which it is raised and protraction begins.  The relative
+phase Phi_{j-k} is the time lag of leg k behind leg j, from onset to onset, divided by the period.  The paper prints
+no event and no threshold: the onset, `TOLERANCE` and `CYCLES` are conventions of ours.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.errors import InputError
+from hexmj.legs import MIRROR, N2
+from hexmj.loss_frequency import draw_starts
+from hexmj.network import NetworkRun, steps_within
+from hexmj.parameters import Acceleration, Model, Network
+from hexmj.stability import walk_margin
+from hexmj.walks import Walk
+
+PAIRS: dict[str, tuple[int, int]] = {
+    f"{j + 1}-{k + 1}": (j, k)
+    for j, k in [(front, rear) for front, behind in enumerate(N2) for rear in behind] + list(enumerate(MIRROR[:3]))
+}
+"""The paper's name j-k of each pair of neighbours -> their indices: four ipsilateral pairs, three contralateral.
+
+The paper's contralateral pairs (1-3), (2-4), (5-6) are taken for a misprint of 1-4, 2-5, 3-6.
+"""
+
+IPSILATERAL, CONTRALATERAL = slice(0, 4), slice(4, 7)
+"""Where the two kinds lie on a ``pair`` axis."""
+
+TOLERANCE = 0.002
+"""A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
+
+STEPS = 5
+"""... and this many time steps more, since states change only at whole steps and the network hands that jitter on."""
+
+CYCLES = 10
+"""Fewest whole cycles of every leg that show a limit regime; some settle so slowly that three look alike too soon."""
+
+TRIPOD_PHASE = 0.5
+"""Tripod gait: all neighbouring legs move in anti-phase."""
+
+NEAR = 0.05
+"""Phases that differ by no more than this count as equal where a gait is named."""
+
+FINE = Network(dt=0.01)
+"""The network with the time step of Figs. 5 and 6."""
+
+PART = 4096
+"""Steps of a walk held in memory at a time."""
+
+GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "other"]
+
+
+@dataclass(frozen=True, eq=False)
+class Gait:
+    """The limit regime of each start; NaN where no periodic one was reached."""
+
+    period: np.ndarray
+    """(start,) mean over the legs [time units]."""
+    periods: np.ndarray
+    """(start, leg) each leg's own [time units]."""
+    duty_factor: np.ndarray
+    """(start, leg) part of its period for which a leg stands."""
+    phase: np.ndarray
+    """(start, pair) Phi_{j-k} in [0, 1), in the order of `PAIRS`."""
+    reached: np.ndarray
+    """(start,) onset of leg 1 from which on the regime lasts [time units]; inf where it does not within the walk."""
+    periodic: np.ndarray
+    """(start,) True if from some onset on all legs keep one period and their lags, over `CYCLES` cycles or more."""
+    stable: np.ndarray
+    """(start,) True if a periodic regime is statically stable throughout the last period of the walk."""
+
+
+def gait(walk: Walk) -> Gait:
+    """The gait of every start of a walk that ends with a constant velocity.
+
+    Raises:
+        InputError: a walk of fewer than two steps.
+    """
+    if len(walk.time) < 2:
+        raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
+    regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
+    return _with_stability(regimes, _upright(walk, int(_steps(regimes["period"], walk.time).max())), walk.time)
+
+
+def limit_gait(
+    model: Model,
+    velocity: float,
+    *,
+    starts: int = 100,
+    seed: int = 0,
+    network: Network = FINE,
+    acceleration: Acceleration | None = None,
+    periods: int = 80,
+    threads: int | None = None,
+) -> Gait:
+    """The gaits that a model reaches from random starts, as in Figs. 5 and 6.
+
+    Of the walks only the changes of state and the stability of the last periods are kept.
+
+    Args:
+        model: coupling weights.
+        velocity: V_r, or its final value when accelerating, 0 < V < 1.
+        starts: N.
+        seed: of the starts.
+        network: the constants that the paper leaves out.
+        acceleration: the accelerating procedure of Eq. 11.
+        periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
+        threads: one per core unless given; the result does not depend on it.
+    """
+    if not 0 < velocity < 1:
+        raise InputError(f"velocity = {velocity}; expected 0 < V < 1, since V = 0 has no period")
+    if not periods >= CYCLES + 2:
+        raise InputError(f"periods = {periods}; expected at least {CYCLES + 2}, the last of them incomplete")
+    run = NetworkRun(
+        draw_starts(starts, seed, network),
+        model,
+        velocity,
+        network=network,
+        acceleration=acceleration,
+        threads=threads,
+    )
+    longest = (network.aep0 - network.pep_min) * (1.0 + 1.0 / velocity)  # from AEP_0 to PEP_min and back
+    speeding = (velocity - acceleration.start) / acceleration.rate if acceleration else 0.0
+    steps = int(steps_within(speeding + periods * longest, network))
+    tail = steps - int(steps_within(2.0 * longest, network))
+    stance = np.ones((1, starts, 6), dtype=bool)
+    changes, upright = [], []
+    while run.done < steps:
+        done = run.done
+        part = run.advance(min(PART, (tail if done < tail else steps) - done))
+        row, foot, down = _changes(np.concatenate([stance, part.stance]))
+        changes.append((row + done, foot, down))
+        stance = part.stance[-1:]
+        if done >= tail:
+            upright.append(_upright(part, len(part.time)))
+    time = np.arange(steps + 1) * network.dt
+    row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
+    return _with_stability(_regimes(row, foot, down, time, starts), np.concatenate(upright), time)
+
+
+def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
+    """Mean direction of phases on the circle [0, 1)."""
+    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
+    return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
+
+
+def circular_sd(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
+    """Circular standard deviation sqrt(-2 ln R) of phases on [0, 1), R the mean resultant length, as parts of 1."""
+    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    resultant = np.hypot(np.sin(angle).mean(axis), np.cos(angle).mean(axis))
+    with np.errstate(divide="ignore"):  # opposite phases: R = 0, no deviation is large enough
+        return np.sqrt(-2.0 * np.log(np.minimum(resultant, 1.0))) / (2.0 * np.pi)
+
+
+def wilson_phase(v: ArrayLike) -> np.ndarray:
+    """Ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
+
+    The paper says: a front leg begins protraction when the leg behind it ends its own (zero delay), and the duration
+    of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
+    V / (1 + V) of the period, and by that part the front leg lags behind.
+    """
+    return 1.0 / (1.0 + np.asarray(v, dtype=float))
+
+
+def graham_phase(v: ArrayLike) -> np.ndarray:
+    """Ipsilateral phase of Graham's Gait I: 0.5, the tripod 'for the whole range of velocities', as the paper says.
+
+    Its protraction takes longer in a longer period; the paper gives no numbers for that.
+    """
+    return np.full(np.shape(v), TRIPOD_PHASE)
+
+
+def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName:
+    """Name a gait by its phases, as Section 5.3 does.
+
+    Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'.  'tripod': so do those
+    along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
+    'negative metachrony': both between 0 and 0.5, front, middle, hind.
+    """
+    along = phase_12, phase_23
+    if not abs(contralateral - 0.5) <= NEAR:
+        return "other"
+    if all(abs(phase - TRIPOD_PHASE) <= NEAR for phase in along):
+        return "tripod"
+    if all(0.5 < phase < 1.0 for phase in along):
+        return "positive metachrony"
+    if all(0.0 < phase < 0.5 for phase in along):
+        return "negative metachrony"
+    return "other"
+
+
+def _upright(walk: Walk, steps: int) -> np.ndarray:
+    """Whether each start is statically stable in each of the last steps, (step, start)."""
+    size = len(walk.time)
+    parts = [slice(first, min(first + PART, size)) for first in range(size - steps, size, PART)]
+    return np.concatenate(
+        [
+            walk_margin(Walk(walk.time[s], walk.velocity[s], walk.x[s], walk.y[s], walk.stance[s], walk.geometry)) > 0
+            for s in parts
+        ]
+    )
+
+
+def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The changes of state in (step, start, leg): rows that differ from the row before, foot, new state.
+
+    Feet are numbered through all starts, foot = 6 start + leg.
+    """
+    state = stance.reshape(len(stance), -1)
+    row, foot = np.divmod(np.flatnonzero(state[1:] != state[:-1]), state.shape[1])
+    return row + 1, foot, state[row + 1, foot]
+
+
+def _regimes(
+    row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, starts: int
+) -> dict[str, np.ndarray]:
+    """The fields of `Gait` but `stable`."""
+    raised = _by_foot(row[~down], foot[~down], 6 * starts)
+    lowered = _by_foot(row[down], foot[down], 6 * starts)
+    periods, duty_factor = np.full((starts, 6), np.nan), np.full((starts, 6), np.nan)
+    phase, reached = np.full((starts, len(PAIRS)), np.nan), np.full(starts, np.inf)
+    j, k = np.transpose(list(PAIRS.values()))
+    for n in range(starts):
+        legs = slice(6 * n, 6 * n + 6)
+        begin, touch, end = time[_cycles(raised[legs], lowered[legs])]
+        settled = _settled(begin, end, _resolution(time))
+        if len(begin) - settled < CYCLES:
+            continue
+        begin, touch, end = begin[settled:], touch[settled:], end[settled:]
+        periods[n] = (end - begin).mean(axis=0)
+        duty_factor[n] = 1.0 - (touch - begin).mean(axis=0) / periods[n]
+        phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
+        reached[n] = begin[0, 0]
+    return {
+        "period": periods.mean(axis=1),
+        "periods": periods,
+        "duty_factor": duty_factor,
+        "phase": phase,
+        "reached": reached,
+        "periodic": np.isfinite(reached),
+    }
+
+
+def _by_foot(row: np.ndarray, foot: np.ndarray, feet: int) -> list[np.ndarray]:
+    """The rows of each foot, in order."""
+    order = np.argsort(foot, kind="stable")
+    return np.split(row[order], np.searchsorted(foot[order], np.arange(1, feet)))
+
+
+def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
+    """Rows of onset, touchdown and next onset of every leg, (3, cycle, leg).
+
+    Cycle n of a leg is the first one that begins when the n-th of leg 1 does, or later.
+    """
+    following = [np.searchsorted(r, raised[0]) for r in raised]
+    whole = min(np.count_nonzero(i + 1 < len(r)) for i, r in zip(following, raised, strict=True))
+    begin = [r[i[:whole]] for i, r in zip(following, raised, strict=True)]
+    touch = [r[np.searchsorted(r, b)] for b, r in zip(begin, lowered, strict=True)]
+    end = [r[i[:whole] + 1] for i, r in zip(following, raised, strict=True)]
+    return np.stack([np.stack(rows, axis=-1) for rows in (begin, touch, end)])
+
+
+def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
+    """The first of the cycles, (cycle, leg) [time units], from which on all are like the last one."""
+    if len(begin) == 0:
+        return 0
+    length, lag = end - begin, begin - begin[:, :1]
+    period = length[-1, 0]
+    drift = (lag - lag[-1]) / period
+    change = np.maximum(np.abs(length / period - 1.0), np.abs(drift - np.round(drift))).max(axis=1)
+    unlike = np.flatnonzero(change > TOLERANCE + STEPS * resolution / period)
+    return int(unlike[-1]) + 1 if len(unlike) else 0
+
+
+def _steps(period: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Steps of each period, rounded up and within the walk; one where there is none."""
+    steps = np.ceil(np.nan_to_num(period) / _resolution(time)).astype(int)
+    return np.clip(steps, 1, len(time))
+
+
+def _resolution(time: np.ndarray) -> float:
+    """The time step of a walk [time units]."""
+    return float((time[-1] - time[0]) / (len(time) - 1))
+
+
+def _with_stability(regimes: dict[str, np.ndarray], upright: np.ndarray, time: np.ndarray) -> Gait:
+    """Add to the regimes whether each is upright, (step, start), in its last period."""
+    ends = enumerate(_steps(regimes["period"], time))
+    stable = np.array([bool(upright[-steps:, start].all()) for start, steps in ends])
+    return Gait(**regimes, stable=regimes["periodic"] & stable)

@@ -1,0 +1,302 @@
+"""Laws of the gaits: walks whose phases are known, mirror and time symmetry, and the phases that the paper prints."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+from scipy.stats import circmean, circstd
+
+import hexmj.gaits
+from hexmj.errors import InputError
+from hexmj.gaits import (
+    CONTRALATERAL,
+    CYCLES,
+    IPSILATERAL,
+    PAIRS,
+    Gait,
+    circular_mean,
+    circular_sd,
+    classify,
+    gait,
+    graham_phase,
+    limit_gait,
+    wilson_phase,
+)
+from hexmj.legs import FIG1, MIRROR
+from hexmj.loss_frequency import draw_starts
+from hexmj.network import walk
+from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
+from hexmj.walks import Walk
+
+TRIPOD = np.array([0.0, 0.5, 0.0, 0.5, 0.0, 0.5])
+
+
+def ideal_walk(
+    onset: ArrayLike, *, period: ArrayLike = 50.0, duty: ArrayLike = 0.6, cycles: float = CYCLES + 4, dt: float = 0.05
+) -> Walk:
+    """Legs that step like clockwork.
+
+    `onset` is the part of the period at which a leg is raised, (start, leg); `period` [time units] and `duty`
+    may differ between starts and legs.
+    """
+    time = dt * np.arange(1, int(cycles * np.max(period) / dt) + 1)
+    age = (time[:, None, None] / np.asarray(period, dtype=float) - np.atleast_2d(np.asarray(onset, dtype=float))) % 1.0
+    swing = 1.0 - np.asarray(duty)
+    stance = age >= swing
+    x = np.where(stance, 10.0 - 20.0 * (age - swing) / (1.0 - swing), -10.0 + 20.0 * age / swing)
+    return Walk(time, np.full(x.shape[:2], 0.5), x, np.broadcast_to(FIG1.y, x.shape), stance)
+
+
+def part(walked: Walk, steps: slice, delay: float = 0.0) -> Walk:
+    """Some of the steps, `delay` time units later."""
+    time = walked.time[steps] + delay
+    return Walk(time, walked.velocity[steps], walked.x[steps], walked.y[steps], walked.stance[steps], walked.geometry)
+
+
+def circle(a, b) -> np.ndarray:
+    """The distance of phases on the circle."""
+    d = np.asarray(a) - b
+    return np.abs(d - np.round(d))
+
+
+def lags(onset: np.ndarray) -> np.ndarray:
+    """Phi_{j-k} of onsets, (start, pair)."""
+    return np.stack([onset[:, k] - onset[:, j] for j, k in PAIRS.values()], axis=-1) % 1.0
+
+
+def assert_same_gait(a: Gait, b: Gait, *, later: float = 0.0) -> None:
+    for name, value in vars(a).items():
+        shift = later if name == "reached" else 0.0
+        assert getattr(b, name) == pytest.approx(value + shift, nan_ok=True), name
+
+
+def test_pairs_are_the_papers_neighbours():
+    assert list(PAIRS) == ["1-2", "2-3", "4-5", "5-6", "1-4", "2-5", "3-6"]
+    assert all(f"{j + 1}-{k + 1}" == name for name, (j, k) in PAIRS.items())
+    assert list(PAIRS)[IPSILATERAL] + list(PAIRS)[CONTRALATERAL] == list(PAIRS)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.floats(30.0, 80.0))
+def test_phases_periods_and_duty_factors_of_a_clockwork(seed, period):
+    rng = np.random.default_rng(seed)
+    onset, duty = rng.random((3, 6)), rng.uniform(0.4, 0.95, (3, 6))
+    found = gait(ideal_walk(onset, period=period, duty=duty))
+    step = 0.05 / period
+    assert found.periodic.all()
+    assert circle(found.phase, lags(onset)).max() <= 2 * step
+    assert ((found.phase >= 0) & (found.phase < 1)).all()
+    assert found.periods == pytest.approx(np.full((3, 6), period), rel=2 * step / CYCLES)
+    assert found.period == pytest.approx(found.periods.mean(axis=1))
+    assert found.duty_factor == pytest.approx(duty, abs=2 * step)
+    assert (found.reached <= period * (onset[:, 0] % 1.0) + 0.1).all()
+
+
+def test_the_lag_is_that_of_the_second_leg_behind_the_first():
+    """Leg 2 is raised a tenth of the period before leg 1, so nine tenths after it."""
+    found = gait(ideal_walk([0.1, 0.0, 0.9, 0.6, 0.5, 0.4]))
+    assert found.phase[0] == pytest.approx([0.9, 0.9, 0.9, 0.9, 0.5, 0.5, 0.5], abs=0.002)
+    assert classify(*found.phase[0, [0, 1, 4]]) == "positive metachrony"
+
+
+def test_a_later_beginning_changes_nothing():
+    onset = np.random.default_rng(0).random((20, 6))
+    walked = ideal_walk(onset, cycles=CYCLES + 6)
+    whole = gait(walked)
+    assert_same_gait(whole, gait(part(walked, slice(None), 1000.0)), later=1000.0)
+    late = gait(part(walked, slice(1000 + 370, None)))  # a period and some more
+    assert late.periodic.all()
+    assert late.period == pytest.approx(whole.period, abs=0.01)
+    assert circle(late.phase, whole.phase).max() < 0.001
+    assert late.duty_factor == pytest.approx(whole.duty_factor, abs=0.001)
+
+
+def mirrored(phase: np.ndarray) -> np.ndarray:
+    return np.concatenate([phase[:, [2, 3, 0, 1]], -phase[:, CONTRALATERAL]], axis=1) % 1.0
+
+
+@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
+def test_mirrored_starts_have_mirrored_phases(model):
+    starts = draw_starts(20, seed=1)
+    one, other = (gait(walk(x, model, 0.5, 4000.0)) for x in (starts, starts[:, MIRROR]))
+    both = one.periodic & other.periodic
+    assert both.mean() > 0.8
+    assert circle(other.phase, mirrored(one.phase))[both].max() < 0.005
+    assert other.duty_factor[both] == pytest.approx(one.duty_factor[both][:, MIRROR], abs=0.005)
+    assert np.array_equal(other.stable[both], one.stable[both])
+
+
+@pytest.mark.parametrize(
+    "walked",
+    [
+        ideal_walk(TRIPOD, period=np.array([50.0, 50.0, 50.0, 50.0, 50.0, 31.0])),
+        ideal_walk(TRIPOD, period=np.array([50.0, 50.0, 50.0, 50.0, 50.0, 50.1])),  # the lag creeps
+        ideal_walk(TRIPOD, period=np.array([50.0, 50.0, 50.0, 50.0, 50.0, 100.0])),
+        ideal_walk(TRIPOD + 0.0004, duty=np.array([0.6, 0.6, 0.6, 0.6, 0.6, 1.0 - 1e-9])),
+        ideal_walk(TRIPOD, cycles=CYCLES - 1),
+        walk(np.zeros((1, 6)), HWS, 0.0, 100.0),
+    ],
+    ids=["two periods", "nearly one", "every other step", "a leg that stands", "too short", "V = 0"],
+)
+def test_what_is_not_periodic_is_reported(walked):
+    found = gait(walked)
+    assert not found.periodic[0]
+    assert not found.stable[0]
+    assert found.reached[0] == np.inf
+    assert all(np.isnan(v[0]).all() for v in (found.period, found.periods, found.duty_factor, found.phase))
+
+
+def test_the_regime_begins_where_the_legs_fall_into_step():
+    """Leg 1 is raised at every multiple of the period; the others change their phases after the fifth."""
+    onset = np.array([[0.0, 0.3, 0.6, 0.9, 0.2, 0.4]])
+    before, after = ideal_walk(onset, cycles=4.95), ideal_walk(TRIPOD, cycles=CYCLES + 4)
+    stance = np.concatenate([before.stance, after.stance[-1000:][before.stance.shape[0] % 1000 :], after.stance])
+    n = len(stance)
+    whole = Walk(0.05 * np.arange(1, n + 1), np.zeros((n, 1)), np.zeros((n, 1, 6)), np.zeros((n, 1, 6)), stance)
+    found = gait(whole)
+    assert found.periodic[0]
+    assert found.reached[0] == pytest.approx(250.0, abs=0.1)
+    assert circle(found.phase, lags(TRIPOD[None])).max() < 0.001
+
+
+def test_starts_do_not_mix():
+    """A tripod between a start that is not periodic and one that never steps."""
+    tripod = ideal_walk(TRIPOD)
+    crowd = ideal_walk(np.stack([TRIPOD] * 3), period=np.array([[50.0, 50, 50, 50, 50, 31], [50.0] * 6, [50.0] * 6]))
+    crowd.stance[:, 2] = True
+    found = gait(crowd)
+    assert found.periodic.tolist() == [False, True, False]
+    assert found.phase[1] == pytest.approx(gait(tripod).phase[0])
+
+
+@pytest.mark.parametrize("v", [0.05, 0.1, 0.3, 0.6, 0.9])
+def test_wilsons_walk(v):
+    """Each front leg is raised when the leg behind it comes down, and sides alternate: Phi = 1 / (1 + V), stable."""
+    swing = v / (1.0 + v)
+    left = np.array([2.0, 1.0, 0.0]) * swing
+    found = gait(ideal_walk(np.concatenate([left, left + 0.5]), duty=1.0 - swing, dt=0.01))
+    assert found.phase[0, IPSILATERAL] == pytest.approx(np.full(4, wilson_phase(v)), abs=0.001)
+    assert found.phase[0, CONTRALATERAL] == pytest.approx(np.full(3, 0.5), abs=0.001)
+    assert found.duty_factor[0] == pytest.approx(np.full(6, wilson_phase(v)), abs=0.001)
+    assert found.stable[0]
+
+
+def test_reference_gaits():
+    v = np.linspace(0.05, 0.95, 19)
+    assert wilson_phase(0.1) == pytest.approx(0.91, abs=0.002)  # Section 5.3, LDVS at V = 0.1
+    assert wilson_phase(1.0) == 0.5  # 'becomes the tripod gait'
+    assert (np.diff(wilson_phase(v)) < 0).all()
+    assert np.array_equal(graham_phase(v), np.full(19, 0.5))
+
+
+def test_stability_of_the_limit_regime():
+    """A tripod stands at any moment; with one side in the air at a time nothing does."""
+    pace = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.5])
+    assert gait(ideal_walk(np.stack([TRIPOD, pace]))).stable.tolist() == [True, False]
+
+
+def test_early_falls_do_not_count_against_the_limit_regime():
+    walked = ideal_walk(TRIPOD)
+    x = walked.x.copy()
+    x[:500] -= 100.0
+    assert gait(Walk(walked.time, walked.velocity, x, walked.y, walked.stance)).stable[0]
+    x[-500:] -= 100.0
+    assert not gait(Walk(walked.time, walked.velocity, x, walked.y, walked.stance)).stable[0]
+
+
+def test_uncoordinated_legs_keep_the_phases_of_their_start():
+    """Alone, a leg at x is raised after (x - PEP_0) / V, and its period is (AEP_0 - PEP_0)(1 + 1 / V)."""
+    v, starts = 0.4, draw_starts(30, seed=2)
+    found = gait(walk(starts, UNCOORDINATED, v, 1200.0, network=Network(dt=0.01)))
+    period = 20.0 * (1.0 + 1.0 / v)
+    assert found.periodic.all()
+    assert found.period == pytest.approx(np.full(30, period), abs=0.05)
+    assert circle(found.phase, lags(starts / v / period)).max() < 0.001
+    assert found.duty_factor == pytest.approx(np.full((30, 6), 1.0 / (1.0 + v)), abs=0.001)
+
+
+@pytest.mark.parametrize("acceleration", [None, Acceleration(rate=0.001)])
+def test_limit_gait_is_the_gait_of_the_whole_walk(acceleration, monkeypatch):
+    monkeypatch.setattr(hexmj.gaits, "PART", 700)
+    network, periods, v = Network(), CYCLES + 15, 0.4
+    found = limit_gait(HWS, v, starts=12, seed=3, network=network, acceleration=acceleration, periods=periods)
+    time = periods * 30.0 * (1.0 + 1.0 / v) + (300.0 if acceleration else 0.0)
+    starts = draw_starts(12, 3)
+    assert_same_gait(found, gait(walk(starts, HWS, v, time, network=network, acceleration=acceleration)))
+    assert found.periodic.any()
+    assert np.array_equal(found.stable, found.periodic)
+
+
+@pytest.mark.parametrize(("v", "phase", "printed"), [(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)])
+def test_hard_wired_phases(v, phase, printed):
+    """An independent simulation gave 0.655 and 0.714 with the default constants; the paper prints 0.65 and 0.7."""
+    found = limit_gait(HWS, v, starts=10, acceleration=Acceleration(rate=0.0004), periods=45)
+    assert found.periodic.all()
+    assert found.stable.all()
+    mean = circular_mean(found.phase, axis=0)
+    assert mean[IPSILATERAL] == pytest.approx(np.full(4, phase), abs=0.001)
+    assert mean[IPSILATERAL] == pytest.approx(np.full(4, printed), abs=0.015)
+    assert mean[CONTRALATERAL] == pytest.approx(np.full(3, 0.5), abs=0.001)
+    assert np.ptp(found.periods, axis=1).max() < 0.1
+    assert circular_sd(found.phase, axis=0).max() < 0.005
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(0.001, 0.3))
+def test_circular_statistics_equal_scipys(seed, centre, width):
+    phase = (np.random.default_rng(seed).normal(centre, width, (50, 3))) % 1.0
+    assert circle(circular_mean(phase, 0), circmean(phase, high=1.0, axis=0)).max() < 1e-12
+    assert circular_sd(phase, 0) == pytest.approx(circstd(phase, high=1.0, axis=0))
+    assert circle(circular_mean(phase), circmean(phase, high=1.0)) < 1e-12
+    assert ((circular_mean(phase, 0) >= 0) & (circular_mean(phase, 0) < 1)).all()
+
+
+def test_circular_statistics_across_zero():
+    assert circle(circular_mean([0.95, 0.05]), 0.0) < 1e-12
+    assert circular_mean([0.95, 0.05]) < 1.0
+    assert circular_sd([0.25, 0.25, 0.25]) == pytest.approx(0.0, abs=1e-7)
+    assert circular_sd([0.95, 0.05]) == pytest.approx(circular_sd([0.45, 0.55]))
+
+
+@pytest.mark.parametrize(
+    ("phases", "name"),
+    [
+        ((0.5, 0.5, 0.5), "tripod"),
+        ((0.46, 0.53, 0.52), "tripod"),
+        ((0.66, 0.66, 0.5), "positive metachrony"),
+        ((0.91, 0.91, 0.5), "positive metachrony"),
+        ((0.52, 0.6, 0.5), "positive metachrony"),
+        ((0.34, 0.34, 0.5), "negative metachrony"),
+        ((0.66, 0.34, 0.5), "other"),
+        ((0.0, 0.0, 0.5), "other"),
+        ((0.66, 0.66, 0.4), "other"),
+        ((np.nan, np.nan, np.nan), "other"),
+    ],
+)
+def test_names(phases, name):
+    assert classify(*phases) == name
+
+
+def test_mirrored_in_time_the_wave_runs_the_other_way():
+    names = {"positive metachrony": "negative metachrony", "negative metachrony": "positive metachrony"}
+    for a, b in np.random.default_rng(4).random((200, 2)):
+        name = classify(a, b, 0.5)
+        assert classify(1.0 - a, 1.0 - b, 0.5) == names.get(name, name)
+
+
+def test_what_makes_no_sense():
+    with pytest.raises(InputError, match="V = 0 has no period"):
+        limit_gait(HWS, 0.0)
+    with pytest.raises(InputError, match="periods = 3"):
+        limit_gait(HWS, 0.4, periods=3)
+    with pytest.raises(InputError, match="a walk of 1 steps"):
+        gait(walk(np.zeros((1, 6)), HWS, 0.4, 0.1))
+
+
+def test_never_imports_mujoco():
+    code = "import sys, hexmj.gaits; sys.exit('mujoco' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
