@@ -33,10 +33,12 @@ if TYPE_CHECKING:
     from hexmj.parameters import load_model as load_model
     from hexmj.physical_walks import PhysicalWalk as PhysicalWalk
     from hexmj.physical_walks import physical_walk as physical_walk
+    from hexmj.problems import Problem as Problem
     from hexmj.recording import load_recording as load_recording
     from hexmj.recording import record as record
     from hexmj.recording import record_plan as record_plan
     from hexmj.recording import save_recording as save_recording
+    from hexmj.search import Plan as Plan
     from hexmj.stability import loss_time as loss_time
     from hexmj.stability import stability_margin as stability_margin
     from hexmj.stability import support_polygon as support_polygon
@@ -63,7 +65,9 @@ _MODULES = {
         "load_model",
     ),
     "physical_walks": ("PhysicalWalk", "physical_walk"),
+    "problems": ("Problem",),
     "recording": ("load_recording", "record", "record_plan", "save_recording"),
+    "search": ("Plan",),
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),
     "video": ("Film", "render"),
     "walks": ("Walk",),

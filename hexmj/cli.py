@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, subcommand
@@ -129,11 +129,53 @@ class Render:
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
 
+@dataclass(frozen=True)
+class Search:
+    """Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with many.
+
+    Repeat the command to go on with a search that was stopped.
+    """
+
+    form: Literal["hws", "ldvs"] = "ldvs"
+    """Nine parameters (hws), or ten with a neutral position that depends on the velocity (ldvs)."""
+    velocity: float | None = None
+    """Problem 1: this velocity V_r as a fraction of V_p, 0 <= V < 1; 0.3 unless one or a range is given."""
+    velocities: tuple[float, float] | None = None
+    """Problem 2: velocities drawn uniformly from this range."""
+    physical: bool = False
+    """Minimise falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    algorithm: Literal["evolution", "cmaes"] = "evolution"
+    """The paper's evolutionary algorithm, or CMA-ES."""
+    population: int = 10
+    """Individuals of a generation; the paper's L."""
+    domain: float = 10.0
+    """The first population's shifts [mm] and weights are drawn from 0 to this, neutral positions [mm] from minus this
+    to this; not printed in the paper."""
+    starts: int | None = None
+    """Random starts of each candidate, the same for all; 500 unless given, 50 if physical."""
+    budget: int = 1000
+    """Most evaluations of the population's search; at L = 10 about the paper's 100 iterations."""
+    refine_starts: int | None = None
+    """Random starts of each candidate of the simplex; 7000 unless given, 100 if physical."""
+    refine_budget: int = 400
+    """Most evaluations of the simplex; 0 leaves it out."""
+    verdict_starts: int | None = None
+    """Fresh random starts for the verdict; 7000 unless given, 200 if physical."""
+    verdict_seed: int = 1998
+    """Seed of the fresh starts; another than --seed."""
+    out: Path = Path("results/search")
+    """Folder for the model (TOML), the history (NetCDF), a figure and a manifest."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
 Command = (
     Annotated[Compare, subcommand("compare")]
     | Annotated[Flss, subcommand("flss")]
     | Annotated[Walk, subcommand("walk")]
     | Annotated[Render, subcommand("render")]
+    | Annotated[Search, subcommand("search")]
 )
 
 _registry = ConstructorRegistry()
@@ -165,14 +207,17 @@ def main() -> None:
             Flss: commands.run_flss,
             Walk: commands.run_walk,
             Render: commands.run_render,
+            Search: commands.run_search,
         }
         run[type(options)](options)
+    except KeyboardInterrupt:
+        sys.exit(_complain("stopped", 130))
     except InputError as error:
         sys.exit(_complain(error, 2))
     except (SimulationError, RenderingError) as error:
         sys.exit(_complain(error, 1))
 
 
-def _complain(error: Exception, code: int) -> int:
+def _complain(error: Exception | str, code: int) -> int:
     print(f"hexmj: {error}", file=sys.stderr)
     return code

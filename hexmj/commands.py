@@ -11,7 +11,7 @@ from hexmj.errors import InputError, RenderingError
 from hexmj.film import Film
 from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time, settings
 from hexmj.network import walk
-from hexmj.parameters import Model, load_model
+from hexmj.parameters import HWS, LDVS, Model, Symmetric, load_model
 from hexmj.progress import progress_bar
 from hexmj.results import json_text, results_folder, save_dataset, save_manifest, write_whole
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from hexmj.cli import Compare, Conditions, Flss, Render, Walk
+    from hexmj.cli import Compare, Conditions, Flss, Render, Search, Walk
+    from hexmj.problems import Problem
+    from hexmj.search import Plan
 
 
 def run_compare(options: "Compare") -> None:
@@ -199,6 +201,85 @@ def run_render(options: "Render") -> None:
         one.close()
 
 
+def run_search(options: "Search") -> None:
+    """`hexmj search`: the best parameters for one velocity or a range, and a verdict on fresh starts."""
+    from hexmj.convergence import convergence_figure
+    from hexmj.problems import Sample
+    from hexmj.search import search
+
+    conditions = options.conditions
+    if options.verdict_seed == conditions.seed:
+        raise InputError(f"--verdict-seed = {options.verdict_seed} is also --seed; expected another, for fresh starts")
+    problem, plan = _search_settings(options)
+    size = options.verdict_starts if options.verdict_starts is not None else 200 if options.physical else 7 * SAMPLE
+    fresh = Sample.draw(problem, size, options.verdict_seed, conditions.threads)
+    out = results_folder(options.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
+    with progress_bar("searching") as progress:
+        found = search(problem, plan, path=out / "history.nc", threads=conditions.threads, progress=progress)
+    models = {"found": Symmetric.from_vector(found.vector), "hws": HWS, "ldvs": LDVS}
+    verdict = fresh.verdict(models)
+    at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
+    kind = "physical" if options.physical else "kinematic"
+    title = f"{problem.form}, {kind} FLSS at {at}, window {problem.window}, {plan.algorithm}, seed {plan.seed}"
+    told = {"problem": asdict(problem), "plan": asdict(plan), "found": asdict(models["found"])}
+    told |= {"verdict_starts": size, "verdict_seed": options.verdict_seed}
+    files = [
+        out / "history.nc",
+        _save_model(models["found"], f"hexmj search: {title}", out / "found.toml"),
+        _save_figure(convergence_figure(found.history, title), out / "convergence.png"),
+        save_manifest(told, out / "manifest.json"),
+    ]
+    evaluations, windows = found.history.sizes["evaluation"], verdict.window.values.tolist()
+    if options.json:
+        judged = {
+            name: {w: {key: verdict[key].sel(model=name, window=w).item() for key in verdict} for w in windows}
+            for name in models
+        }
+        counts = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
+        _print_json({"found": told["found"]} | counts | {"verdict": judged, "settings": told, "files": files})
+    else:
+        weights, judged = _table("parameter", *models), _table("model", *(f"window {w}" for w in windows))
+        for key in asdict(HWS):
+            weights.add_row(key.replace("_", " "), *(f"{getattr(model, key):.4g}" for model in models.values()))
+        for name in models:
+            judged.add_row(name, *(_interval(verdict.sel(model=name, window=w), "flss") for w in windows))
+        _print(
+            title,
+            weights,
+            f"{kind} FLSS on {size} fresh starts (seed {options.verdict_seed}), with 95 % intervals",
+            judged,
+            f"{evaluations} evaluations, {found.replayed} of them from an earlier run; least cost {found.cost:.4g}",
+            _conditions_line(conditions, options.physical),
+            *map(str, files),
+        )
+
+
+def _search_settings(options: "Search") -> "tuple[Problem, Plan]":
+    """What to minimise and how, with fewer starts for physical walks."""
+    from hexmj.problems import Problem
+    from hexmj.search import Plan
+
+    if options.velocity is not None and options.velocities is not None:
+        raise InputError("--velocity and --velocities were both given; expected one velocity or one range")
+    v = options.velocity if options.velocity is not None else 0.3
+    low, high = options.velocities or (v, v)
+    conditions = options.conditions
+    body = conditions.body if options.physical else None
+    acceleration = conditions.options["acceleration"]
+    problem = Problem(options.form, low, high, conditions.time, conditions.network, acceleration, body)
+    few, many = (50, 100) if options.physical else (500, 7 * SAMPLE)
+    return problem, Plan(
+        algorithm=options.algorithm,
+        population=options.population,
+        domain=options.domain,
+        starts=options.starts if options.starts is not None else few,
+        budget=options.budget,
+        refine_starts=options.refine_starts if options.refine_starts is not None else many,
+        refine_budget=options.refine_budget,
+        seed=conditions.seed,
+    )
+
+
 def _recorded(
     model: Model, velocity: float, start: int, conditions: "Conditions", title: str, physical: bool
 ) -> "xr.Dataset":
@@ -310,6 +391,12 @@ def _interval(one: "xr.Dataset", measure: str) -> str:
 
 def _save_figure(figure: "Figure", path: Path) -> Path:
     return write_whole(path, lambda part: figure.savefig(part, dpi=150))
+
+
+def _save_model(model: Symmetric, comment: str, path: Path) -> Path:
+    """A TOML file that `load_model` reads to the same bits."""
+    lines = [f"# {comment}", "[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(model).items())]
+    return write_whole(path, lambda part: part.write_text("\n".join(lines) + "\n", encoding="utf-8"))
 
 
 def _table(*columns: str) -> "Table":

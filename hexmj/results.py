@@ -14,7 +14,7 @@ from hexmj.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "dm-control", "xarray")
+PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "cmaes", "dm-control", "xarray")
 
 
 def results_folder(path: Path, names: Sequence[str]) -> Path:

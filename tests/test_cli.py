@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -35,11 +36,11 @@ def run(monkeypatch, capsys):
 def test_help_names_every_command_and_imports_nothing_slow():
     script = "import sys; from hexmj.cli import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
-    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render"))
+    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render", "search"))
     assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
 
 
-@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render"])
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search"])
 def test_every_command_has_help_with_units_and_defaults(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0
@@ -179,7 +180,106 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
         assert video.shape[1:] == (240, width, 3)
 
 
+SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "start", "--starts", 40, "--budget", 40,
+          "--refine-starts", 100, "--refine-budget", 20, "--verdict-starts", 500]  # fmt: skip
+
+
+@pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
+def test_search_writes_a_model_that_can_be_used_and_reports_it_again(run, tmp_path, algorithm):
+    words = [*SEARCH, "--algorithm", algorithm, "--out", tmp_path]
+    code, text, _ = run(*words, "--json")
+    assert code == 0
+    answer = json.loads(text)
+    assert answer["replayed"] == 0
+    found = hexmj.load_model(str(tmp_path / "found.toml"))
+    assert found == hexmj.Symmetric(**answer["found"])
+    history = xr.load_dataset(tmp_path / "history.nc")
+    assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
+    assert history.best.values[-1] == answer["cost"]
+    assert history.attrs["settings"]
+    for name, model in (("found", found), ("hws", hexmj.HWS), ("ldvs", hexmj.LDVS)):
+        flss, interval = hexmj.flss_over_range(model, 0.3, 0.6, starts=500, window="start", seed=1998)
+        assert answer["verdict"][name]["start"] == {"flss": flss, "flss_low": interval[0], "flss_high": interval[1]}
+        assert "walk" in answer["verdict"][name]
+    assert (tmp_path / "convergence.png").read_bytes().startswith(PNG)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["settings"]["plan"]["algorithm"] == algorithm
+    files = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    code, text, _ = run(*words)
+    assert code == 0
+    assert f"{answer['evaluations']} evaluations, {answer['evaluations']} of them from an earlier run" in text
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == files
+    code, out, error = run(*words, "--seed", 1)
+    assert (code, out) == (2, "")
+    assert "history.nc is of another search: plan.seed is 0 there and 1 here" in error
+    (tmp_path / "history.nc").write_bytes(files[tmp_path / "history.nc"][:-100])
+    code, out, error = run(*words)
+    assert (code, out) == (2, "")
+    assert "history.nc is damaged" in error
+    assert (tmp_path / "history.nc").read_bytes() == files[tmp_path / "history.nc"][:-100]
+    assert (tmp_path / "found.toml").read_bytes() == files[tmp_path / "found.toml"]
+
+
+def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
+    words = [*map(str, SEARCH), "--refine-starts", "20000", "--refine-budget", "40", "--json", "--out"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    while not (tmp_path / "killed" / "history.nc").exists() and running.poll() is None:
+        time.sleep(0.01)
+    running.kill()
+    assert running.wait() == -9
+    assert [path.name for path in (tmp_path / "killed").iterdir() if path.name[0] != "."] == ["history.nc"]
+    answers = [json.loads(run(*words, tmp_path / name)[1]) for name in ("killed", "unbroken")]
+    assert 0 < answers[0]["replayed"] < answers[0]["evaluations"]
+    for key in ("found", "cost", "verdict", "evaluations", "settings"):
+        assert answers[0][key] == answers[1][key]
+    datasets = [xr.load_dataset(tmp_path / name / "history.nc") for name in ("killed", "unbroken")]
+    assert datasets[0].identical(datasets[1])
+
+
+def test_a_search_that_is_stopped_by_hand_keeps_its_history(run, tmp_path, monkeypatch):
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hexmj.search.refine", stop)
+    code, out, error = run(*SEARCH, "--out", tmp_path)
+    assert (code, out) == (130, "")
+    assert error.endswith("hexmj: stopped\n")
+    assert xr.load_dataset(tmp_path / "history.nc").sizes["evaluation"] == 37
+
+
+def test_physical_search(run, tmp_path):
+    words = ["search", "--physical", "--velocity", 0.6, "--window", "start", "--vp", 200, "--starts", 3, "--budget", 10]
+    words += ["--refine-budget", 0, "--verdict-starts", 4, "--json", "--out", tmp_path]
+    code, text, _ = run(*words)
+    assert code == 0
+    answer = json.loads(text)
+    fell = hexmj.physical_flss(
+        hexmj.load_model(str(tmp_path / "found.toml")), [0.6], starts=4, window="start", seed=1998,
+        body=hexmj.Body(vp=200.0),
+    )  # fmt: skip
+    assert answer["verdict"]["found"]["start"]["flss"] == fell.flss.item()
+    assert answer["settings"]["problem"]["body"]["vp"] == 200.0
+
+
 NONSENSE = [
+    (["search", "--velocity", "1"], "expected 0 <= low <= high < 1"),
+    (["search", "--velocities", "0.5", "0.1"], "velocity range 0.5 to 0.1; expected 0 <= low <= high < 1"),
+    (["search", "--velocities", "0.1", "1.5"], "expected 0 <= low <= high < 1"),
+    (["search", "--velocities", "0", "0.5"], "has no period"),
+    (["search", "--velocity", "0.1", "--velocities", "0.1", "0.5"], "expected one velocity or one range"),
+    (["search", "--population", "0"], "expected at least 2 individuals"),
+    (["search", "--algorithm", "cmaes", "--population", "1"], "expected at least 4 individuals"),
+    (["search", "--budget", "0"], "at least one generation, 10 evaluations"),
+    (["search", "--refine-starts", "0"], "starts = 0; expected"),
+    (["search", "--verdict-starts", "0"], "starts = 0; expected"),
+    (["search", "--verdict-seed", "0"], "expected another, for fresh starts"),
+    (["search", "--domain", "nan"], "domain = nan; expected"),
+    (["search", "--form", "lvds"], "hws"),
+    (["search", "--window", "long"], "valid names: walk, start"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
     (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
@@ -207,7 +307,7 @@ NONSENSE = [
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
     (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),
-    (["dance"], "compare, flss, walk, render"),
+    (["dance"], "compare, flss, walk, render, search"),
 ]
 
 

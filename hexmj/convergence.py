@@ -1,0 +1,32 @@
+"""The course of a search as a figure."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
+
+
+def convergence_figure(history: "xr.Dataset", title: str) -> "Figure":
+    """Every candidate's cost and the least so far against the number of evaluations, from `History.dataset`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+    axes = figure.subplots()
+    evaluation = np.arange(1, history.sizes["evaluation"] + 1)
+    for number, (stage, colour) in enumerate(STAGE_COLOURS.items()):
+        here = history.stage.values == number
+        if here.any():
+            axes.plot(evaluation[here], history.cost.values[here], ".", color=colour, markersize=2.5, alpha=0.35)
+            axes.plot(evaluation[here], history.best.values[here], color=colour, linewidth=1.8, label=stage)
+    axes.set(xlabel="evaluations of the cost function", ylabel="FLSS on the starts of the stage", ylim=(-0.02, 1.02))
+    axes.set_title(title, fontsize=9)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", linewidth=0.8)
+    title = "lines: least so far, dots: candidates"
+    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=title, title_fontsize=8)
+    return figure

@@ -1,0 +1,25 @@
+"""Where a search begins, and how its real numbers are read as parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """The box of the initial population, which a search may leave; binary parameters stay binary."""
+
+    low: np.ndarray
+    """(parameter,) least values, in the units of the parameters; below 1/2 where binary."""
+    high: np.ndarray
+    """(parameter,) greatest values; above 1/2 where binary."""
+    binary: np.ndarray
+    """(parameter,) whether the cost function takes only 0 or 1 there."""
+
+    def read(self, individuals: np.ndarray) -> np.ndarray:
+        """The parameters of individuals, both (..., parameter): a binary one is 1 where the number is above 1/2."""
+        return np.where(self.binary, individuals > 0.5, individuals)
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Individuals uniformly distributed over the box, (size, parameter)."""
+        return rng.uniform(self.low, self.high, (size, len(self.low)))
