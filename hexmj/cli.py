@@ -170,12 +170,32 @@ class Search:
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
 
+@dataclass(frozen=True)
+class Reproduce:
+    """The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms, footfall diagrams.
+
+    Repeat the command to go on with a run that was stopped.
+    """
+
+    quick: bool = False
+    """Fewer starts and velocities, under a minute; the full protocol takes several."""
+    only: tuple[str, ...] = ()
+    """Keys of the claims to judge, without figures; all unless given."""
+    seed: int = 0
+    """Seed of the random starts."""
+    out: Path = Path("results/reproduce")
+    """Folder for the table (Markdown, JSON), the figures and what was measured."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+
+
 Command = (
     Annotated[Compare, subcommand("compare")]
     | Annotated[Flss, subcommand("flss")]
     | Annotated[Walk, subcommand("walk")]
     | Annotated[Render, subcommand("render")]
     | Annotated[Search, subcommand("search")]
+    | Annotated[Reproduce, subcommand("reproduce")]
 )
 
 _registry = ConstructorRegistry()
@@ -208,6 +228,7 @@ def main() -> None:
             Walk: commands.run_walk,
             Render: commands.run_render,
             Search: commands.run_search,
+            Reproduce: commands.run_reproduce,
         }
         run[type(options)](options)
     except KeyboardInterrupt:

@@ -1,7 +1,7 @@
 """What each command does: call the package, print a table or one JSON object, write the files."""
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from hexmj.cli import Compare, Conditions, Flss, Render, Search, Walk
+    from hexmj.cli import Compare, Conditions, Flss, Render, Reproduce, Search, Walk
     from hexmj.problems import Problem
     from hexmj.search import Plan
 
@@ -252,6 +252,24 @@ def run_search(options: "Search") -> None:
             _conditions_line(conditions, options.physical),
             *map(str, files),
         )
+
+
+def run_reproduce(options: "Reproduce") -> None:
+    """`hexmj reproduce`: the paper's claims, judged, and its figures."""
+    from hexmj.claims_table import HEADS, claims_json, summary
+    from hexmj.protocol import FULL, QUICK
+    from hexmj.reproduce import reproduce
+
+    protocol = replace(QUICK if options.quick else FULL, seed=options.seed)
+    with progress_bar("reproducing") as progress:
+        rows, files = reproduce(options.out, protocol, only=options.only, progress=progress)
+    if options.json:
+        _print_json(claims_json(rows, asdict(protocol)) | {"files": files})
+    else:
+        table = _table(*HEADS)
+        for row in rows:
+            table.add_row(*row.cells)
+        _print("The claims of the 1998 paper", table, *summary(rows), *map(str, files))
 
 
 def _search_settings(options: "Search") -> "tuple[Problem, Plan]":

@@ -65,10 +65,10 @@ def walk_figure(recording: "xr.Dataset") -> "Figure":
     time = recording.time.values
     physical = "measured_stance" in recording
     for row, leg in enumerate(LEGS):
-        footfall.broken_barh(_spans(time, ~recording.planned_stance.values[:, row]), (row - 0.38, 0.76), color="0.15")
+        footfall.broken_barh(spans(time, ~recording.planned_stance.values[:, row]), (row - 0.38, 0.76), color="0.15")
         if physical:
             off = ~recording.measured_stance.values[:, row] & np.isfinite(recording.measured_x.values[:, row])
-            footfall.broken_barh(_spans(time, off), (row + 0.2, 0.18), color=MEASURE_COLOURS["measured"])
+            footfall.broken_barh(spans(time, off), (row + 0.2, 0.18), color=MEASURE_COLOURS["measured"])
         footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
     footfall.set(ylim=(5.6, -0.6), yticks=[], title=recording.attrs.get("title", ""))
     legend = "black: protraction" + (", orange: foot off the ground" if physical else "")
@@ -93,7 +93,7 @@ def _flss_axes(axes: "Axes") -> None:
     axes.grid(color="0.9", linewidth=0.8)
 
 
-def _spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
+def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
     """Begin and length of each stretch of time in which `on`, (step,), holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     step = time[1] - time[0] if len(time) > 1 else 0.0

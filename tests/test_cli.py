@@ -36,11 +36,11 @@ def run(monkeypatch, capsys):
 def test_help_names_every_command_and_imports_nothing_slow():
     script = "import sys; from hexmj.cli import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
-    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render", "search"))
+    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render", "search", "reproduce"))
     assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
 
 
-@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search"])
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search", "reproduce"])
 def test_every_command_has_help_with_units_and_defaults(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0
@@ -266,6 +266,8 @@ def test_physical_search(run, tmp_path):
 
 
 NONSENSE = [
+    (["reproduce", "--only", "nothing"], "claim 'nothing'; valid keys: "),
+    (["reproduce", "--quick", "--seed", "-1"], "seed = -1"),
     (["search", "--velocity", "1"], "expected 0 <= low <= high < 1"),
     (["search", "--velocities", "0.5", "0.1"], "velocity range 0.5 to 0.1; expected 0 <= low <= high < 1"),
     (["search", "--velocities", "0.1", "1.5"], "expected 0 <= low <= high < 1"),
@@ -350,3 +352,14 @@ def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):
     assert code == 1
     assert "did not settle" in error
     assert not Path(tmp_path / "recording.nc").exists()
+
+
+def test_reproduce_judges_chosen_claims(run, tmp_path):
+    words = ["reproduce", "--quick", "--only", "ldvs-accelerated", "--json", "--out", tmp_path]
+    code, text, _ = run(*words)
+    assert code == 0
+    (claim,) = json.loads(text)["claims"]
+    assert claim["key"] == "ldvs-accelerated"
+    assert set(claim["ours"]) == {"walk", "start"}
+    assert claim["command"].endswith("--only ldvs-accelerated")
+    assert (tmp_path / "claims.md").is_file()

@@ -1,0 +1,110 @@
+"""The table of claims: each judged over both windows, as rows, Markdown and JSON."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from hexmj.loss_frequency import WINDOWS
+from hexmj.paper import Claim
+from hexmj.quantities import Measured
+from hexmj.rules import Answer
+
+NOT_SEARCHED = "not yet searched"
+SAME = "same"
+"""Stands under the second window where no window is involved."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A claim with our answers."""
+
+    claim: Claim
+    answers: dict[str, Answer | None]
+    """By window; one, under '', where no window is involved; None where a set has not been searched yet."""
+
+    @property
+    def verdicts(self) -> dict[str, str]:
+        """By window: agrees, differs or not yet searched."""
+        return {
+            window: NOT_SEARCHED if one is None else "agrees" if one.agrees else "differs"
+            for window, one in self.answers.items()
+        }
+
+    @property
+    def fits(self) -> str:
+        """Which window the paper's numbers fit: a window, both or neither; empty where that is not the question."""
+        if set(self.answers) == {""} or NOT_SEARCHED in self.verdicts.values():
+            return ""
+        agreeing = [window for window, verdict in self.verdicts.items() if verdict == "agrees"]
+        return {0: "neither", 1: agreeing[0] if agreeing else "", len(WINDOWS): "both"}[len(agreeing)]
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Section, the paper's words and value, our answers under 'walk' and 'start', which fits, why."""
+        ours = [
+            f"{verdict}: {_number(answer)}" if answer else verdict
+            for verdict, answer in zip(self.verdicts.values(), self.answers.values(), strict=True)
+        ]
+        why = self.claim.why if "differs" in self.verdicts.values() else ""
+        ours += [SAME] * (len(WINDOWS) - len(ours))
+        return self.claim.section, self.claim.words, self.claim.value, *ours, self.fits, why
+
+
+HEADS = ("section", "the paper", "its value", *(f"ours, {window}" for window in WINDOWS), "fits", "why")
+
+
+def judge(claim: Claim, measured: Measured) -> Row:
+    """Judge a claim over both windows, or once where no window is involved."""
+    windows = WINDOWS if claim.rule.quantity.windowed else ("",)
+    return Row(claim, {window: claim.rule.answer(measured, window) for window in windows})
+
+
+def summary(rows: Sequence[Row]) -> list[str]:
+    """Sentences that count the verdicts."""
+    lines = []
+    for windows, of in ((WINDOWS, "claims on FLSS and sets"), (("",), "claims on gaits")):
+        for window in windows:
+            verdicts = [row.verdicts[window] for row in rows if window in row.verdicts]
+            counts = ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", NOT_SEARCHED) if v in verdicts)
+            lines.append(f"{of}{f', window {window}' if window else ''}: {counts or 'none judged yet'}")
+    fits = [row.fits for row in rows if row.fits]
+    counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *WINDOWS, "neither"))
+    return [*lines, f"which window the paper's numbers fit: {counts}"]
+
+
+def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
+    """The table, the rule of every row, and the command that recomputes it."""
+    size = f"{settings['samples']} times {settings['sample']} starts, gaits from {settings['gait_starts']} starts"
+    head = ["# The claims of the 1998 paper", "", f"{size}; seed {settings['seed']}.  An answer is the number that"]
+    head[-1] += " strains the rule most, with its 95 % interval, and where."
+    lines = [*head, "", *(f"- {line}" for line in summary(rows)), "", _line(HEADS), _line(["---"] * len(HEADS))]
+    lines += [_line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
+    lines += ["", "## Rules and commands", "", _line(("the paper", "agrees if", "command")), _line(["---"] * 3)]
+    lines += [_line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]:
+    """The same as plain numbers and texts."""
+    claims = []
+    for row in rows:
+        claim = row.claim
+        told = {"key": claim.key, "section": claim.section, "paper": claim.words, "value": claim.value}
+        ours = {
+            window or "any": {"verdict": row.verdicts[window]} | (asdict(answer) if answer else {})
+            for window, answer in row.answers.items()
+        }
+        how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": claim.command}
+        claims.append(told | {"ours": ours} | how)
+    return {"claims": claims, "summary": summary(rows), "protocol": settings}
+
+
+def _number(answer: Answer) -> str:
+    if answer.value != answer.value:
+        return f"no start left at {answer.where}"
+    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
+    return f"{answer.value:.4f}{interval} at {answer.where}"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,67 @@
+"""The parameter sets that searches found (``ideal.toml``), by observation time and velocities."""
+
+import tomllib
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from hexmj.errors import InputError
+from hexmj.loss_frequency import WINDOWS
+from hexmj.parameters import Symmetric
+
+TABLE = Path(__file__).with_name("ideal.toml")
+
+
+@dataclass(frozen=True)
+class FoundSet:
+    """One set of the HWS form, with what found it."""
+
+    window: str
+    """Observation time under which it was searched, 'walk' or 'start'."""
+    low: float
+    """Least velocity of the search."""
+    high: float
+    """Greatest velocity; the least again for Problem 1."""
+    model: Symmetric
+    command: str
+    """Finds it again, with its seed."""
+
+
+@cache
+def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
+    """All sets of a table.
+
+    Raises:
+        InputError: the table is damaged, or holds a set twice.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path.name} cannot be read as TOML: {error}") from None
+    found = tuple(_read(entry, f"{path.name}, set {i + 1}") for i, entry in enumerate(table.get("set", [])))
+    places = [(one.window, one.low, one.high) for one in found]
+    if twice := [place for place in places if places.count(place) > 1]:
+        raise InputError(f"{path.name} holds two sets for {twice[0]}; expected one for each window and velocity")
+    return found
+
+
+def found_set(window: str, low: float, high: float | None = None) -> Symmetric | None:
+    """The set for one velocity (Problem 1) or a range (Problem 2); None where no search has been made yet."""
+    place = window, low, low if high is None else high
+    return next((one.model for one in found_sets() if (one.window, one.low, one.high) == place), None)
+
+
+def _read(entry: dict[str, Any], where: str) -> FoundSet:
+    if unknown := set(entry) ^ {"window", "velocities", "command", "symmetric"}:
+        raise InputError(f"{where}: {min(unknown)} is missing or unknown; see the head of the file")
+    if entry["window"] not in WINDOWS:
+        raise InputError(f"{where}: window = {entry['window']!r}; valid names: {', '.join(WINDOWS)}")
+    velocities = entry["velocities"]
+    if not (len(velocities) in (1, 2) and all(0 < v < 1 for v in velocities) and velocities == sorted(velocities)):
+        raise InputError(f"{where}: velocities = {velocities}; expected one, or the ends of a range, in ]0, 1[")
+    names = {f.name for f in fields(Symmetric)} - {"p34_i"}
+    if unknown := set(entry["symmetric"]) - names:
+        raise InputError(f"{where}: {min(unknown)} is no parameter of the HWS form; valid: {', '.join(sorted(names))}")
+    model = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
+    return FoundSet(entry["window"], velocities[0], velocities[-1], model, entry["command"])

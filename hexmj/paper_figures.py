@@ -1,0 +1,247 @@
+"""Figures 2-6 in the paper's layout, the phase histograms of Section 5.3, and footfall diagrams over the velocity.
+
+Each function takes the measurements it names (`hexmj.reproduce.measure`) and returns a figure and the data in it.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.figures import spans
+from hexmj.gaits import PAIRS, circular_mean, wilson_phase
+from hexmj.legs import LEGS
+from hexmj.loss_frequency import WINDOWS
+from hexmj.protocol import NO_SET
+from hexmj.quantities import Measured, kept_gaits, main_peak
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SAMPLES = 7
+"""Samples of starts whose means and standard deviations are drawn."""
+
+BINS = 51
+"""Of a phase histogram; 0.5 is in the middle of one."""
+
+RELATIVE = {2: "o", 3: "s"}
+"""Legs whose phases relative to leg 1 are drawn, with their symbols."""
+
+UNCOORDINATED, HWS, LDVS, IDEAL, ACCELERATED = "#7a7a7a", "#1b6ca8", "#b3261e", "#111111", "#e08e1b"
+MODELS = {"hws": HWS, "ldvs": LDVS}
+
+CIRCLES: dict[str, Any] = {"color": UNCOORDINATED, "marker": "o", "markerfacecolor": "white", "markersize": 6}
+BARS: dict[str, Any] = {"marker": "_", "markersize": 7, "markeredgewidth": 1.5}
+IDEALS: dict[str, Any] = {"color": IDEAL, "marker": "x", "linestyle": "none", "markersize": 6.5, "markeredgewidth": 1.5}
+
+
+def figure_2(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
+    """FLSS without coordination (circles) and with the set optimised for each velocity (bars)."""
+    return _flss_figure(
+        measured,
+        window,
+        {
+            "uncoordinated": ("no coordination", CIRCLES),
+            "ideal": ("HWS, optimised for each $V$", BARS | {"color": HWS}),
+        },
+    )
+
+
+def figure_3(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
+    """FLSS of the HWS set: the ideal (x), none (circles), Problem 2 (crosses), accelerated (bars)."""
+    return _flss_figure(
+        measured,
+        window,
+        {
+            "uncoordinated": ("no coordination", CIRCLES),
+            "hws": ("HWS", {"color": HWS, "marker": "+", "markersize": 9, "markeredgewidth": 1.5}),
+            "ideal": ("ideal", IDEALS),
+            "hws accelerated": ("HWS, accelerated", BARS | {"color": ACCELERATED}),
+        },
+    )
+
+
+def figure_4(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
+    """FLSS of the LDVS set: the ideal (x), none (circles), Problem 2 (bars), accelerated (stars)."""
+    return _flss_figure(
+        measured,
+        window,
+        {
+            "uncoordinated": ("no coordination", CIRCLES),
+            "ldvs": ("LDVS", BARS | {"color": LDVS}),
+            "ideal": ("ideal", IDEALS),
+            "ldvs accelerated": ("LDVS, accelerated", {"color": ACCELERATED, "marker": "*", "markersize": 9}),
+        },
+    )
+
+
+def figure_5(measured: Measured) -> "tuple[Figure, xr.Dataset]":
+    """Phases of legs 2 (upper line) and 3 (lower line) relative to leg 1, HWS."""
+    return _phase_figure(measured["hws gaits"], HWS)
+
+
+def figure_6(measured: Measured) -> "tuple[Figure, xr.Dataset]":
+    """Phases of legs 2 (upper line) and 3 (lower line) relative to leg 1, LDVS, with Wilson's Gait II (crosses)."""
+    figure, data = _phase_figure(measured["ldvs gaits"], LDVS)
+    (axes,) = figure.axes
+    v = data.velocity.values
+    data["wilson"] = (("leg", "velocity"), np.array([wilson_phase(v), 2 * wilson_phase(v) - 1]))
+    for leg in data.leg.values:
+        label = "Gait II (Wilson)" if leg == 2 else None
+        axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
+    axes.legend(frameon=False, fontsize=10)
+    return figure, data
+
+
+def phase_histograms(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
+    """How many starts walk with which phase: a row for each pair of legs, a column for each of five velocities."""
+    import xarray as xr
+
+    kept = list(kept_gaits(measured[f"{model} gaits"]))
+    kept = [kept[i] for i in np.unique(np.linspace(0, len(kept) - 1, 5).round().astype(int))]
+    edges = np.linspace(0, 1, BINS + 1)
+    counts = np.array([[np.histogram(one.phase.sel(pair=pair), edges)[0] for pair in PAIRS] for _, one in kept])
+    figure = _figure(8.6, 7.4)
+    panels = figure.subplots(len(PAIRS), len(kept), sharex=True, sharey="row", squeeze=False)
+    for row, pair in enumerate(PAIRS):
+        for column, (v, one) in enumerate(kept):
+            axes: Axes = panels[row, column]
+            axes.stairs(counts[column, row], edges, fill=True, color=MODELS[model])
+            axes.set(xlim=(0, 1), ylim=(0, 1.15 * max(1, counts.max())), xticks=(0, 0.5, 1))
+            axes.xaxis.set_major_formatter("{x:g}")
+            if row == 0:
+                axes.set_title(f"$V$ = {v:g}\n{one.sizes['start']} stable gaits", fontsize=10)
+        panels[row, 0].set_ylabel(f"$\\Phi$ {pair}", rotation=0, ha="right", va="center", fontsize=12)
+    figure.supxlabel("relative phase", fontsize=11)
+    figure.supylabel("number of starts", fontsize=11)
+    data = xr.Dataset(
+        {"starts": (("velocity", "pair", "bin"), counts)},
+        {"velocity": [v for v, _ in kept], "pair": list(PAIRS), "bin": (edges[:-1] + edges[1:]) / 2},
+    )
+    return figure, data
+
+
+def footfall_diagrams(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
+    """Which legs protract (bars) in the limit regime, over three periods of a single leg, a panel a velocity."""
+    data = measured[f"{model} footfall"]
+    figure = _figure(7.2, 1.35 * data.sizes["velocity"] + 0.5)
+    panels = figure.subplots(data.sizes["velocity"], 1, sharex=True, squeeze=False)[:, 0]
+    time = data.time.values
+    for axes, v in zip(panels, data.velocity.values, strict=True):
+        stance = data.stance.sel(velocity=v).values.astype(bool)
+        for row in range(len(LEGS)):
+            axes.broken_barh(
+                spans(time, ~stance[:, row]), (row - 0.36, 0.72), color=MODELS[model] if row < 3 else "0.2"
+            )
+        axes.set(ylim=(5.6, -0.6), xlim=(time[0], time[-1]), yticks=range(len(LEGS)), yticklabels=LEGS)
+        axes.tick_params(axis="y", length=0, labelsize=8)
+        axes.axhline(2.5, color="0.8", linewidth=0.8)
+        axes.text(1.01, 0.5, f"$V$ = {v:g}", transform=axes.transAxes, va="center", fontsize=11)
+    panels[-1].set_xlabel("time [periods of a single leg, $20\\,(1 + 1/V)$];  bars: protraction")
+    return figure, data
+
+
+def _flss_figure(
+    measured: Measured, window: str, curves: Mapping[str, tuple[str, dict[str, Any]]]
+) -> "tuple[Figure, xr.Dataset]":
+    """FLSS against velocity: means of the samples of starts, error bars of one standard deviation over them."""
+    import xarray as xr
+
+    figure = _figure(6.4, 4.6)
+    axes = figure.subplots()
+    data = xr.concat(
+        [_samples(measured[name].lost.sel(window=window)) for name in curves],
+        xr.DataArray(list(curves), dims="curve", name="curve"),
+        combine_attrs="drop_conflicts",
+    )
+    missing = []
+    for name, (label, style) in curves.items():
+        one = data.sel(curve=name).dropna("velocity")
+        if one.sizes["velocity"]:
+            look: dict[str, Any] = {"linewidth": 1.3, "capsize": 3} | style
+            axes.errorbar(one.velocity, one.flss, one.sample_sd, label=label, **look)
+        else:
+            missing.append(label)
+    axes.set(xlabel="velocity $V$", ylabel="FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
+    for label in missing:
+        axes.plot([], [], " ", label=f"{label}: not yet searched")
+    axes.legend(frameon=False, fontsize=10)
+    return figure, data
+
+
+def _samples(lost: "xr.DataArray") -> "xr.Dataset":
+    """Mean and standard deviation over the samples of starts, (velocity,); NaN where no set is known."""
+    import xarray as xr
+
+    known = (lost.values != NO_SET).all(axis=1)
+    means = lost.values.reshape(lost.sizes["velocity"], SAMPLES, -1).mean(axis=2)
+    means[~known] = np.nan
+    size = lost.sizes["start"] // SAMPLES
+    return xr.Dataset(
+        {
+            "flss": ("velocity", means.mean(axis=1), {"units": "1"}),
+            "sample_sd": ("velocity", means.std(axis=1, ddof=1), {"units": "1"}),
+        },
+        {"velocity": lost.velocity},
+        {"samples": f"{SAMPLES} of {size} starts"},
+    )
+
+
+def _phase_figure(gaits: "xr.Dataset", colour: str) -> "tuple[Figure, xr.Dataset]":
+    """Phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks."""
+    import xarray as xr
+
+    v = gaits.velocity.values
+    phase = np.full((len(RELATIVE), len(v), gaits.sizes["start"]), np.nan)  # (leg, velocity, start)
+    peak = np.full((len(RELATIVE), len(v)), np.nan)
+    for i, (_, one) in enumerate(kept_gaits(gaits)):
+        second = one.phase.sel(pair="1-2").values
+        third = (second + one.phase.sel(pair="2-3").values) % 1.0
+        for row, values in enumerate((second, third)):
+            phase[row, i, : len(values)] = values
+            if len(values):
+                peak[row, i] = circular_mean(values[main_peak(values)])
+    dims = ("leg", "velocity")
+    data = xr.Dataset(
+        {"phase": ((*dims, "gait"), phase, {"units": "1"}), "main_peak": (dims, peak, {"units": "1"})},
+        {"velocity": v, "leg": list(RELATIVE)},
+    )
+    figure = _figure(6.4, 4.6)
+    axes = figure.subplots()
+    for row, (leg, marker) in enumerate(RELATIVE.items()):
+        axes.plot(np.repeat(v, phase.shape[2]), phase[row].ravel(), ".", color=colour, markersize=4, alpha=0.25,
+                  label="single starts" if row == 0 else None)  # fmt: skip
+        label = f"leg {leg} relative to leg 1"
+        axes.plot(v, peak[row], color=colour, marker=marker, markersize=5, linewidth=1.3, label=label)
+    axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
+    axes.legend(frameon=False, fontsize=10)
+    return figure, data
+
+
+def _figure(width: float, height: float) -> "Figure":
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]
+
+FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
+    **{
+        f"figure-{number}-{window}": (("uncoordinated", "ideal", *names), partial(draw, window=window))
+        for number, draw, names in (
+            (2, figure_2, ()),
+            (3, figure_3, ("hws", "hws accelerated")),
+            (4, figure_4, ("ldvs", "ldvs accelerated")),
+        )
+        for window in WINDOWS
+    },
+    "figure-5": (("hws gaits",), figure_5),
+    "figure-6": (("ldvs gaits",), figure_6),
+    **{f"phases-{model}": ((f"{model} gaits",), partial(phase_histograms, model=model)) for model in MODELS},
+    **{f"footfall-{model}": ((f"{model} footfall",), partial(footfall_diagrams, model=model)) for model in MODELS},
+}
+"""Name of each figure -> the measurements it needs, and what draws it."""

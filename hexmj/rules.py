@@ -1,0 +1,121 @@
+"""How a claim of the paper is judged: a quantity, velocities, and a band that its 95 % intervals must reach."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from hexmj.quantities import Measured, Point, Quantity
+
+END = 0.05
+"""A range of velocities is covered if its ends are met this closely."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What comes out here, at the point that strains a rule most."""
+
+    value: float
+    low: float
+    high: float
+    where: str
+    agrees: bool
+
+
+@dataclass(frozen=True)
+class Band:
+    """Agrees if, at every velocity of a range, the interval of a quantity reaches into a band."""
+
+    quantity: Quantity
+    velocities: tuple[float, float]
+    least: float = -np.inf
+    most: float = np.inf
+
+    @property
+    def words(self) -> str:
+        """The rule as a sentence."""
+        if self.least == self.most:
+            band = f"reaches {self.least:g}"
+        elif np.isinf(self.least):
+            band = f"does not lie above {self.most:g}"
+        elif np.isinf(self.most):
+            band = f"does not lie below {self.least:g}"
+        else:
+            band = f"reaches into [{self.least:g}, {self.most:g}]"
+        return f"at {_range(self.velocities)} the 95 % interval of {self.quantity.words} {band}"
+
+    def answer(self, measured: Measured, window: str) -> Answer | None:
+        """None where a set has not been searched yet."""
+        points = _within(self.quantity.points(measured, window), self.velocities)
+        if points is None:
+            return None
+        estimates = [point.estimate for point in points]
+        strain = [max(value - self.most, self.least - value) for value, _, _ in estimates]
+        worst = int(np.argmax(np.nan_to_num(strain, nan=np.inf)))
+        agrees = all(low <= self.most and high >= self.least for _, low, high in estimates)
+        value, low, high = estimates[worst]
+        return Answer(value, low, high, _where(points[worst]), agrees)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Agrees if, from each velocity of a range to the next, the interval of the change reaches the right side of 0."""
+
+    quantity: Quantity
+    velocities: tuple[float, float]
+    sign: Literal[1, -1]
+
+    @property
+    def words(self) -> str:
+        """The rule as a sentence."""
+        side = "above" if self.sign > 0 else "below"
+        return (
+            f"from each V to the next, over {_range(self.velocities)}, the 95 % interval of the change of"
+            f" {self.quantity.words} reaches {side} 0"
+        )
+
+    def answer(self, measured: Measured, window: str) -> Answer | None:
+        """None where a set has not been searched yet; the change shown is the one that fits least."""
+        points = _within(self.quantity.points(measured, window), self.velocities)
+        if points is None:
+            return None
+        steps = []
+        for name in dict.fromkeys(point.of for point in points):
+            row = [point for point in points if point.of == name]
+            for one, following in pairwise(row):
+                steps.append((_difference(one, following), f"{_where(one)} to {following.velocity:g}"))
+        estimates = [estimate for estimate, _ in steps]
+        worst = int(np.argmin([np.nan_to_num(self.sign * value, nan=-np.inf) for value, _, _ in estimates]))
+        agrees = all((high if self.sign > 0 else -low) >= 0 for _, low, high in estimates)
+        value, low, high = estimates[worst]
+        return Answer(value, low, high, steps[worst][1], agrees)
+
+
+Rule = Band | Trend
+
+
+def _within(points: Iterator[Point], velocities: tuple[float, float]) -> list[Point] | None:
+    """The points of a range, if its ends are met."""
+    low, high = velocities
+    inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
+    if not inside:
+        return None
+    met = [point.velocity for point in inside]
+    return inside if min(met) <= low + END + 1e-9 and max(met) >= high - END - 1e-9 else None
+
+
+def _difference(one: Point, other: Point) -> tuple[float, float, float]:
+    """Change of the mean and its 95 % interval, as of independent samples."""
+    (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
+    return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))
+
+
+def _range(velocities: tuple[float, float]) -> str:
+    low, high = velocities
+    return f"V = {low:g}" if low == high else f"V in [{low:g}, {high:g}]"
+
+
+def _where(point: Point) -> str:
+    return f"V = {point.velocity:g}" + (f", {point.of}" if point.of else "")

@@ -1,0 +1,262 @@
+"""The paper's claims: rules on made-up measurements, the table, what is kept of a stopped run, found sets, figures."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from hexmj import found_sets as found
+from hexmj.claims_table import NOT_SEARCHED, judge, summary
+from hexmj.errors import InputError
+from hexmj.late_losses import lost_after
+from hexmj.loss_frequency import draw_starts, flss
+from hexmj.network import walk
+from hexmj.paper import CLAIMS, Claim
+from hexmj.paper_figures import FIGURES
+from hexmj.parameters import HWS, LDVS, Acceleration
+from hexmj.protocol import FULL, MEASUREMENTS, QUICK, Protocol
+from hexmj.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
+from hexmj.reproduce import measure, reproduce
+from hexmj.rules import Answer, Band, Rule, Trend
+from hexmj.stability import walk_margin
+
+TINY = replace(
+    QUICK,
+    samples=7,
+    sample=3,
+    velocities=(0.3, 0.6),
+    gait_starts=3,
+    gait_velocities=(0.5, 0.6),
+    footfall_velocities=(0.3, 0.6),
+    acceleration=Acceleration(rate=0.001),
+)
+
+
+def losses(*rates: float, starts: int = 1000, velocities: tuple[float, ...] = (0.1, 0.2, 0.3)) -> xr.Dataset:
+    """A measurement with these frequencies, the same under both windows."""
+    lost = np.arange(starts) < np.round(np.array(rates)[:, np.newaxis] * starts)
+    return xr.Dataset(
+        {"lost": (("window", "velocity", "start"), np.stack([lost, lost]).astype(np.int8))},
+        {"window": ["walk", "start"], "velocity": list(velocities)},
+    )
+
+
+def gaits(phases: np.ndarray) -> xr.Dataset:
+    """Accelerated gaits at V = 0.5 with the same phases, (start,), for every pair."""
+    fine = np.ones((1, len(phases)), dtype=bool)
+    pairs = ["1-2", "2-3", "4-5", "5-6", "1-4", "2-5", "3-6"]
+    by_start = ("velocity", "start")
+    return xr.Dataset(
+        {
+            "phase": ((*by_start, "pair"), np.repeat(phases[np.newaxis, :, np.newaxis], 7, axis=2)),
+            "periodic": (by_start, fine), "stable": (by_start, fine), "lost": (by_start, ~fine),
+        },
+        {"velocity": [0.5], "pair": pairs},
+    )  # fmt: skip
+
+
+def answer_of(rule: Rule, measured: Measured, window: str) -> Answer:
+    """Of a rule that can be judged."""
+    answer = rule.answer(measured, window)
+    assert answer is not None
+    return answer
+
+
+def test_rules_agree_if_every_interval_reaches_the_band():
+    measured = {"hws": losses(0.01, 0.2, 0.31), "ldvs": losses(0.02, 0.1, 0.5)}
+    below = Band(Lost("hws"), (0.1, 0.3), most=0.3)
+    answer = answer_of(below, measured, "walk")
+    assert answer.agrees and answer.where == "V = 0.3" and answer.low < 0.3 < answer.value
+    assert not answer_of(Band(Lost("hws"), (0.1, 0.3), most=0.25), measured, "walk").agrees
+    assert not answer_of(Band(Lost("hws"), (0.1, 0.3), least=0.1), measured, "walk").agrees
+    apart = answer_of(Band(Lost("ldvs", "hws"), (0.1, 0.3), most=0.0), measured, "walk")
+    assert not apart.agrees and apart.value == pytest.approx(0.19) and apart.where == "V = 0.3"
+    assert answer_of(Band(Lost("hws", "ldvs", 2.0), (0.1, 0.3), most=0.0), measured, "walk").agrees
+    assert answer_of(Trend(Lost("hws"), (0.1, 0.3), 1), measured, "walk").agrees
+    assert not answer_of(Trend(Lost("hws"), (0.1, 0.3), -1), measured, "walk").agrees
+
+
+def test_a_range_whose_ends_are_not_met_is_not_judged():
+    measured = {"hws": losses(0.01, 0.2, 0.3)}
+    assert answer_of(Band(Lost("hws"), (0.1, 0.35), most=0.3), measured, "walk")
+    assert Band(Lost("hws"), (0.1, 0.4), most=0.3).answer(measured, "walk") is None
+    unknown = losses(0.01, 0.2, 0.3)
+    unknown.lost[:] = -1
+    assert Band(Lost("hws"), (0.1, 0.3), most=0.3).answer({"hws": unknown}, "walk") is None
+
+
+def test_phases_are_judged_in_the_main_peak_and_the_others_counted():
+    phases = np.array([0.66, 0.67, 0.67, 0.68, 0.2])
+    assert main_peak(phases).tolist() == [True, True, True, True, False]
+    assert main_peak(np.array([0.99, 0.01, 0.02, 0.5])).tolist() == [True, True, True, False]
+    measured = {"hws gaits": gaits(phases)}
+    answer = answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), 0.66, 0.68), measured, "")
+    assert answer.agrees and answer.value == pytest.approx(0.67)
+    assert not answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
+    outside = answer_of(Band(Scatter("hws", "phases"), (0.5, 0.5), 0.0, 0.0), measured, "")
+    assert outside.value == pytest.approx(0.2) and not outside.agrees
+
+
+def test_windows_are_judged_apart():
+    lost = losses(0.1, 0.1, 0.1)
+    lost.lost.loc[{"window": "start"}] = 0
+    row = judge(Claim("a", "5", "slow", "< 0.05", Band(Lost("hws"), (0.1, 0.3), most=0.05), "why"), {"hws": lost})
+    assert row.verdicts == {"walk": "differs", "start": "agrees"}
+    assert row.fits == "start"
+    assert row.cells[-1] == "why"
+    assert "start 1" in summary([row])[-1]
+
+
+def test_claims_have_unique_keys_and_name_measurements():
+    assert len({claim.key for claim in CLAIMS}) == len(CLAIMS) >= 40
+    assert all(set(claim.rule.quantity.needs) <= set(MEASUREMENTS) for claim in CLAIMS)
+    assert all(set(needs) <= set(MEASUREMENTS) for needs, _ in FIGURES.values())
+    assert (FULL.samples, FULL.sample, FULL.gait_starts, FULL.gait_network.dt) == (7, 1000, 100, 0.01)
+    assert (FULL.network.dt, FULL.acceleration.rate) == (0.1, 0.00008)
+
+
+def test_measured_losses_are_those_of_flss(tmp_path):
+    protocol = replace(TINY, sample=20)
+    lost = measure("ldvs", protocol, tmp_path).lost
+    fast = measure("hws accelerated", protocol, tmp_path).lost
+    for window in ("walk", "start"):
+        table = flss(LDVS, protocol.velocities, starts=140, window=window)
+        assert lost.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
+        table = flss(HWS, protocol.velocities, starts=140, window=window, acceleration=protocol.acceleration)
+        assert fast.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
+
+
+def test_lost_after_is_the_end_of_the_walk():
+    starts, wait, durations = draw_starts(70, 3), 60.0, np.array([20.0, 45.0])
+    margin = walk_margin(walk(starts, LDVS, 0.6, wait + durations[-1]))
+    ours = lost_after(starts, LDVS, 0.6, wait, durations)
+    for lost, duration in zip(ours, durations, strict=True):
+        assert np.array_equal(lost, (margin[600 : 600 + round(10 * duration)] <= 0).any(axis=0))
+    assert 0 < ours[0].sum() < ours[1].sum() < 70
+
+
+def test_a_stopped_run_goes_on_and_ends_the_same(tmp_path):
+    class Stop(Exception):
+        pass
+
+    def until(rows: int):
+        done = iter(range(rows))
+
+        def told(_: float) -> None:
+            if next(done, None) is None:
+                raise Stop
+
+        return told
+
+    keys = ("ldvs-below-hws", "hws-late", "p2")
+    protocol = replace(TINY, velocities=(0.1, 0.3, 0.5, 0.6))
+    whole, _ = reproduce(tmp_path / "whole", protocol, only=keys)
+    with pytest.raises(Stop):
+        reproduce(tmp_path / "stopped", protocol, only=keys, progress=until(9))
+    table = json.loads((tmp_path / "stopped" / "claims.json").read_text())
+    assert [row["key"] for row in table["claims"]] == ["p2", "ldvs-below-hws"]
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "stopped" / "measurements").iterdir()}
+    assert len(kept) == 10
+    rows, _ = reproduce(tmp_path / "stopped", protocol, only=keys)
+    assert rows == whole
+    assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
+    for name in ("claims.md", "claims.json"):
+        assert (tmp_path / "stopped" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_rows_of_another_protocol_are_kept_apart(tmp_path):
+    measure("hws", TINY, tmp_path)
+    assert measure("hws", replace(TINY, seed=1), tmp_path).sizes["start"] == 21
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_everything_is_written(tmp_path):
+    told = []
+    rows, files = reproduce(tmp_path, TINY, progress=told.append)
+    assert len(rows) == len(CLAIMS)
+    assert sum(told) == pytest.approx(1.0)
+    assert all(path.stat().st_size > 0 for path in files)
+    assert {path.suffix for path in files} == {".md", ".json", ".pdf", ".png", ".nc"}
+    assert len(files) == 2 + 3 * len(FIGURES)
+    text = (tmp_path / "claims.md").read_text()
+    assert all(claim.command in text for claim in CLAIMS)
+    assert str(tmp_path) not in text
+    data = xr.load_dataset(tmp_path / "figures" / "figure-3-walk.nc", engine="h5netcdf")
+    assert data.flss.sel(curve="hws", velocity=0.3) == pytest.approx(flss(HWS, [0.3], starts=21).flss.item())
+
+
+def test_nonsense_gets_a_clear_sentence_and_destroys_nothing(tmp_path):
+    with pytest.raises(InputError, match="valid keys: ideal"):
+        reproduce(tmp_path, TINY, only=("no such claim",))
+    measure("hws", TINY, tmp_path / "measurements")
+    path = min((tmp_path / "measurements").iterdir())
+    path.write_bytes(b"not a dataset")
+    with pytest.raises(InputError, match="delete it"):
+        reproduce(tmp_path, TINY, only=("hws-late", "hws-diminishes"))
+    assert path.read_bytes() == b"not a dataset"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        reproduce(tmp_path / "file", TINY)
+
+
+SET = """
+[[set]]
+window = "walk"
+velocities = [{v}]
+command = "made up"
+symmetric = {{ p32_i = 4.0, p33_i = 0.3, p32_c = 0.5, p4_i = 1 }}
+"""
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """Let another file be the table of found sets."""
+
+    def use(text: str):
+        path = tmp_path / f"sets-{len(list(tmp_path.iterdir()))}.toml"
+        path.write_text(text)
+        sets = found.found_sets(path)
+        monkeypatch.setattr(found, "found_sets", lambda: sets)
+        monkeypatch.setattr("hexmj.quantities.found_sets", lambda: sets)
+        return sets
+
+    return use
+
+
+def test_found_sets_feed_curves_and_claims(table, tmp_path):
+    table("".join(SET.format(v=v) for v in ("0.3", "0.6", "0.1, 0.7")))
+    lost = measure("ideal", TINY, tmp_path / "out").lost
+    assert (lost.sel(window="walk") >= 0).all()
+    assert (lost.sel(window="start") == -1).all()
+    assert (measure("wide", TINY, tmp_path / "out").lost.sel(window="walk") >= 0).all()
+    verdicts = [
+        judge(Claim("a", "5", "", "", Band(Weight(p, "p32_i"), (0.3, 0.6), most=0.1)), {}).verdicts
+        for p in ("p33_i", "p32_c")
+    ]
+    assert verdicts == [{"walk": "agrees", "start": NOT_SEARCHED}, {"walk": "differs", "start": NOT_SEARCHED}]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[[set", "cannot be read as TOML"),
+        (SET.format(v="0.1") * 2, "two sets"),
+        (SET.format(v="1.5"), "velocities"),
+        (SET.format(v="0.1").replace("walk", "long"), "valid names: walk, start"),
+        (SET.format(v="0.1").replace("p33_i", "p34_i"), "no parameter of the HWS form"),
+        (SET.format(v="0.1").replace("command", "by"), "missing or unknown"),
+    ],
+)
+def test_a_damaged_table_of_sets_gets_a_clear_sentence(table, text, words):
+    with pytest.raises(InputError, match=words):
+        table(text)
+
+
+def test_the_shipped_table_of_sets_can_be_read():
+    assert all(one.command for one in found.found_sets())
+
+
+def test_the_papers_protocol_is_the_default():
+    assert Protocol() == FULL
