@@ -40,7 +40,7 @@ def test_help_names_every_command_and_imports_nothing_slow():
     assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
 
 
-@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search", "reproduce"])
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search"])
 def test_every_command_has_help_with_units_and_defaults(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0
