@@ -255,6 +255,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("results/bench"), help="folder (default: %(default)s)")
     parser.add_argument("--share", type=float, default=1.0, help="multiplies starts and times (default: %(default)s)")
     options = parser.parse_args(arguments)
+    if not 0 < options.share <= 10:
+        parser.error(f"share = {options.share}; expected above 0 and at most 10")
     folder = results_folder(options.out, (FIGURE, DATA))
     console = Console()
     console.width = max(console.width, 120)  # or the table is cut off

@@ -54,6 +54,7 @@ def _slabs(size: int, seed: int, network: Network) -> Iterator[np.ndarray]:
 
 
 def _check_draw(size: int, seed: int) -> None:
+    """Refuse a number of starts or a seed that makes no sense."""
     if not (isinstance(size, int) and 1 <= size <= MOST_STARTS):
         raise InputError(f"starts = {size}; expected a whole number of at least 1 and at most {MOST_STARTS}")
     if not (isinstance(seed, int) and seed >= 0):
