@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from hexmj import LDVS, compare, draw_starts, insect
-from hexmj.clock import stopped_clock
-from hexmj.kinematics import tips_to_joints
+from hexmj import LDVS, compare, draw_starts
 from hexmj.network import NetworkRun
-from hexmj.physical_walks import physical_outcomes
-from hexmj.settling import Settled, settle
-from hexmj.targets import TipTargets
+from hexmj.physics import insect
+from hexmj.physics.clock import stopped_clock
+from hexmj.physics.kinematics import tips_to_joints
+from hexmj.physics.physical_walks import physical_outcomes
+from hexmj.physics.settling import Settled, settle
+from hexmj.physics.targets import TipTargets
 
 FLYGYM = Path(__file__).parents[1] / ".venv-flygym" / "bin" / "python"
 VELOCITY, DURATION = 0.1, 20.0  # nobody falls, so both loops take the same steps

@@ -8,8 +8,9 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from hexmj import LDVS, Film, draw_starts, insect, physical_walk, record, render
-from hexmj.take import Take
+from hexmj import LDVS, Film, draw_starts, physical_walk, record, render
+from hexmj.film.take import Take
+from hexmj.physics import insect
 
 FLSS = "-m", "hexmj", "flss", "--velocities", "0.5"
 IMPORTS = "-c", "import numba, xarray"

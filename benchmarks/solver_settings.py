@@ -21,11 +21,12 @@ import mujoco
 import numpy as np
 
 from benchmarks.table import print_table
-from hexmj import LDVS, Body, Network, SimulationError, draw_starts, insect
+from hexmj import LDVS, Body, Network, SimulationError, draw_starts
 from hexmj.loss_frequency import wilson_interval
-from hexmj.physical_walks import physical_outcomes
+from hexmj.physics import insect
+from hexmj.physics.physical_walks import physical_outcomes
+from hexmj.physics.settling import Settled, settle
 from hexmj.results import json_text, write_whole
-from hexmj.settling import Settled, settle
 
 VELOCITY, DURATION = 0.5, 40.0
 FINEST = "time step / 4"

@@ -7,14 +7,15 @@ unit of the network is 1 mm / V_p.  Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from hexmj.gl import prefer_egl
+from hexmj.film.gl import prefer_egl
 
 if TYPE_CHECKING:
-    from hexmj.body import Body as Body
     from hexmj.comparison import compare as compare
     from hexmj.comparison import physical_flss as physical_flss
     from hexmj.errors import InputError as InputError
     from hexmj.errors import SimulationError as SimulationError
+    from hexmj.film.video import Film as Film
+    from hexmj.film.video import render as render
     from hexmj.legs import CENTRED as CENTRED
     from hexmj.legs import FIG1 as FIG1
     from hexmj.legs import Geometry as Geometry
@@ -31,24 +32,23 @@ if TYPE_CHECKING:
     from hexmj.parameters import Symmetric as Symmetric
     from hexmj.parameters import Weights as Weights
     from hexmj.parameters import load_model as load_model
-    from hexmj.physical_walks import PhysicalWalk as PhysicalWalk
-    from hexmj.physical_walks import physical_walk as physical_walk
-    from hexmj.problems import Problem as Problem
+    from hexmj.physics.body import Body as Body
+    from hexmj.physics.physical_walks import PhysicalWalk as PhysicalWalk
+    from hexmj.physics.physical_walks import physical_walk as physical_walk
     from hexmj.recording import load_recording as load_recording
     from hexmj.recording import record as record
     from hexmj.recording import record_plan as record_plan
     from hexmj.recording import save_recording as save_recording
-    from hexmj.search import Plan as Plan
+    from hexmj.search.problems import Problem as Problem
+    from hexmj.search.stages import Plan as Plan
     from hexmj.stability import loss_time as loss_time
     from hexmj.stability import stability_margin as stability_margin
     from hexmj.stability import support_polygon as support_polygon
     from hexmj.stability import walk_margin as walk_margin
-    from hexmj.video import Film as Film
-    from hexmj.video import render as render
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
-    "body": ("Body",),
+    "physics.body": ("Body",),
     "comparison": ("compare", "physical_flss"),
     "errors": ("InputError", "SimulationError"),
     "legs": ("CENTRED", "FIG1", "Geometry"),
@@ -64,12 +64,12 @@ _MODULES = {
         "Weights",
         "load_model",
     ),
-    "physical_walks": ("PhysicalWalk", "physical_walk"),
-    "problems": ("Problem",),
+    "physics.physical_walks": ("PhysicalWalk", "physical_walk"),
+    "search.problems": ("Problem",),
     "recording": ("load_recording", "record", "record_plan", "save_recording"),
-    "search": ("Plan",),
+    "search.stages": ("Plan",),
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),
-    "video": ("Film", "render"),
+    "film.video": ("Film", "render"),
     "walks": ("Walk",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}

@@ -9,11 +9,11 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, subcommand
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from hexmj.body import Body
 from hexmj.errors import InputError, RenderingError, SimulationError
-from hexmj.film import Film
+from hexmj.film.film import Film
 from hexmj.legs import GEOMETRIES, Geometry
 from hexmj.parameters import Acceleration, Network
+from hexmj.physics.body import Body
 
 _ABOUT = "A stick insect in MuJoCo, driven by the coordination network of 1998, and its stability measured twice."
 

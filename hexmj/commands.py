@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import InputError, RenderingError
-from hexmj.film import Film
+from hexmj.film.film import Film
 from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time, settings
 from hexmj.network import walk
 from hexmj.parameters import HWS, LDVS, Model, Symmetric, load_model
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from hexmj.cli import Compare, Conditions, Flss, Render, Reproduce, Search, Walk
-    from hexmj.problems import Problem
-    from hexmj.search import Plan
+    from hexmj.search.problems import Problem
+    from hexmj.search.stages import Plan
 
 
 def run_compare(options: "Compare") -> None:
@@ -165,8 +165,9 @@ def run_walk(options: "Walk") -> None:
 
 def run_render(options: "Render") -> None:
     """`hexmj render`: record if there is nothing to render yet, then render from the recordings."""
-    from hexmj import gl, recording
-    from hexmj.video import render
+    from hexmj import recording
+    from hexmj.film import gl
+    from hexmj.film.video import render
 
     if len(options.recordings) > 2:
         raise InputError(f"{len(options.recordings)} recordings were given; expected one, or two for side by side")
@@ -203,9 +204,9 @@ def run_render(options: "Render") -> None:
 
 def run_search(options: "Search") -> None:
     """`hexmj search`: the best parameters for one velocity or a range, and a verdict on fresh starts."""
-    from hexmj.convergence import convergence_figure
-    from hexmj.problems import Sample
-    from hexmj.search import search
+    from hexmj.search.convergence import convergence_figure
+    from hexmj.search.problems import Sample
+    from hexmj.search.stages import search
 
     conditions = options.conditions
     if options.verdict_seed == conditions.seed:
@@ -256,9 +257,9 @@ def run_search(options: "Search") -> None:
 
 def run_reproduce(options: "Reproduce") -> None:
     """`hexmj reproduce`: the paper's claims, judged, and its figures."""
-    from hexmj.claims_table import HEADS, claims_json, summary
-    from hexmj.protocol import FULL, QUICK
-    from hexmj.reproduce import reproduce
+    from hexmj.paper.protocol import FULL, QUICK
+    from hexmj.paper.reproduce import reproduce
+    from hexmj.paper.table import HEADS, claims_json, summary
 
     protocol = replace(QUICK if options.quick else FULL, seed=options.seed)
     with progress_bar("reproducing") as progress:
@@ -274,8 +275,8 @@ def run_reproduce(options: "Reproduce") -> None:
 
 def _search_settings(options: "Search") -> "tuple[Problem, Plan]":
     """What to minimise and how, with fewer starts for physical walks."""
-    from hexmj.problems import Problem
-    from hexmj.search import Plan
+    from hexmj.search.problems import Problem
+    from hexmj.search.stages import Plan
 
     if options.velocity is not None and options.velocities is not None:
         raise InputError("--velocity and --velocities were both given; expected one velocity or one range")
@@ -303,7 +304,7 @@ def _recorded(
 ) -> "xr.Dataset":
     """A recording of one of the seed's starts."""
     from hexmj import recording
-    from hexmj.physical_walks import physical_walk
+    from hexmj.physics.physical_walks import physical_walk
 
     if start < 0:
         raise InputError(f"start = {start}; expected at least 0")
@@ -322,8 +323,9 @@ def _recorded(
 
 def _typical_gait(models: dict[str, Model], result: "xr.Dataset", conditions: "Conditions", out: Path) -> Path:
     """A video of the first model near V = 0.3, of the first start that neither fell nor lost stability, if any."""
-    from hexmj import gl, recording
-    from hexmj.video import render
+    from hexmj import recording
+    from hexmj.film import gl
+    from hexmj.film.video import render
 
     if sentence := gl.missing():
         raise RenderingError(sentence)
@@ -342,7 +344,7 @@ def _typical_gait(models: dict[str, Model], result: "xr.Dataset", conditions: "C
 def _summary(walked: "xr.Dataset") -> dict[str, Any]:
     """When a recorded walk lost stability or fell [time units], and its least margins [mm]."""
     from hexmj.comparison import REPORTED
-    from hexmj.insect import TRUNK
+    from hexmj.physics.insect import TRUNK
 
     summary: dict[str, Any] = {
         "time units": float(walked.time[-1]),

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.body import Body
 from hexmj.errors import InputError
-from hexmj.insect import TRUNK
 from hexmj.legs import LEGS
 from hexmj.loss_frequency import (
     checked_list,
@@ -19,11 +17,13 @@ from hexmj.loss_frequency import (
     settings,
     wilson_interval,
 )
-from hexmj.measurement import Outcomes
 from hexmj.parameters import PRESETS, Acceleration, Model, Network
-from hexmj.physical_walks import physical_outcomes
+from hexmj.physics.body import Body
+from hexmj.physics.insect import TRUNK
+from hexmj.physics.measurement import Outcomes
+from hexmj.physics.physical_walks import physical_outcomes
+from hexmj.physics.settling import settle
 from hexmj.progress import Progress
-from hexmj.settling import settle
 
 if TYPE_CHECKING:
     import xarray as xr

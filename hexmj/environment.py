@@ -39,17 +39,17 @@ from dm_control.rl import control
 from dm_control.utils import rewards
 from dm_env import specs
 
-from hexmj import insect
-from hexmj.body import Body
 from hexmj.errors import InputError
-from hexmj.kinematics import tips_to_joints
 from hexmj.legs import LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun, steps_within
 from hexmj.parameters import LDVS, Model, Network
-from hexmj.settling import settle
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.kinematics import tips_to_joints
+from hexmj.physics.settling import settle
+from hexmj.physics.targets import TipTargets
 from hexmj.stability import stability_margin
-from hexmj.targets import TipTargets
 
 LARGEST_OFFSET = 5.0
 """Greatest offset of a tip in each direction [mm]."""

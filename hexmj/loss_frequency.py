@@ -15,7 +15,7 @@ from hexmj.progress import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.body import Body
+    from hexmj.physics.body import Body
 
 WINDOWS = ("walk", "start")
 SAMPLE = 1000

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hexmj import insect
-from hexmj.body import Body
 from hexmj.comparison import REPORTED
 from hexmj.errors import InputError
-from hexmj.kinematics import LegDimensions, tips_to_joints
 from hexmj.legs import LEGS
 from hexmj.parameters import Network
-from hexmj.physical_walks import PhysicalWalk
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.kinematics import LegDimensions, tips_to_joints
+from hexmj.physics.physical_walks import PhysicalWalk
+from hexmj.physics.targets import TipTargets
 from hexmj.results import write_whole
 from hexmj.stability import loss_time, walk_margin
-from hexmj.targets import TipTargets
 from hexmj.walks import Walk
 
 _LEGS, _STEPS, _ONCE = ("step", "leg"), ("step",), ()

@@ -244,7 +244,7 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_history(run, tmp_path, monke
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexmj.search.refine", stop)
+    monkeypatch.setattr("hexmj.search.stages.refine", stop)
     code, out, error = run(*SEARCH, "--out", tmp_path)
     assert (code, out) == (130, "")
     assert error.endswith("hexmj: stopped\n")

@@ -9,16 +9,18 @@ from dm_control.viewer.runtime import Runtime, State
 from dm_env import TimeStep, specs
 from dm_env.test_utils import EnvironmentTestMixin
 
-from hexmj import environment, gl, insect
-from hexmj.body import Body
+from hexmj import environment
 from hexmj.errors import InputError
-from hexmj.kinematics import joints_to_tips
+from hexmj.film import gl
 from hexmj.legs import CENTRED, FIG1, LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.parameters import HWS, LDVS, Network
-from hexmj.physical_walks import physical_walk
-from hexmj.physics import drive
-from hexmj.settling import settle
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.drive import drive
+from hexmj.physics.kinematics import joints_to_tips
+from hexmj.physics.physical_walks import physical_walk
+from hexmj.physics.settling import settle
 from hexmj.stability import walk_margin
 
 ZEROS = np.zeros(18)

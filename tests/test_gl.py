@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from hexmj import gl
+from hexmj.film import gl
 
 SCREENS = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
 

@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from hexmj import insect
 from hexmj.errors import InputError
-from hexmj.insect import JOINTS, ROOT_QPOS, TRUNK
-from hexmj.kinematics import tips_to_joints
 from hexmj.legs import FIG1, LEGS, MIRROR
+from hexmj.physics import insect
+from hexmj.physics.insect import JOINTS, ROOT_QPOS, TRUNK
+from hexmj.physics.kinematics import tips_to_joints
 
 STANDING_HEIGHT = 10.0  # mm
 LIFT = 12.0  # mm

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from hexmj import insect
-from hexmj.kinematics import joints_to_tips, tips_to_joints
 from hexmj.legs import FIG1, LEGS, MIRROR
+from hexmj.physics import insect
+from hexmj.physics.kinematics import joints_to_tips, tips_to_joints
 
 MODEL = insect.load()
 DIMENSIONS = insect.dimensions(MODEL)

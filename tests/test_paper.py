@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj import found_sets as found
-from hexmj.claims_table import NOT_SEARCHED, judge, summary
 from hexmj.errors import InputError
-from hexmj.late_losses import lost_after
 from hexmj.loss_frequency import draw_starts, flss
 from hexmj.network import walk
-from hexmj.paper import CLAIMS, Claim
-from hexmj.paper_figures import FIGURES
+from hexmj.paper import found_sets as found
+from hexmj.paper.claims import CLAIMS, Claim
+from hexmj.paper.figures import FIGURES
+from hexmj.paper.late_losses import lost_after
+from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, Protocol
+from hexmj.paper.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
+from hexmj.paper.reproduce import measure, reproduce
+from hexmj.paper.rules import Answer, Band, Rule, Trend
+from hexmj.paper.table import NOT_SEARCHED, judge, summary
 from hexmj.parameters import HWS, LDVS, Acceleration
-from hexmj.protocol import FULL, MEASUREMENTS, QUICK, Protocol
-from hexmj.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
-from hexmj.reproduce import measure, reproduce
-from hexmj.rules import Answer, Band, Rule, Trend
 from hexmj.stability import walk_margin
 
 TINY = replace(
@@ -219,7 +219,7 @@ def table(tmp_path, monkeypatch):
         path.write_text(text)
         sets = found.found_sets(path)
         monkeypatch.setattr(found, "found_sets", lambda: sets)
-        monkeypatch.setattr("hexmj.quantities.found_sets", lambda: sets)
+        monkeypatch.setattr("hexmj.paper.quantities.found_sets", lambda: sets)
         return sets
 
     return use

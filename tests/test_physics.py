@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 from numba import cfunc
 
-from hexmj import insect
-from hexmj.body import Body
 from hexmj.comparison import compare, physical_flss
-from hexmj.divergence import replay
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
 from hexmj.loss_frequency import draw_starts
-from hexmj.measurement import Outcomes
 from hexmj.parameters import LDVS, UNCOORDINATED, Network
-from hexmj.physical_walks import physical_outcomes, physical_walk
-from hexmj.physics import drive
-from hexmj.settling import settle
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.divergence import replay
+from hexmj.physics.drive import drive
+from hexmj.physics.measurement import Outcomes
+from hexmj.physics.physical_walks import physical_outcomes, physical_walk
+from hexmj.physics.settling import settle
 
 OUTCOMES = tuple(Outcomes.__dataclass_fields__)
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj import insect
-from hexmj.body import Body
 from hexmj.errors import InputError
-from hexmj.kinematics import joints_to_tips
+from hexmj.film.take import Take
 from hexmj.legs import FIG1
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import walk
 from hexmj.parameters import LDVS, UNCOORDINATED, Network
-from hexmj.physical_walks import PhysicalWalk, physical_walk
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.kinematics import joints_to_tips
+from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
 from hexmj.recording import load_recording, record, record_plan, save_recording
-from hexmj.take import Take
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hexmj
-from hexmj import search_history
-from hexmj.convergence import convergence_figure
-from hexmj.covariance import CovarianceAdaptation
-from hexmj.domain import Domain
 from hexmj.errors import InputError
-from hexmj.evolution import SIGMA, Evolution, mutated, selection_probabilities
-from hexmj.problems import Form, Problem, Sample
-from hexmj.search import Plan, refine, run, search
-from hexmj.search_history import History
+from hexmj.search import history as search_history
+from hexmj.search.convergence import convergence_figure
+from hexmj.search.covariance import CovarianceAdaptation
+from hexmj.search.domain import Domain
+from hexmj.search.evolution import SIGMA, Evolution, mutated, selection_probabilities
+from hexmj.search.history import History
+from hexmj.search.problems import Form, Problem, Sample
+from hexmj.search.stages import Plan, refine, run, search
 
 TARGET = np.array([3.0, -2.0, 0.0, 6.0, 0.5, 1.0])
 """Where the test cost is least: real numbers but for parameters 2 (0) and 5 (1), which are binary."""

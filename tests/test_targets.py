@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from hexmj.body import Body
 from hexmj.errors import InputError
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun, walk
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Network
-from hexmj.targets import TipTargets
+from hexmj.physics.body import Body
+from hexmj.physics.targets import TipTargets
 
 
 def all_tips(body: Body, model=LDVS, velocity=0.6, steps=600, size=20, stretch=60):

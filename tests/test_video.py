@@ -11,14 +11,15 @@ import pytest
 import xarray as xr
 
 from film_reader import read_film
-from hexmj import gl, insect
 from hexmj.errors import InputError
-from hexmj.film import CAMERAS, Film
+from hexmj.film import gl
+from hexmj.film.film import CAMERAS, Film
+from hexmj.film.video import render
 from hexmj.loss_frequency import draw_starts
 from hexmj.parameters import UNCOORDINATED
-from hexmj.physical_walks import PhysicalWalk, physical_walk
+from hexmj.physics import insect
+from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
 from hexmj.recording import load_recording, record, record_plan, save_recording
-from hexmj.video import render
 
 DURATION = 24.0  # time units, 0.3 s
 
@@ -188,7 +189,7 @@ def test_whether_anything_can_be_rendered_is_known():
     kept = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
     for backend in ("glfw", "disable"):
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", "from hexmj import gl; gl.missing(); print(gl.missing())"],
+            [sys.executable, "-W", "error", "-c", "from hexmj.film import gl; gl.missing(); print(gl.missing())"],
             env=kept | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
             capture_output=True,
             text=True,

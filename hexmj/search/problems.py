@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from hexmj.body import Body
-from hexmj.domain import Domain
 from hexmj.errors import InputError
 from hexmj.loss_frequency import WINDOWS, draw_starts, observation_time, wilson_interval
 from hexmj.network import checked_velocities, first_loss, steps_within
 from hexmj.parameters import Acceleration, Model, Network, Symmetric
+from hexmj.physics.body import Body
+from hexmj.search.domain import Domain
 from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.settling import Settled
+    from hexmj.physics.settling import Settled
 
 Form = Literal["hws", "ldvs"]
 """Forms of the model, with nine and with ten parameters (Appendix A)."""
@@ -96,7 +96,7 @@ class Sample:
         velocity = np.random.default_rng([seed, 1]).uniform(problem.low, problem.high, size)
         settled = None
         if problem.body:
-            from hexmj.settling import settle
+            from hexmj.physics.settling import settle
 
             settled = settle(starts, problem.body, problem.network, threads)
         return cls(problem, starts, velocity, settled, threads)
@@ -138,7 +138,7 @@ class Sample:
         ends = np.array(steps) * dt
         longest = ends.max(axis=0)
         if self.settled:
-            from hexmj.physical_walks import physical_outcomes
+            from hexmj.physics.physical_walks import physical_outcomes
 
             time = float(longest.max())
             outcomes = physical_outcomes(

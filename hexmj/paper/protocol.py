@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.found_sets import found_set
 from hexmj.gaits import PAIRS, limit_gait
-from hexmj.late_losses import lost_after
 from hexmj.legs import LEGS
 from hexmj.loss_frequency import SAMPLE, WINDOWS, draw_starts, observation_time
 from hexmj.network import NetworkRun, first_loss, steps_within
+from hexmj.paper.found_sets import found_set
+from hexmj.paper.late_losses import lost_after
 from hexmj.parameters import PRESETS, Acceleration, Model, Network, Symmetric
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hexmj.body import Body
 from hexmj.parameters import Network
+from hexmj.physics.body import Body
 from hexmj.walks import Walk
 
 

@@ -16,14 +16,14 @@ from mujoco.batch import Batch
 from numba import njit
 from numpy.typing import ArrayLike
 
-from hexmj import insect
-from hexmj.clock import stopped_clock
-from hexmj.divergence import raise_if_diverged
-from hexmj.joint_targets import JointTargets, Orders
 from hexmj.network import NetworkRun
 from hexmj.parameters import Acceleration, Model
+from hexmj.physics import insect
+from hexmj.physics.clock import stopped_clock
+from hexmj.physics.divergence import raise_if_diverged
+from hexmj.physics.joint_targets import JointTargets, Orders
+from hexmj.physics.settling import Settled
 from hexmj.progress import Progress
-from hexmj.settling import Settled
 from hexmj.threads import thread_count
 from hexmj.walks import Walk
 

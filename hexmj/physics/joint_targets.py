@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj import insect
-from hexmj.kinematics import tips_to_joints
 from hexmj.network import NetworkRun, steps_within
-from hexmj.settling import Settled
-from hexmj.targets import TipTargets
+from hexmj.physics import insect
+from hexmj.physics.kinematics import tips_to_joints
+from hexmj.physics.settling import Settled
+from hexmj.physics.targets import TipTargets
 from hexmj.walks import Walk
 
 STRETCH = 40

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from hexmj import insect
 from hexmj.errors import SimulationError
+from hexmj.physics import insect
 
 
 def raise_if_diverged(
@@ -30,7 +30,7 @@ def raise_if_diverged(
     saved = {name: values[i] for name, values in state.items()}
     try:
         np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, friction=model.pair_friction[0, 0])
-        written = f"its last good state is in {path} (hexmj.divergence.replay)"
+        written = f"its last good state is in {path} (hexmj.physics.divergence.replay)"
     except OSError as error:
         written = f"its last good state could not be written to {path}: {error.strerror}"
     raise SimulationError(f"start {ids[i]} diverged {when}, at {time:.4g} time units: {', '.join(kinds)}; {written}")

@@ -1,6 +1,6 @@
 """Figures 2-6 in the paper's layout, the phase histograms of Section 5.3, and footfall diagrams over the velocity.
 
-Each function takes the measurements it names (`hexmj.reproduce.measure`) and returns a figure and the data in it.
+Each function takes the measurements it names (`hexmj.paper.reproduce.measure`) and returns a figure and the data in it.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,8 +13,8 @@ from hexmj.figures import spans
 from hexmj.gaits import PAIRS, circular_mean, wilson_phase
 from hexmj.legs import LEGS
 from hexmj.loss_frequency import WINDOWS
-from hexmj.protocol import NO_SET
-from hexmj.quantities import Measured, kept_gaits, main_peak
+from hexmj.paper.protocol import NO_SET
+from hexmj.paper.quantities import Measured, kept_gaits, main_peak
 
 if TYPE_CHECKING:
     import xarray as xr

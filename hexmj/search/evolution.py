@@ -7,8 +7,8 @@ the nearer of 0 and 1 (`Domain.read`); the '0'-individual is individual 1 of the
 
 import numpy as np
 
-from hexmj.domain import Domain
 from hexmj.errors import InputError
+from hexmj.search.domain import Domain
 
 SIGMA = 0.3
 """Standard deviation of the mutation of individual i is i times this, in the units of the parameters."""

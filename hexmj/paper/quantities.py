@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hexmj.found_sets import found_sets
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
 from hexmj.loss_frequency import WILSON_Z, wilson_interval
-from hexmj.protocol import NO_SET
+from hexmj.paper.found_sets import found_sets
+from hexmj.paper.protocol import NO_SET
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Measured = Mapping[str, "xr.Dataset"]
-"""Measurements of `hexmj.protocol` by name, each with a leading velocity axis."""
+"""Measurements of `hexmj.paper.protocol` by name, each with a leading velocity axis."""
 
 PEAK = 0.05
 """Half the width of a narrow peak of phases."""

@@ -9,15 +9,16 @@ import mujoco
 import numpy as np
 import xarray as xr
 
-from hexmj import gl, insect
 from hexmj.errors import InputError, RenderingError
-from hexmj.film import Film
-from hexmj.overlay import Overlay
+from hexmj.film import gl
+from hexmj.film.film import Film
+from hexmj.film.overlay import Overlay
+from hexmj.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.film.take import Take
+from hexmj.physics import insect
 from hexmj.progress import Progress
 from hexmj.results import write_whole
-from hexmj.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.stability import support_polygon
-from hexmj.take import Take
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""

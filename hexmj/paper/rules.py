@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from hexmj.quantities import Measured, Point, Quantity
+from hexmj.paper.quantities import Measured, Point, Quantity
 
 END = 0.05
 """A range of velocities is covered if its ends are met this closely."""

@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hexmj.loss_frequency import WINDOWS
-from hexmj.paper import Claim
-from hexmj.quantities import Measured
-from hexmj.rules import Answer
+from hexmj.paper.claims import Claim
+from hexmj.paper.quantities import Measured
+from hexmj.paper.rules import Answer
 
 NOT_SEARCHED = "not yet searched"
 SAME = "same"

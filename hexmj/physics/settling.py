@@ -7,14 +7,14 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import ArrayLike
 
-from hexmj import insect
-from hexmj.body import Body
-from hexmj.clock import stopped_clock
-from hexmj.divergence import raise_if_diverged
 from hexmj.errors import InputError, SimulationError
-from hexmj.kinematics import tips_to_joints
 from hexmj.network import checked_starts
 from hexmj.parameters import Network
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.clock import stopped_clock
+from hexmj.physics.divergence import raise_if_diverged
+from hexmj.physics.kinematics import tips_to_joints
 from hexmj.threads import thread_count
 
 AT_REST = 5.0

@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.kinematics import LegDimensions
 from hexmj.legs import LEGS, SIDE
+from hexmj.physics.kinematics import LegDimensions
 
 JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
 """A leg's joints from the body outwards; their angles are protraction, levation, the knee's inner angle."""
@@ -70,7 +70,7 @@ def load(timestep: float = 0.001, friction: float = 1.0, *, looks: bool = True) 
 def mjcf() -> str:
     """The insect's MJCF text."""
     packaged = files("hexmj") / "assets"
-    folder = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
+    folder = packaged if packaged.is_dir() else Path(__file__).parents[2] / "assets"
     return (folder / "stick_insect.xml").read_text(encoding="utf-8")
 
 

@@ -8,12 +8,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hexmj.claims_table import Row, claims_json, claims_markdown, judge
 from hexmj.errors import InputError
-from hexmj.paper import CLAIMS, Claim
-from hexmj.paper_figures import FIGURES
+from hexmj.paper.claims import CLAIMS, Claim
+from hexmj.paper.figures import FIGURES
+from hexmj.paper.protocol import COSTS, FULL, MEASUREMENTS, Protocol
+from hexmj.paper.table import Row, claims_json, claims_markdown, judge
 from hexmj.progress import Progress
-from hexmj.protocol import COSTS, FULL, MEASUREMENTS, Protocol
 from hexmj.results import json_text, results_folder, save_dataset, write_whole
 
 if TYPE_CHECKING:

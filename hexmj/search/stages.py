@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from hexmj.covariance import CovarianceAdaptation
 from hexmj.errors import InputError
-from hexmj.evolution import Evolution
-from hexmj.problems import Problem, Sample
 from hexmj.progress import Progress
-from hexmj.search_history import Costs, History
+from hexmj.search.covariance import CovarianceAdaptation
+from hexmj.search.evolution import Evolution
+from hexmj.search.history import Costs, History
+from hexmj.search.problems import Problem, Sample
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hexmj import insect
-from hexmj.physics import Stretch
-from hexmj.settling import Settled
+from hexmj.physics import insect
+from hexmj.physics.drive import Stretch
+from hexmj.physics.settling import Settled
 from hexmj.stability import loss_time
 from hexmj.walks import Walk
 

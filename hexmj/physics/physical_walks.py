@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.body import Body
-from hexmj.measurement import Outcomes, Tally, measured_walk
 from hexmj.network import first_loss, walk
 from hexmj.parameters import Acceleration, Model, Network
-from hexmj.physics import drive
+from hexmj.physics.body import Body
+from hexmj.physics.drive import drive
+from hexmj.physics.measurement import Outcomes, Tally, measured_walk
+from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress
-from hexmj.settling import Settled, settle
 from hexmj.walks import Walk
 
 

@@ -7,8 +7,8 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from hexmj.film.take import Take
 from hexmj.legs import LEGS
-from hexmj.take import Take
 
 INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
 GREEN, RED = (22, 122, 56), (192, 28, 22)

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.insect import TRUNK
+from hexmj.physics.insect import TRUNK
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,8 @@
 import cmaes
 import numpy as np
 
-from hexmj.domain import Domain
 from hexmj.errors import InputError
+from hexmj.search.domain import Domain
 
 STEP = 0.5
 """Initial standard deviation, as a fraction of half the domain."""

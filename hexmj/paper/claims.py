@@ -11,8 +11,8 @@ phases 0.655 and 0.714 of HWS, stood in the README already):
 
 from dataclasses import dataclass
 
-from hexmj.quantities import Lost, Named, Phase, Regime, Scatter, Weight
-from hexmj.rules import Band, Rule, Trend
+from hexmj.paper.quantities import Lost, Named, Phase, Regime, Scatter, Weight
+from hexmj.paper.rules import Band, Rule, Trend
 
 CLOSE, FITS, ABOUT_ZERO = 0.05, 0.02, 0.01
 EVERY = (0.1, 0.9)

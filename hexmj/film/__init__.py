@@ -1,0 +1,1 @@
+"""Gait videos from recordings."""

@@ -1,0 +1,1 @@
+"""The paper's Section 5: claims, rules, measurements, figures."""

@@ -1,0 +1,1 @@
+"""The insect in MuJoCo: plan in, measured walk out."""

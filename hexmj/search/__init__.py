@@ -1,0 +1,1 @@
+"""Minimisation of the cost function (paper, Section 4)."""
