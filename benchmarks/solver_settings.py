@@ -68,7 +68,7 @@ class _CoarseBody(Body):
 
 def with_model(settled: Settled, searched: bool = False, **options: Any) -> Settled:
     """The same starts with other values in `mjOption`, or with pairs of geoms that MuJoCo must search for."""
-    model = insect.load(settled.mujoco_model.opt.timestep, settled.body.friction, looks=False)
+    model = insect.load(settled.mujoco_model.opt.timestep, settled.body, looks=False)
     if searched:
         spec = mujoco.MjSpec.from_string(insect.mjcf())
         spec.compiler.discardvisual = True

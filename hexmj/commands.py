@@ -12,6 +12,7 @@ from hexmj.film.film import Film
 from hexmj.loss_frequency import SAMPLE, draw_starts, flss, observation_time, settings
 from hexmj.network import walk
 from hexmj.parameters import HWS, LDVS, Model, Symmetric, load_model
+from hexmj.physics.body import Body
 from hexmj.progress import progress_bar
 from hexmj.results import json_text, results_folder, save_dataset, save_manifest, write_whole
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from hexmj.cli import Compare, Conditions, Flss, Render, Reproduce, Search, Walk
     from hexmj.search.problems import Problem
     from hexmj.search.stages import Plan
+
+
+TOLD = ("vp", "step_height", "standing_height", "lift_time", "friction", "contact_gap")
+"""Conditions of a body that stand beside every physical measure; the others only if they are not the usual ones."""
 
 
 def run_compare(options: "Compare") -> None:
@@ -396,7 +401,8 @@ def _conditions_line(conditions: "Conditions", physical: bool) -> str:
     if conditions.acceleration is not None:
         line += f"; a = {conditions.acceleration:g} from V = {conditions.initial_velocity:g}"
     if physical:
-        line += "; " + ", ".join(f"{key} {value:g}" for key, value in asdict(conditions.body).items())
+        told, usual = asdict(conditions.body), asdict(Body())
+        line += "; " + ", ".join(f"{key} {told[key]}" for key in told if key in TOLD or told[key] != usual[key])
     return line
 
 

@@ -108,7 +108,7 @@ def load(
         raise InputError(f"actions = {actions!r}; valid names: {', '.join(TASKS)}")
     task = TASKS[actions](velocity, model, body, network, int(steps_within(duration, network)), seed)
     substeps = body.substeps(network)
-    compiled = insect.load(body.seconds(network) / substeps, body.friction)
+    compiled = insect.load(body.seconds(network) / substeps, body)
     return control.Environment(InsectPhysics.from_model(wrapper.MjModel(compiled)), task, n_sub_steps=substeps)
 
 

@@ -33,16 +33,22 @@ class NetworkRun:
         *,
         network: Network | None = None,
         acceleration: Acceleration | None = None,
+        at_speed: bool = False,
         threads: int | None = None,
     ) -> None:
-        """Put every start at time 0; the arguments are those of `walk`."""
+        """Put every start at time 0; the arguments are those of `walk`.
+
+        With `at_speed` they walk at the final velocity at once, and an acceleration takes place only after `restart`.
+        """
         self.network = network or Network()
         self.done = 0
         self._starts = checked_starts(starts, self.network)
         velocity = checked_velocities(velocity, len(self._starts), acceleration)
         self._settings = *_, k = _settings(model, self.network, acceleration)
         self._blocks = np.empty((-(-len(velocity) // lanes.LANES), lanes.ROWS * lanes.LANES))
-        lanes.begin_blocks(self._blocks, self._starts, _first_velocity(velocity, acceleration), velocity, k)
+        first_velocity = _first_velocity(velocity, None if at_speed else acceleration)
+        lanes.begin_blocks(self._blocks, self._starts, first_velocity, velocity, k)
+        self._restart_velocity = _first_velocity(velocity, acceleration)
         self._threads = threads
 
     def advance(self, steps: int) -> Walk:
@@ -58,6 +64,43 @@ class NetworkRun:
         time = np.arange(self.done - steps + 1, self.done + 1) * self.network.dt
         geometry = self.network.geometry
         return Walk(time, velocity, x, np.broadcast_to(geometry.y, x.shape), stance, geometry)
+
+    @property
+    def tips(self) -> np.ndarray:
+        """Where the tips are now, (start, leg) [mm]."""
+        return self._read(lanes.X)
+
+    @property
+    def standing(self) -> np.ndarray:
+        """Which legs retract now, (start, leg)."""
+        return self._read(lanes.S) == 1.0
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Go on from other tips and states than the network's own, both (start, leg): as measured, or disturbed."""
+        self._write(lanes.X, tips)
+        self._write(lanes.S, standing)
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
+
+        With an acceleration they begin at its V_r(0) again.
+        """
+        legs = {lanes.X: tips, lanes.S: 1.0, lanes.S_OLD: 1.0, lanes.AEP: self.network.aep0}
+        for row, values in (legs | {lanes.PEP_SHIFT: 0.0, lanes.AEP_SHIFT: 0.0}).items():
+            self._write(row, np.where(which[:, None], values, self._read(row)))
+        for row, values in {lanes.V: self._restart_velocity, lanes.DONE: 0.0}.items():
+            self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
+
+    def _read(self, row: int, rows: int = 6) -> np.ndarray:
+        """A variable of every start, (start, leg), or (start, 1) with one row."""
+        return self._rows(row, rows).transpose(0, 2, 1).reshape(-1, rows)[: len(self._starts)]
+
+    def _write(self, row: int, values: np.ndarray, rows: int = 6) -> None:
+        padded = np.concatenate([values, np.repeat(values[-1:], -len(values) % lanes.LANES, axis=0)])
+        self._rows(row, rows)[:] = padded.reshape(-1, lanes.LANES, rows).transpose(0, 2, 1)
+
+    def _rows(self, row: int, rows: int) -> np.ndarray:
+        return self._blocks.reshape(len(self._blocks), lanes.ROWS, lanes.LANES)[:, row : row + rows]
 
 
 def walk(

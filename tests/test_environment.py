@@ -14,6 +14,7 @@ from hexmj.errors import InputError
 from hexmj.film import gl
 from hexmj.legs import CENTRED, FIG1, LEGS
 from hexmj.loss_frequency import draw_starts
+from hexmj.network import NetworkRun
 from hexmj.parameters import HWS, LDVS, Network
 from hexmj.physics import insect
 from hexmj.physics.body import Body
@@ -68,7 +69,7 @@ def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
     walked = physical_walk(starts, LDVS, velocity, duration)
     settled, m = settle(starts), body.substeps(Network())
     standing = np.zeros((2, 1000 * m + 1, 6), dtype=bool)
-    for stretch in drive(settled, LDVS, velocity, duration):
+    for stretch in drive(settled, NetworkRun(settled.starts, LDVS, velocity, network=settled.network), duration):
         standing[stretch.ids, stretch.first : stretch.first + stretch.standing.shape[1]] = stretch.standing
     margins = walk_margin(walked.measured)
     walking = environment.load(velocity, actions="tips", duration=duration)

@@ -1,12 +1,16 @@
 """The compiled insect: masses, symmetry, postures, ranges, names and the physics of standing."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, MIRROR
 from hexmj.physics import insect
+from hexmj.physics.body import Body, Ground
 from hexmj.physics.insect import JOINTS, ROOT_QPOS, TRUNK
 from hexmj.physics.kinematics import tips_to_joints
 
@@ -249,7 +253,7 @@ def test_standing_does_not_depend_on_the_time_step(standing: mujoco.MjData):
 
 
 def test_every_load_is_a_copy_of_its_own():
-    first, second = insect.load(timestep=0.0005, friction=0.3), insect.load()
+    first, second = insect.load(0.0005, Body(friction=0.3)), insect.load()
     assert (first.opt.timestep, second.opt.timestep) == (0.0005, 0.001)
     assert set(first.pair_friction[:, :2].flat) == {0.3}
     assert set(second.pair_friction[:, :2].flat) == {1.0}
@@ -267,9 +271,49 @@ def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):
     assert np.array_equal(*seen)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("timestep", 0.0), ("timestep", 0.002), ("friction", -1.0), ("friction", np.nan)]
-)
-def test_values_without_sense_are_refused(name: str, value: float):
-    with pytest.raises(InputError, match=name):
-        insect.load(**{"timestep": 0.001, "friction": 1.0} | {name: value}, looks=True)
+@pytest.mark.parametrize("timestep", [0.0, -0.001, 0.002, np.nan])
+def test_time_steps_without_sense_are_refused(timestep: float):
+    with pytest.raises(InputError, match="timestep"):
+        insect.load(timestep)
+
+
+def centre_of_mass(model: mujoco.MjModel) -> np.ndarray:
+    """At home, from the root [mm]."""
+    data = at_home(model)
+    mujoco.mj_forward(model, data)
+    return data.subtree_com[model.body("mesothorax").id] - data.qpos[:3]
+
+
+@pytest.mark.parametrize("x", [-9.4, 0.0, 5.0])
+@pytest.mark.parametrize("changed", [Body(), Body(leg_mass=0.01), Body(load=1.0)], ids=["own", "massless legs", "load"])
+def test_masses_are_where_they_are_asked_for(changed: Body, x: float):
+    model = insect.load(body=replace(changed, centre_of_mass=x))
+    assert_allclose(centre_of_mass(model)[:2], [x, 0.0], atol=0.03 if x == 0.0 else 1e-6)
+    assert_allclose(model.body_mass.sum(), 1.0 + changed.load, rtol=1e-5)
+    legs = [model.body(f"{leg}_{part}").id for leg in LEGS for part in ("coxa", "femur", "tibia")]
+    own = insect.load()
+    assert_allclose(model.body_mass[legs], changed.leg_mass * own.body_mass[legs])
+
+
+@pytest.mark.parametrize("ground", ["step", "gap", "hurdle", "rough"])
+def test_all_ground_is_touched_alike(ground: Ground):
+    """Every pair has the contact settings of the MJCF, feet and trunk each touch every piece."""
+    flat, model = insect.load(), insect.load(body=Body(ground=ground))
+    pieces = model.npair // flat.npair
+    assert model.npair == pieces * flat.npair == (3 if ground == "gap" else 2) * 11
+    for name in ("dim", "solref", "solreffriction", "solimp", "margin", "gap", "friction"):
+        values = getattr(model, f"pair_{name}")
+        assert_array_equal(values, np.broadcast_to(getattr(flat, f"pair_{name}")[0], values.shape))
+
+
+def test_feet_grasp_with_the_force_asked_for():
+    model = insect.load(body=Body(grasp=2.0))
+    assert model.nu == insect.JOINT_ACTUATORS + 6
+    assert_allclose(model.actuator_gainprm[insect.JOINT_ACTUATORS :, 0], 2.0 * insect.MASS * insect.GRAVITY)
+    assert_array_equal(insect.load(body=Body(grasp=0.0)).nu, insect.JOINT_ACTUATORS)
+
+
+def test_mass_and_gravity_are_those_of_the_model():
+    model = insect.load()
+    assert_allclose(model.body_mass.sum(), insect.MASS, rtol=1e-5)
+    assert model.opt.gravity[2] == -insect.GRAVITY

@@ -118,6 +118,39 @@ def test_advancing_in_parts_is_one_walk():
         assert np.array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
 
 
+def test_restarted_starts_begin_anew_and_leave_the_others_alone():
+    rng = np.random.default_rng(31)
+    starts, tips = random_starts(rng, 70), random_starts(rng, 70)
+    which = rng.random(70) < 0.5
+    run = NetworkRun(starts, LDVS, 0.4)
+    run.advance(300)
+    run.restart(which, tips)
+    after, anew, on = run.advance(200), walk(tips, LDVS, 0.4, 20.0), walk(starts, LDVS, 0.4, 50.0)
+    assert np.array_equal(after.x[:, which], anew.x[:, which])
+    assert np.array_equal(after.stance[:, which], anew.stance[:, which])
+    assert np.array_equal(after.x[:, ~which], on.x[300:, ~which])
+
+
+def test_only_restarted_starts_accelerate():
+    starts, which = random_starts(np.random.default_rng(32), 3), np.array([True, False, True])
+    run = NetworkRun(starts, LDVS, 0.5, acceleration=Acceleration(0.01), at_speed=True)
+    assert np.array_equal(run.advance(100).x, walk(starts, LDVS, 0.5, 10.0).x)
+    run.restart(which, run.tips)
+    velocity = run.advance(60).velocity
+    assert np.array_equal(velocity[:, which], np.repeat(0.1 + 0.01 * (np.arange(60)[:, None] * 0.1), 2, axis=1))
+    assert (velocity[:, 1] == 0.5).all()
+
+
+def test_seeing_what_was_planned_changes_nothing():
+    starts = random_starts(np.random.default_rng(33), 65)
+    run, parts = NetworkRun(starts, LDVS, 0.4), []
+    for _ in range(100):
+        parts.append(run.advance(1).x)
+        assert np.array_equal(parts[-1][0], run.tips)
+        run.see(run.tips, run.standing)
+    assert np.array_equal(np.concatenate(parts), walk(starts, LDVS, 0.4, 10.0).x)
+
+
 @pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
 @pytest.mark.parametrize("order", ["printed", "undelayed"])
 def test_mirrored_starts_give_mirrored_walks(model, order):

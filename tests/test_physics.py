@@ -4,16 +4,18 @@ import mujoco
 import numpy as np
 import pytest
 from numba import cfunc
+from numpy.testing import assert_allclose
 
 from hexmj.comparison import compare, physical_flss
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
 from hexmj.loss_frequency import draw_starts
+from hexmj.network import NetworkRun
 from hexmj.parameters import LDVS, UNCOORDINATED, Network
 from hexmj.physics import insect
 from hexmj.physics.body import Body
 from hexmj.physics.divergence import replay
-from hexmj.physics.drive import drive
+from hexmj.physics.drive import Push, drive
 from hexmj.physics.measurement import Outcomes
 from hexmj.physics.physical_walks import physical_outcomes, physical_walk
 from hexmj.physics.settling import settle
@@ -34,7 +36,7 @@ def walked():
 def test_settled_starts_stand_still_on_six_feet(settled):
     assert np.linalg.norm(settled.qvel[:, :3], axis=1).max() < 5.0
     assert (settled.qpos[:, 2] > 9.0).all()
-    first = next(iter(drive(settled, LDVS, 0.3, 10.0)))
+    first = next(iter(drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 10.0)))
     assert first.standing[:, 0].all()
 
 
@@ -63,15 +65,29 @@ def test_measured_tips_follow_the_plan(walked):
 
 def test_mujocos_clock_stops_only_while_insects_walk(settled):
     assert mujoco.get_mjcb_time() is None
-    for _ in drive(settled, LDVS, 0.3, 4.0):
+    for _ in drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 4.0):
         assert mujoco.get_mjcb_time() is not None
     assert mujoco.get_mjcb_time() is None
     mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
     try:
-        list(drive(settled, LDVS, 0.3, 4.0))
+        list(drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 4.0))
         assert mujoco.get_mjcb_time() is ours
     finally:
         mujoco.set_mjcb_time(None)
+
+
+def test_a_push_gives_the_momentum_asked_for():
+    """Without friction the ground holds nothing back: the whole insect moves aside by impulse over mass."""
+    settled = settle(draw_starts(3, 0), Body(friction=0.0))
+    speed = []
+    for impulse in (0.0, 30.0):
+        push = Push(np.array([impulse, -impulse, impulse]), np.array([2.0, 2.0, 1e9]))
+        plan = NetworkRun(settled.starts, UNCOORDINATED, 0.0)
+        centre = insect.sensors(settled.mujoco_model).centre_of_mass
+        y = np.concatenate([one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 8.0, push=push)], axis=1)
+        speed.append((y[:, -1] - y[:, -40]) / 39 / settled.mujoco_model.opt.timestep)  # mm/s
+    assert_allclose((speed[1] - speed[0])[:2] * insect.MASS, [30.0, -30.0], rtol=0.02)
+    assert speed[1][2] == speed[0][2]
 
 
 def test_every_bounce_counts_without_a_contact_gap():
@@ -137,7 +153,7 @@ def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_p
     with pytest.raises(
         SimulationError, match=r"start 1 diverged while walking at V = 0.3, at 0 time units: mjWARN_\w+"
     ) as error:
-        list(drive(broken, LDVS, 0.3, 10.0))
+        list(drive(broken, NetworkRun(broken.starts, LDVS, 0.3), 10.0))
     path = tmp_path / "diverged-start-1.npz"
     assert str(path) in str(error.value)
     model, data = replay(path)

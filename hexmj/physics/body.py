@@ -2,14 +2,21 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from hexmj.errors import InputError
 from hexmj.parameters import Network
 
+Ground = Literal["flat", "step", "gap", "hurdle", "rough"]
+"""Kinds of ground, see `Body.ground`."""
+
+SHORTEST_LEG = 31.0
+"""Length of the shortest leg, the middle one [mm]; no obstacle is taller."""
+
 
 @dataclass(frozen=True)
 class Body:
-    """Conditions of a physical walk; all of them are printed with every physical measure."""
+    """Conditions of a physical walk; those that matter or are not as usual are printed with every physical measure."""
 
     vp: float = 80.0
     """Velocity V_p of a protracting tip relative to the body [mm/s]; links the network's time unit, 1 mm / V_p,
@@ -29,6 +36,25 @@ class Body:
     """A foot that leaves the ground for no longer still stands in the measured polygon [ms]; 0 counts every bounce."""
     settling_time: float = 200.0
     """Time for which the insect stands before it walks [ms]; whether it has come to rest is checked."""
+    load: float = 0.0
+    """Weight carried at O, in multiples of the insect's own."""
+    centre_of_mass: float = 0.0
+    """How far ahead of O the centre of mass lies when all legs are at home [mm]; the animal's is at -9.4, 1.4 mm
+    behind the hind coxae.  The trunk's masses are moved, none is added."""
+    leg_mass: float = 1.0
+    """Mass of the legs as a fraction of the insect's own; the trunk makes up for it.  The paper's legs have none."""
+    grasp: float = 0.0
+    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight."""
+    ground: Ground = "flat"
+    """What lies ahead: nothing, a step up, a gap, a hurdle, or rough ground."""
+    ground_height: float = 3.0
+    """Height of step, hurdle or the highest bump of rough ground [mm]; a gap is as deep as a leg is long."""
+    ground_at: float = 50.0
+    """Where step, gap, hurdle or rough ground begin, ahead of O at the start [mm]."""
+    ground_length: float = 10.0
+    """Length of gap or hurdle along the way [mm]."""
+    ground_seed: int = 0
+    """Of the bumps of rough ground."""
 
     def __post_init__(self) -> None:
         bounds = {
@@ -38,13 +64,29 @@ class Body:
             "lift_time": (0.0, 1000.0, "ms"),
             "longest_substep": (0.001, 1.0, "ms"),
             "settling_time": (0.0, 10000.0, "ms"),
+            "leg_mass": (0.0, 2.0, "times the insect's own"),
+            "ground_height": (0.0, SHORTEST_LEG, "mm, the length of the shortest leg"),
+            "ground_length": (0.0, 1000.0, "mm"),
         }
         for name, (low, high, unit) in bounds.items():
             value = getattr(self, name)
             if not low < value <= high:
                 raise InputError(f"{name} = {value}; expected above {low:g} and at most {high:g} {unit}")
-        if not 0 <= self.contact_gap <= 1000:
-            raise InputError(f"contact_gap = {self.contact_gap}; expected 0 to 1000 ms")
+        closed = {
+            "contact_gap": (0.0, 1000.0, "ms"),
+            "load": (0.0, 10.0, "times the insect's weight"),
+            "grasp": (0.0, 100.0, "times the insect's weight"),
+            "centre_of_mass": (-30.0, 30.0, "mm"),
+            "ground_at": (45.0, 10000.0, "mm, ahead of the front feet"),
+        }
+        for name, (low, high, unit) in closed.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError(f"{name} = {value}; expected {low:g} to {high:g} {unit}")
+        if self.ground not in get_args(Ground):
+            raise InputError(f"ground = {self.ground!r}; valid names: {', '.join(get_args(Ground))}")
+        if not (isinstance(self.ground_seed, int) and self.ground_seed >= 0):
+            raise InputError(f"ground_seed = {self.ground_seed}; expected an integer of at least 0")
         if not 0 <= self.friction < math.inf:
             raise InputError(f"friction = {self.friction}; expected a finite number of at least 0")
 

@@ -1,5 +1,7 @@
 """A simulation that diverged is an error, never an outcome: its last good state is written, to be replayed."""
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import mujoco
@@ -8,10 +10,11 @@ from mujoco.batch import Batch
 
 from hexmj.errors import SimulationError
 from hexmj.physics import insect
+from hexmj.physics.body import Body
 
 
 def raise_if_diverged(
-    batch: Batch, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
+    batch: Batch, body: Body, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
 ) -> None:
     """A MuJoCo warning or a number that is not finite in one of `ids` ends everything; its state is written.
 
@@ -29,7 +32,7 @@ def raise_if_diverged(
     model = batch.model
     saved = {name: values[i] for name, values in state.items()}
     try:
-        np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, friction=model.pair_friction[0, 0])
+        np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, body=json.dumps(asdict(body)))
         written = f"its last good state is in {path} (hexmj.physics.divergence.replay)"
     except OSError as error:
         written = f"its last good state could not be written to {path}: {error.strerror}"
@@ -39,7 +42,7 @@ def raise_if_diverged(
 def replay(path: Path | str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A written state of divergence, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep, actuator)."""
     with np.load(path) as saved:
-        model = insect.load(float(saved["timestep"]), float(saved["friction"]))
+        model = insect.load(float(saved["timestep"]), Body(**json.loads(str(saved["body"]))))
         data = mujoco.MjData(model)
         for name in ("qpos", "qvel", "qacc_warmstart"):
             getattr(data, name)[:] = saved[name]

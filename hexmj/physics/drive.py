@@ -14,15 +14,13 @@ from typing import Any
 import numpy as np
 from mujoco.batch import Batch
 from numba import njit
-from numpy.typing import ArrayLike
 
-from hexmj.network import NetworkRun
-from hexmj.parameters import Acceleration, Model
 from hexmj.physics import insect
 from hexmj.physics.clock import stopped_clock
 from hexmj.physics.divergence import raise_if_diverged
 from hexmj.physics.joint_targets import JointTargets, Orders
 from hexmj.physics.settling import Settled
+from hexmj.plans import Plan
 from hexmj.progress import Progress
 from hexmj.threads import thread_count
 from hexmj.walks import Walk
@@ -45,7 +43,7 @@ class Stretch:
     standing: np.ndarray
     """(n, substep, leg) whether the ground carried the foot within the last `Body.contact_gap`."""
     force: np.ndarray
-    """(n, substep, actuator) torques of the joints [g mm^2/s^2]."""
+    """(n, substep, joint) torques of the joints [g mm^2/s^2]."""
     valid: np.ndarray
     """(n,) substeps up to the fall, that one included."""
     fell: np.ndarray
@@ -54,28 +52,44 @@ class Stretch:
     """(n,) targets out of reach."""
 
 
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A push from the side at the root, for each start; it lasts one stretch, `push_time`."""
+
+    impulse: np.ndarray
+    """(start,) to the left [g mm/s]."""
+    time: np.ndarray
+    """(start,) when it begins, rounded down to the beginning of a stretch [time units]."""
+
+
 def drive(
     settled: Settled,
-    model: Model,
-    velocity: ArrayLike,
+    plan: Plan,
     duration: float,
     *,
-    acceleration: Acceleration | None = None,
+    push: Push | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Stretch]:
-    """Walk settled starts, stretch by stretch; the arguments are those of `network.walk`.
+    """Walk settled starts by a plan, stretch by stretch.
+
+    Args:
+        settled: starts at rest.
+        plan: of the same starts, at time 0.
+        duration: observation time [time units of the network].
+        push: from the side.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
 
     Raises:
         SimulationError: a simulation that diverged; its state is written for `divergence.replay`.
     """
     network = settled.network
-    plan = NetworkRun(settled.starts, model, velocity, network=network, acceleration=acceleration, threads=1)
     targets = JointTargets(settled, plan, duration)
     batch = Batch(settled.mujoco_model, len(settled.starts), thread_count(threads))
     batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
     batch.bind("qacc_warmstart")[:] = settled.warmstart
-    columns = insect.sensors(settled.mujoco_model)
+    columns, root = insect.sensors(settled.mujoco_model), settled.mujoco_model.body("mesothorax").id
     unloaded = np.zeros((len(settled.starts), 6), dtype=int)
     longest_gap = settled.body.contact_gap / 1000.0 / settled.mujoco_model.opt.timestep
 
@@ -83,10 +97,14 @@ def drive(
         """Positions before the stretch, (n, 25), and what MuJoCo records in it."""
         ids = orders.ids
         before = {name: batch.bind(name)[ids] for name in ("qpos", "qvel", "qacc_warmstart")}
-        record = ("qpos", "sensordata", "actuator_force")
-        seen = batch.rollout(orders.joints.shape[1], orders.joints, record=record, ids=ids)
         time, speed = orders.plan.time[0] - network.dt, orders.plan.velocity[0]
-        raise_if_diverged(batch, ids, time, speed, before | {"ctrl": orders.joints})
+        if push:
+            now = (push.time >= time - 1e-9) & (push.time < time + len(orders.plan.time) * network.dt - 1e-9)
+            seconds = len(orders.plan.time) * settled.body.seconds(network)
+            batch.bind("xfrc_applied")[:, root, 1] = np.where(now, push.impulse / seconds, 0.0)
+        record = ("qpos", "sensordata", "actuator_force")
+        seen = batch.rollout(orders.control.shape[1], orders.control, record=record, ids=ids)
+        raise_if_diverged(batch, settled.body, ids, time, speed, before | {"ctrl": orders.control})
         return before["qpos"], seen
 
     with stopped_clock(), ThreadPoolExecutor(1) as stepper:
@@ -107,7 +125,7 @@ def drive(
                 qpos=np.concatenate([before[:, None], seen["qpos"][:, :-1]], axis=1),
                 sensors=seen["sensordata"],
                 standing=_standing(seen["sensordata"][:, :, columns.touch] > 0, unloaded, now.ids, longest_gap),
-                force=seen["actuator_force"],
+                force=seen["actuator_force"][:, :, : insect.JOINT_ACTUATORS],
                 valid=valid,
                 fell=fell,
                 unreachable=np.where(np.arange(now.missed.shape[1]) < valid[:, None], now.missed, 0).sum(axis=1),

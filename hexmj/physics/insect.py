@@ -6,9 +6,8 @@ reshape to (leg, joint).
 """
 
 import copy
-import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -17,6 +16,8 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.legs import LEGS, SIDE
+from hexmj.physics.body import Body
+from hexmj.physics.ground import lay_ground
 from hexmj.physics.kinematics import LegDimensions
 
 JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
@@ -30,6 +31,12 @@ ROOT_QPOS = 7
 
 ROOT_QVEL = 6
 """Numbers of `qvel` before the joints: the root's velocity (3) and angular velocity (3)."""
+
+MASS, GRAVITY = 1.0, 9810.0
+"""The insect's own mass [g], and the acceleration of gravity [mm/s^2]."""
+
+JOINT_ACTUATORS = 18
+"""Columns of `ctrl` that hold joint targets; with `Body.grasp` the adhesion of the six feet follows."""
 
 LONGEST_STEP = 0.001
 """The longest time step [s] that the gains and contacts of the MJCF allow."""
@@ -49,21 +56,18 @@ class Sensors:
     """Centre of mass of the whole insect in the world, (..., axis) [mm]."""
 
 
-def load(timestep: float = 0.001, friction: float = 1.0, *, looks: bool = True) -> mujoco.MjModel:
-    """The compiled insect on its plane; every call gives a copy of its own.
+def load(timestep: float = 0.001, body: Body | None = None, *, looks: bool = True) -> mujoco.MjModel:
+    """The compiled insect on its ground; every call gives a copy of its own.
 
     Args:
         timestep: integration step [s], at most the 0.001 that gains and contacts are made for.
-        friction: coefficient of sliding friction between the ground and feet or trunk.
+        body: friction, masses, adhesion and ground are taken from it.
         looks: with the geoms that are only to look at; without them it walks to the same bits, 2 % faster.
     """
     if not 0 < timestep <= LONGEST_STEP:
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {LONGEST_STEP} s")
-    if not 0 <= friction < math.inf:
-        raise InputError(f"friction = {friction}; expected a finite number, at least 0")
-    model = copy.copy(_compiled(looks))
+    model = copy.copy(_compiled(body or Body(), looks))
     model.opt.timestep = timestep
-    model.pair_friction[:, :2] = friction
     return model
 
 
@@ -118,8 +122,42 @@ def trunk_corners(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     return np.array(ends), np.array(radii)
 
 
-@cache
-def _compiled(looks: bool) -> mujoco.MjModel:
+@lru_cache(maxsize=16)
+def _compiled(body: Body, looks: bool) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(mjcf())
     spec.compiler.discardvisual = not looks
-    return spec.compile()
+    lay_ground(spec, body, LEGS, TRUNK)
+    if body.load:
+        load = spec.body("mesothorax").add_body(name="load", mass=body.load * MASS, inertia=3 * [4 * body.load * MASS])
+        load.explicitinertial = True
+    for leg in LEGS if body.grasp else ():
+        spec.add_actuator(
+            name=f"{leg}_grasp",
+            trntype=mujoco.mjtTrn.mjTRN_BODY,
+            target=f"{leg}_tibia",
+            gainprm=[body.grasp * MASS * GRAVITY] + 9 * [0.0],
+            ctrllimited=True,
+            ctrlrange=[0.0, 1.0],
+        )
+    model = spec.compile()
+    model.pair_friction[:, :2] = body.friction
+    if body.leg_mass != 1.0 or body.centre_of_mass != 0.0:
+        _redistribute(model, body)
+    return model
+
+
+def _redistribute(model: mujoco.MjModel, body: Body) -> None:
+    """Give the legs their share of the mass, and move the trunk's masses until the centre of mass lies there."""
+    legs = [model.body(f"{leg}_{part}").id for leg in LEGS for part in ("coxa", "femur", "tibia")]
+    trunk = [model.body(part).id for part in TRUNK]
+    in_legs, in_trunk = model.body_mass[legs].sum(), model.body_mass[trunk].sum()
+    for bodies, factor in ((legs, body.leg_mass), (trunk, 1.0 + in_legs / in_trunk * (1.0 - body.leg_mass))):
+        model.body_mass[bodies] *= factor
+        model.body_inertia[bodies] *= factor
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    offset = body.centre_of_mass - (data.subtree_com[model.body("mesothorax").id] - data.qpos[:3])[0]
+    model.body_ipos[trunk, 0] += offset * model.body_mass.sum() / model.body_mass[trunk].sum()
+    mujoco.mj_setConst(model, data)

@@ -4,11 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj.network import NetworkRun, steps_within
+from hexmj.network import steps_within
 from hexmj.physics import insect
 from hexmj.physics.kinematics import tips_to_joints
 from hexmj.physics.settling import Settled
 from hexmj.physics.targets import TipTargets
+from hexmj.plans import Plan
 from hexmj.walks import Walk
 
 STRETCH = 40
@@ -25,20 +26,20 @@ class Orders:
     """Index of the first substep."""
     ids: np.ndarray
     """(n,) which starts these are."""
-    joints: np.ndarray
-    """(n, substep, actuator) joint targets [rad]."""
+    control: np.ndarray
+    """(n, substep, actuator) joint targets [rad], and the adhesion of feet that may grasp."""
     missed: np.ndarray
     """(n, substep) number of tips out of reach."""
 
     def only(self, keep: np.ndarray) -> "Orders":
         """The orders of some of the starts, (n,)."""
-        return replace(self, ids=self.ids[keep], joints=self.joints[keep], missed=self.missed[keep])
+        return replace(self, ids=self.ids[keep], control=self.control[keep], missed=self.missed[keep])
 
 
 class JointTargets:
     """The joint targets of settled starts, made as the plan goes on."""
 
-    def __init__(self, settled: Settled, plan: NetworkRun, duration: float) -> None:
+    def __init__(self, settled: Settled, plan: Plan, duration: float) -> None:
         """All legs hold their starts; `plan` is at time 0 and ends at `duration` [time units]."""
         self._plan = plan
         self._steps = int(steps_within(duration, settled.network))
@@ -46,7 +47,8 @@ class JointTargets:
         self.total = self._steps * self._substeps
         self._tips = TipTargets(settled.starts, settled.body, settled.network)
         self._legs = insect.dimensions(settled.mujoco_model)
-        self._last = settled.ctrl.reshape(-1, 6, 3).copy()
+        self._last = settled.ctrl[:, : insect.JOINT_ACTUATORS].reshape(-1, 6, 3).copy()
+        self._grasps = settled.mujoco_model.nu > insect.JOINT_ACTUATORS
 
     def ahead(self, ids: np.ndarray) -> Orders | None:
         """The orders of the starts `ids` for the next stretch; none where the walk has ended.
@@ -62,10 +64,13 @@ class JointTargets:
         for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
             _hold(joints[i], self._last[ids[i]])
         self._last[ids] = joints[:, -1]
-        joints, missed = joints.reshape(*joints.shape[:2], -1), (~reachable).sum(axis=2)
+        control, missed = joints.reshape(*joints.shape[:2], -1), (~reachable).sum(axis=2)
+        if self._grasps:
+            held = plan.stance[:, ids].swapaxes(0, 1).repeat(self._substeps, axis=1)
+            control = np.concatenate([control, held], axis=2)
         if self._plan.done == self._steps:  # one substep more shows the state at the end
-            joints = np.concatenate([joints, joints[:, -1:]], axis=1)
-        return Orders(plan, first, ids, joints, missed)
+            control = np.concatenate([control, control[:, -1:]], axis=1)
+        return Orders(plan, first, ids, control, missed)
 
 
 def _hold(joints: np.ndarray, last: np.ndarray) -> None:

@@ -118,7 +118,7 @@ class Tally:
         """Take in one stretch of `physics.drive`."""
         settled, ids = self._settled, stretch.ids
         model, dt, m = settled.mujoco_model, settled.network.dt, settled.body.substeps(settled.network)
-        columns, limit = insect.sensors(model), model.actuator_forcerange[:, 1]
+        columns, limit = insect.sensors(model), model.actuator_forcerange[: insect.JOINT_ACTUATORS, 1]
         feet, touch = columns.foot.start, columns.touch.start
         seen = stretch.qpos, stretch.sensors, stretch.force, stretch.valid
         _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids)
@@ -151,7 +151,7 @@ class Tally:
             tilt=np.arccos(np.clip(sums[:, _UPRIGHT], -1.0, 1.0)),
             speed=speed,
             slip=slip,
-            saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * self._settled.mujoco_model.nu),
+            saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * insect.JOINT_ACTUATORS),
             unreachable=self._unreachable,
         )
 

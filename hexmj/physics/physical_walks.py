@@ -1,17 +1,20 @@
 """Physical walks from start to end: `physical_walk` keeps them whole, `physical_outcomes` only how they went."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.network import first_loss, walk
+from hexmj.network import NetworkRun, first_loss, walk
 from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
-from hexmj.physics.drive import drive
+from hexmj.physics.drive import Push, drive
 from hexmj.physics.measurement import Outcomes, Tally, measured_walk
 from hexmj.physics.settling import Settled, settle
+from hexmj.plans import Plan
 from hexmj.progress import Progress
+from hexmj.stability import loss_time
 from hexmj.walks import Walk
 
 
@@ -57,12 +60,27 @@ def physical_outcomes(
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError, SimulationError: see `physics.drive`.
+        InputError, SimulationError: see `drive.drive`.
     """
-    tally = _tally(settled, model, velocity, duration, acceleration, threads)
-    for stretch in drive(
-        settled, model, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
-    ):
+    conditions: Any = {"network": settled.network, "acceleration": acceleration}
+    plan = NetworkRun(settled.starts, model, velocity, **conditions, threads=1)
+    planned_loss = first_loss(settled.starts, model, velocity, duration, **conditions, threads=threads)
+    return outcomes_of_plan(settled, plan, duration, planned_loss, threads=threads, progress=progress)
+
+
+def outcomes_of_plan(
+    settled: Settled,
+    plan: Plan,
+    duration: float,
+    planned_loss: np.ndarray,
+    *,
+    push: Push | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Outcomes:
+    """The same for any plan that is at time 0, whose own losses, (start,) [time units], are known."""
+    tally = Tally(settled, planned_loss)
+    for stretch in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
         tally.add(stretch)
     return tally.outcomes()
 
@@ -95,19 +113,32 @@ def physical_walk(
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError, SimulationError: see `settling.settle` and `physics.drive`.
+        InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
-    body, network = body or Body(), network or Network()
-    body = body if vp is None else replace(body, vp=vp)
-    planned = walk(starts, model, velocity, duration, network=network, acceleration=acceleration, threads=threads)
-    settled = settle(starts, body, network, threads)
-    tally = _tally(settled, model, velocity, duration, acceleration, threads)
+    body = body or Body() if vp is None else replace(body or Body(), vp=vp)
+    conditions: Any = {"network": network or Network(), "acceleration": acceleration}
+    planned = walk(starts, model, velocity, duration, **conditions, threads=threads)
+    plan = NetworkRun(starts, model, velocity, **conditions, threads=1)
+    settled = settle(starts, body, plan.network, threads)
+    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress)
+
+
+def physical_walk_of_plan(
+    settled: Settled,
+    plan: Plan,
+    planned: Walk,
+    *,
+    push: Push | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> PhysicalWalk:
+    """The same for any plan that is at time 0, which goes as `planned`."""
+    body, network = settled.body, settled.network
+    tally = Tally(settled, loss_time(planned, threads=threads))
     shape = planned.stance.shape
     x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
-    for stretch in drive(
-        settled, model, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
-    ):
+    for stretch in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
         tally.add(stretch)
         columns, seen, seen_centre = measured_walk(stretch, settled)
         at = np.ix_((stretch.first + columns) // body.substeps(network) - 1, stretch.ids)
@@ -116,23 +147,3 @@ def physical_walk(
         qpos[at] = np.where(over, np.nan, stretch.qpos[:, columns].swapaxes(0, 1))
     measured = Walk(planned.time, planned.velocity, x, y, stance, network.geometry)
     return PhysicalWalk(planned, measured, tally.outcomes(), qpos, centre, body, network)
-
-
-def _tally(
-    settled: Settled,
-    model: Model,
-    velocity: ArrayLike,
-    duration: float,
-    acceleration: Acceleration | None,
-    threads: int | None,
-) -> Tally:
-    planned_loss = first_loss(
-        settled.starts,
-        model,
-        velocity,
-        duration,
-        network=settled.network,
-        acceleration=acceleration,
-        threads=threads,
-    )
-    return Tally(settled, planned_loss)

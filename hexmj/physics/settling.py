@@ -32,7 +32,7 @@ class Settled:
     qvel: np.ndarray
     """(start, 24) velocities."""
     ctrl: np.ndarray
-    """(start, 18) joint targets of the planned tips [rad]."""
+    """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion where they grasp."""
     warmstart: np.ndarray
     """(start, 24) accelerations from which the solver goes on."""
     mujoco_model: mujoco.MjModel
@@ -58,7 +58,7 @@ def settle(
     """
     body, network = body or Body(), network or Network()
     x = checked_starts(starts, network)
-    model = insect.load(body.seconds(network) / body.substeps(network), body.friction, looks=False)
+    model = insect.load(body.seconds(network) / body.substeps(network), body, looks=False)
     tips = np.stack([x + np.array(network.geometry.origin), np.broadcast_to(network.geometry.y, x.shape),
                      np.full(x.shape, -body.standing_height)], axis=-1)  # fmt: skip
     joints, reachable = tips_to_joints(tips, legs := insect.dimensions(model))
@@ -72,14 +72,15 @@ def settle(
     qpos, qvel, warmstart = batch.bind("qpos"), batch.bind("qvel"), batch.bind("qacc_warmstart")
     qpos[:, : insect.ROOT_QPOS] = (0.0, 0.0, body.standing_height + legs.foot, 1.0, 0.0, 0.0, 0.0)
     qpos[:, insect.ROOT_QPOS :] = joints.reshape(len(x), -1)
-    ctrl = joints.reshape(len(x), -1)
+    ctrl = np.ones((len(x), model.nu))
+    ctrl[:, : insect.JOINT_ACTUATORS] = joints.reshape(len(x), -1)
     batch.bind("ctrl")[:] = ctrl
     before = {"qpos": qpos.copy(), "qvel": qvel.copy(), "qacc_warmstart": warmstart.copy(), "ctrl": ctrl[:, None]}
     sensordata, columns = batch.bind("sensordata"), insect.sensors(model)
     steps = max(1, round(body.settling_time / 1000.0 / model.opt.timestep))
     with stopped_clock():
         batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
-    raise_if_diverged(batch, np.arange(len(x)), 0.0, None, before)
+    raise_if_diverged(batch, body, np.arange(len(x)), 0.0, None, before)
     for name, failed in {
         "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,
         "a foot is off the ground": (sensordata[:, columns.touch] <= 0).any(axis=1),
