@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -220,17 +221,8 @@ def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
     try:
         options = tyro.cli(Command, prog="hexmj", description=_ABOUT, registry=_registry, config=(FlagCreatePairsOff,))
-        from hexmj import commands
-
-        run = {
-            Compare: commands.run_compare,
-            Flss: commands.run_flss,
-            Walk: commands.run_walk,
-            Render: commands.run_render,
-            Search: commands.run_search,
-            Reproduce: commands.run_reproduce,
-        }
-        run[type(options)](options)
+        name = type(options).__name__.lower()
+        getattr(import_module(f"hexmj.commands.{name}"), f"run_{name}")(options)
     except KeyboardInterrupt:
         sys.exit(_complain("stopped", 130))
     except InputError as error:

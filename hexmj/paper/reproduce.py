@@ -1,13 +1,11 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hexmj.cells import kept
 from hexmj.errors import InputError
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
@@ -91,14 +89,8 @@ def measure(name: str, protocol: Protocol, folder: Path, progress: Progress | No
     rows: list[xr.Dataset] = []
     velocities = measurement.velocities(protocol)
     for v in velocities:
-        settings = {"measurement": name, "velocity": v, "version": version("hexmj")} | measurement.settings(v, protocol)
-        digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:12]
-        path = folder / f"{name.replace(' ', '-')}-{v:g}-{digest}.nc"
-        if path.exists():
-            rows.append(_load(path))
-        else:
-            rows.append(measurement.at(v, protocol).assign_attrs(settings=settings))
-            save_dataset(rows[-1], path)
+        settings = {"measurement": name, "velocity": v} | measurement.settings(v, protocol)
+        rows.append(kept(folder, f"{name}-{v:g}", settings, lambda v=v: measurement.at(v, protocol)))
         if progress:
             progress(1 / len(velocities))
     return xr.concat(rows, xr.DataArray(list(velocities), dims="velocity", name="velocity"), combine_attrs="drop")
@@ -136,13 +128,3 @@ def _judge_ready(
 def _rows(claims: Sequence[Claim], judged: Mapping[str, Row]) -> list[Row]:
     """What has been judged, in the paper's order."""
     return [judged[claim.key] for claim in claims if claim.key in judged]
-
-
-def _load(path: Path) -> "xr.Dataset":
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as row:
-            return row.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path} is damaged ({error}); delete it, and its row is measured anew") from None

@@ -1,0 +1,1 @@
+"""What each command does: call the package, print a table or one JSON object, write the files."""
