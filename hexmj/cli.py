@@ -137,8 +137,9 @@ class Search:
     Repeat the command to go on with a search that was stopped.
     """
 
-    form: Literal["hws", "ldvs"] = "ldvs"
-    """Nine parameters (hws), or ten with a neutral position that depends on the velocity (ldvs)."""
+    form: Literal["hws", "ldvs", "mirrored"] = "ldvs"
+    """Nine parameters (hws), ten with a neutral position that depends on the velocity (ldvs), or 29, in which only
+    left and right are alike (mirrored)."""
     velocity: float | None = None
     """Problem 1: this velocity V_r as a fraction of V_p, 0 <= V < 1; 0.3 unless one or a range is given."""
     velocities: tuple[float, float] | None = None
@@ -182,8 +183,8 @@ class Reproduce:
     """Fewer starts and velocities, under a minute; the full protocol takes several."""
     only: tuple[str, ...] = ()
     """Keys of the claims to judge, without figures; all unless given."""
-    seed: int = 0
-    """Seed of the random starts."""
+    seed: int = 1998
+    """Seed of the random starts; the ideal sets were searched with 0 and 1."""
     out: Path = Path("results/reproduce")
     """Folder for the table (Markdown, JSON), the figures and what was measured."""
     json: bool = False

@@ -262,6 +262,18 @@ def load_model(name: str) -> Model:
     raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
 
 
+def model_toml(model: Model) -> str:
+    """The text of a TOML file that `load_model` reads to the same bits; general weights that are 0 are left out."""
+    if isinstance(model, Symmetric):
+        return "\n".join(["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(model).items())]) + "\n"
+    lines = []
+    for kind in NEIGHBOURS:
+        matrix = getattr(model, kind)
+        lines += ["", f"[weights.{kind}]"]
+        lines += [f'"{d + 1},{e + 1}" = {matrix[d, e].item()!r}' for d, e in _pairs(kind) if matrix[d, e]]
+    return "\n".join(lines[1:]) + "\n"
+
+
 def _read_weights(table: dict[str, object], where: str) -> Weights:
     if unknown := set(table) - set(NEIGHBOURS):
         raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")

@@ -6,7 +6,18 @@ import pytest
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4
 from hexmj.network import walk
-from hexmj.parameters import HWS, LDVS, NEIGHBOURS, PRESETS, Network, Symmetric, Weights, load_model, weights
+from hexmj.parameters import (
+    HWS,
+    LDVS,
+    NEIGHBOURS,
+    PRESETS,
+    Network,
+    Symmetric,
+    Weights,
+    load_model,
+    model_toml,
+    weights,
+)
 
 
 def test_neighbours_are_the_paper_s():
@@ -125,3 +136,10 @@ def test_weights_copy_their_input():
     general = Weights(**matrices)
     matrices["p1"][0, 1] = 3.0
     assert not general.p1.any()
+
+
+@pytest.mark.parametrize("model", [LDVS, Weights.from_vector(np.random.default_rng(1).integers(0, 2, 58))])
+def test_a_written_model_is_read_to_the_same_bits(model, tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(model_toml(model))
+    assert np.array_equal(weights(load_model(str(path))).to_vector(), weights(model).to_vector())

@@ -10,13 +10,15 @@ from hypothesis import strategies as st
 
 import hexmj
 from hexmj.errors import InputError
+from hexmj.legs import MIRROR
 from hexmj.search import history as search_history
 from hexmj.search.convergence import convergence_figure
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import SIGMA, Evolution, mutated, selection_probabilities
+from hexmj.search.forms import FORMS, Form
 from hexmj.search.history import History
-from hexmj.search.problems import Form, Problem, Sample
+from hexmj.search.problems import Problem, Sample
 from hexmj.search.stages import Plan, refine, run, search
 
 TARGET = np.array([3.0, -2.0, 0.0, 6.0, 0.5, 1.0])
@@ -152,6 +154,7 @@ def test_the_cost_is_the_flss_of_the_same_starts(window):
     cases: list[tuple[Form, hexmj.Symmetric, np.ndarray]] = [
         ("hws", hexmj.HWS, hexmj.HWS.to_vector(9)),
         ("ldvs", hexmj.LDVS, hexmj.LDVS.to_vector(10)),
+        ("mirrored", hexmj.LDVS, FORMS["mirrored"].vector(hexmj.LDVS)),
     ]
     for form, model, vector in cases:
         one = Sample.draw(Problem(form, 0.4, 0.4, window), 300, 5)
@@ -162,6 +165,20 @@ def test_the_cost_is_the_flss_of_the_same_starts(window):
         assert some.costs(vector[None]) == [expected]
         verdict = some.verdict({"model": model})
         assert verdict.flss.sel(model="model", window=str(window)) == expected
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_are_what_their_names_say(form):
+    """Vectors and models turn into each other, and both sides are alike in every form."""
+    problem = Problem(form, 0.4, 0.4)
+    domain = problem.domain(10.0)
+    vector = domain.read(domain.draw(1, np.random.default_rng(3)))[0]
+    model = FORMS[form].model(vector)
+    assert len(problem.names()) == len(vector) == {"hws": 9, "ldvs": 10, "mirrored": 29}[form]
+    assert np.array_equal(FORMS[form].vector(model), vector)
+    starts = hexmj.draw_starts(20, 5)
+    walked, mirrored = (hexmj.walk(one, model, 0.4, 60.0).x for one in (starts, starts[:, MIRROR]))
+    assert np.array_equal(walked[:, :, MIRROR], mirrored)
 
 
 def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.parameters import Symmetric
+from hexmj.parameters import Model, model_toml
 from hexmj.physics.body import Body
 from hexmj.results import json_text, write_whole
 
@@ -24,6 +24,7 @@ def physical_report(result: "xr.Dataset") -> dict[str, float]:
     """How far the bodies did what they were told, over all walks of a comparison or a physical FLSS."""
     return {
         "mean slip [mm/s]": result.slip.mean().item(),
+        "95 % of feet within [mm] of their targets on the ground": result.tracking.mean().item(),
         "joints at their torque limit": result.saturation.mean().item(),
         "tip targets out of reach": result.unreachable.sum().item(),
         "least clearance [mm]": result.clearance.min().item(),
@@ -35,14 +36,15 @@ def report_line(report: dict[str, float]) -> str:
     return "; ".join(f"{key}: {value:.3g}" for key, value in report.items())
 
 
-def conditions_line(conditions: "Conditions", physical: bool) -> str:
-    """The conditions that stand beside every measure."""
+def conditions_line(conditions: "Conditions", physical: bool, varied: tuple[str, ...] = ()) -> str:
+    """The conditions that stand beside every measure, but for those that were `varied`."""
     line = f"window {conditions.window} (t in time units); seed {conditions.seed}"
     if conditions.acceleration is not None:
         line += f"; a = {conditions.acceleration:g} from V = {conditions.initial_velocity:g}"
     if physical:
         told, usual = asdict(conditions.body), asdict(Body())
-        line += "; " + ", ".join(f"{key} {told[key]}" for key in told if key in TOLD or told[key] != usual[key])
+        shown = (key for key in told if (key in TOLD or told[key] != usual[key]) and key not in varied)
+        line += "; " + ", ".join(f"{key} {told[key]}" for key in shown)
     return line
 
 
@@ -59,10 +61,9 @@ def save_figure(figure: "Figure", path: Path) -> Path:
     return write_whole(path, lambda part: figure.savefig(part, dpi=150))
 
 
-def save_model(model: Symmetric, comment: str, path: Path) -> Path:
+def save_model(model: Model, comment: str, path: Path) -> Path:
     """A TOML file that `load_model` reads to the same bits."""
-    lines = [f"# {comment}", "[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(model).items())]
-    return write_whole(path, lambda part: part.write_text("\n".join(lines) + "\n", encoding="utf-8"))
+    return write_whole(path, lambda part: part.write_text(f"# {comment}\n{model_toml(model)}", encoding="utf-8"))
 
 
 def new_table(*columns: str) -> "Table":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from hexmj.commands.printing import conditions_line, interval, new_table, print_json, save_figure, save_model, show
 from hexmj.errors import InputError
 from hexmj.loss_frequency import SAMPLE
-from hexmj.parameters import HWS, LDVS, Symmetric
+from hexmj.parameters import HWS, LDVS
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_manifest
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def run_search(options: "Search") -> None:
     """`hexmj search`: the best parameters for one velocity or a range, and a verdict on fresh starts."""
     from hexmj.search.convergence import convergence_figure
+    from hexmj.search.forms import FORMS
     from hexmj.search.problems import Sample
     from hexmj.search.stages import search
 
@@ -31,12 +32,17 @@ def run_search(options: "Search") -> None:
     out = results_folder(options.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
     with progress_bar("searching") as progress:
         found = search(problem, plan, path=out / "history.nc", threads=conditions.threads, progress=progress)
-    models = {"found": Symmetric.from_vector(found.vector), "hws": HWS, "ldvs": LDVS}
+    form = FORMS[problem.form]
+    models = {"found": form.model(found.vector), "hws": HWS, "ldvs": LDVS}
     verdict = fresh.verdict(models)
     at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
     kind = "physical" if options.physical else "kinematic"
     title = f"{problem.form}, {kind} FLSS at {at}, window {problem.window}, {plan.algorithm}, seed {plan.seed}"
-    told = {"problem": asdict(problem), "plan": asdict(plan), "found": asdict(models["found"])}
+    told = {
+        "problem": asdict(problem),
+        "plan": asdict(plan),
+        "found": dict(zip(form.names, found.vector.tolist(), strict=True)),
+    }
     told |= {"verdict_starts": size, "verdict_seed": options.verdict_seed}
     files = [
         out / "history.nc",
@@ -54,8 +60,8 @@ def run_search(options: "Search") -> None:
         print_json({"found": told["found"]} | counts | {"verdict": judged, "settings": told, "files": files})
     else:
         weights, judged = new_table("parameter", *models), new_table("model", *(f"window {w}" for w in windows))
-        for key in asdict(HWS):
-            weights.add_row(key.replace("_", " "), *(f"{getattr(model, key):.4g}" for model in models.values()))
+        for row in zip(form.names, *(form.vector(model) for model in models.values()), strict=True):
+            weights.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
         for name in models:
             judged.add_row(name, *(interval(verdict.sel(model=name, window=w), "flss") for w in windows))
         show(

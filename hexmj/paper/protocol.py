@@ -46,8 +46,8 @@ class Protocol:
     """Velocities of Figs. 5 and 6, 0.1 to 0.95."""
     footfall_velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
     """Velocities of the footfall diagrams."""
-    seed: int = 0
-    """Of all starts."""
+    seed: int = 1998
+    """Of all starts; another than those of the searches that found the ideal sets."""
     network: Network = field(default_factory=Network)
     """Constants of the walks whose stability is measured."""
     gait_network: Network = field(default_factory=lambda: Network(dt=0.01))

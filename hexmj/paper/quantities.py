@@ -213,7 +213,8 @@ class Weight:
             if one.window == window and one.low == one.high:
                 value = getattr(one.model, self.parameter)
                 if self.over:
-                    value = abs(value / getattr(one.model, self.over))
+                    with np.errstate(divide="ignore", invalid="ignore"):
+                        value = abs(np.float64(value) / getattr(one.model, self.over))
                 yield Point(one.low, "", np.array([value]))
 
 

@@ -101,7 +101,7 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
 
 def _number(answer: Answer) -> str:
     if answer.value != answer.value:
-        return f"no start left at {answer.where}"
+        return f"no value at {answer.where}"
     interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
     return f"{answer.value:.4f}{interval} at {answer.where}"
 

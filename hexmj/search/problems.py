@@ -3,17 +3,18 @@
 import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Literal, get_args
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.loss_frequency import WINDOWS, draw_starts, observation_time, wilson_interval
 from hexmj.network import checked_velocities, first_loss, steps_within
-from hexmj.parameters import Acceleration, Model, Network, Symmetric
+from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
 from hexmj.search.domain import Domain
+from hexmj.search.forms import FORMS, Form
 from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
@@ -21,19 +22,13 @@ if TYPE_CHECKING:
 
     from hexmj.physics.settling import Settled
 
-Form = Literal["hws", "ldvs"]
-"""Forms of the model, with nine and with ten parameters (Appendix A)."""
-
-BINARY = ("p2", "p4_i")
-NEUTRAL = ("p31_i", "p34_i", "p31_c")
-
 
 @dataclass(frozen=True)
 class Problem:
     """A cost function G: FLSS of a form of the model, I_N^t of Eq. 9 or J_N^t of Eq. 10."""
 
     form: Form
-    """Nine parameters, or ten with a neutral position that depends on the velocity."""
+    """Which parameters are free, see `forms`."""
     low: float
     """Least velocity of the range W, a fraction of V_p; Problem 1 where it is also the greatest."""
     high: float
@@ -48,8 +43,8 @@ class Problem:
     """Conditions of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
 
     def __post_init__(self) -> None:
-        if self.form not in get_args(Form):
-            raise InputError(f"form = {self.form!r}; valid names: {', '.join(get_args(Form))}")
+        if self.form not in FORMS:
+            raise InputError(f"form = {self.form!r}; valid names: {', '.join(FORMS)}")
         if not 0 <= self.low <= self.high < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
@@ -63,16 +58,15 @@ class Problem:
 
     def names(self) -> list[str]:
         """Names of the parameters, in the order of the vector."""
-        return [f.name for f in fields(Symmetric) if f.name != "p34_i" or self.form == "ldvs"]
+        return list(FORMS[self.form].names)
 
     def domain(self, reach: float) -> Domain:
         """Where a search begins, not printed in the paper: -reach to reach for the neutral positions [mm], 0 to
         reach for shifts [mm] and weights (the signs of the printed sets), 0 to 1 for the binary P^2 and P^4."""
         if not 0 < reach < math.inf:
             raise InputError(f"domain = {reach}; expected a finite number above 0")
-        binary = np.array([name in BINARY for name in self.names()])
-        neutral = np.array([name in NEUTRAL for name in self.names()])
-        return Domain(np.where(neutral, -reach, 0.0), np.where(binary, 1.0, reach), binary)
+        form = FORMS[self.form]
+        return Domain(np.where(form.neutral, -reach, 0.0), np.where(form.binary, 1.0, reach), form.binary)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +99,9 @@ class Sample:
         """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else."""
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
-            return self._losses(Symmetric.from_vector(vector), [self.problem.window], threads)[0] / len(self.starts)
+            return self._losses(FORMS[self.problem.form].model(vector), [self.problem.window], threads)[0] / len(
+                self.starts
+            )
 
         if self.problem.body or len(vectors) == 1:
             return np.array([cost(vector, self.threads) for vector in vectors])
