@@ -17,7 +17,7 @@ compare: .venv/project system
 
 test: export MUJOCO_GL ?= egl
 test: .venv/dev system
-	.venv/bin/python -m pytest $(ARGS)
+	.venv/bin/python -m pytest -p no:benchmark --numprocesses 2 --dist worksteal $(ARGS)
 
 bench: export MUJOCO_GL ?= egl
 bench: .venv/dev system

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,20 @@ def test_steps(measure, settled, who):
     work = {"hexmj": ours, "bare Batch.step": bare}.get(who, without_clock)
     amount = steps.shape[0] * steps.shape[1] / 1e3
     measure(work, "physical walks", who, amount=amount, unit="thousand physics steps/s", ratio=0.95, rounds=5)
+
+
+@pytest.mark.parametrize("who", ["hexmj", "the open loop"])
+def test_closed_loop(measure, settled, who):
+    """The network reads the legs before each of its steps, so these come one by one."""
+    some = replace(settled, body=replace(settled.body, feedback=who == "hexmj"))
+    measure(
+        lambda: physical_outcomes(some, LDVS, VELOCITY, DURATION, threads=2),
+        "physical walks, closed loop",
+        who,
+        amount=len(some.starts) * DURATION / some.network.dt * some.body.substeps(some.network) / 1e3,
+        unit="thousand physics steps/s",
+        ratio=0.5,
+    )
 
 
 @pytest.mark.parametrize(("window", "bar"), [("start", 50.0), ("walk", 240.0)])

@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from hexmj.parameters import Network as Network
     from hexmj.parameters import Symmetric as Symmetric
     from hexmj.parameters import Weights as Weights
-    from hexmj.parameters import load_model as load_model
     from hexmj.physics.body import Body as Body
     from hexmj.physics.physical_walks import PhysicalWalk as PhysicalWalk
     from hexmj.physics.physical_walks import physical_walk as physical_walk
+    from hexmj.presets import PRESETS as PRESETS
+    from hexmj.presets import load_model as load_model
     from hexmj.recording import load_recording as load_recording
     from hexmj.recording import record as record
     from hexmj.recording import record_plan as record_plan
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
+    "presets": ("PRESETS", "load_model"),
     "physics.body": ("Body",),
     "comparison": ("compare", "physical_flss"),
     "errors": ("InputError", "SimulationError"),
@@ -62,7 +64,6 @@ _MODULES = {
         "Network",
         "Symmetric",
         "Weights",
-        "load_model",
     ),
     "physics.physical_walks": ("PhysicalWalk", "physical_walk"),
     "search.problems": ("Problem",),

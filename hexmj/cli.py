@@ -56,7 +56,7 @@ class Compare:
     """Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait video."""
 
     models: tuple[str, ...] = ("ldvs", "uncoordinated")
-    """Presets (hws, ldvs, uncoordinated) or parameter files (TOML)."""
+    """Presets (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or parameter files (TOML)."""
     velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 <= V < 1."""
     starts: int = 60
@@ -75,7 +75,7 @@ class Flss:
     """FLSS of one model over velocities, kinematic or physical."""
 
     model: str = "ldvs"
-    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
     velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
     """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
     physical: bool = False
@@ -94,7 +94,7 @@ class Walk:
     """One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF)."""
 
     model: str = "ldvs"
-    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
     velocity: float = 0.3
     """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
     physical: bool = False
@@ -115,7 +115,7 @@ class Render:
     recordings: Positional[tuple[Path, ...]] = ()
     """One recording, or two for side by side (recording.nc of `hexmj walk`); none: record a physical walk first."""
     model: str = "ldvs"
-    """A preset (hws, ldvs, uncoordinated) or a parameter file (TOML)."""
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
     velocity: float = 0.3
     """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
     beside: str | None = None
@@ -153,6 +153,9 @@ class Search:
     domain: float = 10.0
     """The first population's shifts [mm] and weights are drawn from 0 to this, neutral positions [mm] from minus this
     to this; not printed in the paper."""
+    begin: str | None = None
+    """A preset or a parameter file (TOML) from which the population begins; without it the paper's '0'-individual
+    (evolution) or the middle of the domain (cmaes)."""
     starts: int | None = None
     """Random starts of each candidate, the same for all; 500 unless given, 50 if physical."""
     budget: int = 1000
@@ -191,6 +194,124 @@ class Reproduce:
     """Print one JSON object on standard output, nothing else."""
 
 
+@dataclass(frozen=True)
+class Converge:
+    """The same starts at smaller and smaller V_p: does the insect tend to its plan and to the static criterion?
+
+    Repeat the command to go on with a run that was stopped.
+    """
+
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
+    velocity: float = 0.5
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    vps: tuple[float, ...] = (400.0, 200.0, 100.0, 50.0, 25.0)
+    """Velocities V_p of a protracting tip [mm/s], instead of --vp."""
+    leg_masses: tuple[float, ...] = (1.0, 0.01)
+    """Masses of the legs as fractions of the insect's own, instead of --leg-mass; the paper's legs have none."""
+    starts: int = 200
+    """Number of random starts, the same for every V_p and mass."""
+    out: Path = Path("results/converge")
+    """Folder for figure, NetCDF, manifest and finished walks."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: Conditions(body=Body(longest_substep=0.5)))
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Steps, gaps, hurdles and rough ground in physics: how often the insect falls once it has reached one.
+
+    Repeat the command to go on with a run that was stopped.
+    """
+
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
+    velocities: tuple[float, ...] = (0.2, 0.4, 0.6)
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
+    grounds: tuple[Literal["step", "gap", "hurdle", "rough"], ...] = ("step", "gap", "hurdle", "rough")
+    """Kinds of obstacles, beside flat ground."""
+    heights: tuple[float, ...] = (2.0, 4.0, 6.0)
+    """Heights of steps, hurdles and rough ground [mm], instead of --ground-height."""
+    lengths: tuple[float, ...] = (2.5, 5.0, 10.0)
+    """Lengths of gaps [mm]; --ground-length is the hurdle's."""
+    grasps: tuple[float, ...] = (0.0, 1.0)
+    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight, instead of --grasp."""
+    starts: int = 40
+    """Number of random starts, the same for every obstacle."""
+    out: Path = Path("results/terrain")
+    """Folder for figure, NetCDF, manifest and finished walks."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: Conditions(body=Body(ground_at=80.0)))
+
+
+@dataclass(frozen=True)
+class Map:
+    """Physical FLSS over the velocity and one condition of the body, and why starts fall or do not.
+
+    Repeat the command to go on with a run that was stopped.
+    """
+
+    over: Literal["vp", "step_height", "standing_height", "friction", "load", "centre_of_mass"] = "vp"
+    """The condition that is varied."""
+    values: tuple[float, ...] = ()
+    """Its values, in its own unit; five usual ones unless given."""
+    velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1."""
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
+    starts: int = 100
+    """Number of random starts, the same for every value and velocity."""
+    out: Path = Path("results/map")
+    """Folder for figures, NetCDF, manifest and finished walks."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+@dataclass(frozen=True)
+class Disturb:
+    """Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies buy.
+
+    Repeat the command to go on with a run that was stopped.
+    """
+
+    model: str = "ldvs"
+    """A preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9) or a parameter file (TOML)."""
+    velocities: tuple[float, ...] = (0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
+    disturbances: tuple[Literal["halt", "leg", "push"], ...] = ()
+    """The body is halted, or one protracting leg is stopped, or the body is pushed from the side; all unless given."""
+    impulses: tuple[float, ...] = (40.0, 60.0)
+    """Impulses of the pushes, in multiples of the insect's mass times V_p."""
+    strategies: tuple[Literal["reorganise", "slow_down", "grasp"], ...] = ()
+    """Legs go to the nearest posture of undisturbed walking, or the walk begins again from --initial-velocity, or feet
+    hold on to the ground; all, beside none, unless given."""
+    recovery: float = 0.002
+    """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper's is 0.00008."""
+    adhesion: float = 1.0
+    """Adhesion of a foot that the plan lets stand where the strategy is to grasp, in multiples of the insect's weight,
+    instead of --grasp."""
+    starts: int = 50
+    """Number of random starts that walk stably until they are disturbed, the same in every case."""
+    kinematic: bool = False
+    """Leave physics out, and with it pushes and grasping."""
+    out: Path = Path("results/disturb")
+    """Folder for figure, NetCDF, manifest and finished walks."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Checks of this machine, each with a remedy where it fails; exit code 1 if one does."""
+
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+
+
 Command = (
     Annotated[Compare, subcommand("compare")]
     | Annotated[Flss, subcommand("flss")]
@@ -198,6 +319,11 @@ Command = (
     | Annotated[Render, subcommand("render")]
     | Annotated[Search, subcommand("search")]
     | Annotated[Reproduce, subcommand("reproduce")]
+    | Annotated[Converge, subcommand("converge")]
+    | Annotated[Terrain, subcommand("terrain")]
+    | Annotated[Map, subcommand("map")]
+    | Annotated[Disturb, subcommand("disturb")]
+    | Annotated[Doctor, subcommand("doctor")]
 )
 
 _registry = ConstructorRegistry()

@@ -17,12 +17,13 @@ from hexmj.loss_frequency import (
     settings,
     wilson_interval,
 )
-from hexmj.parameters import PRESETS, Acceleration, Model, Network
+from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
 from hexmj.physics.insect import TRUNK
 from hexmj.physics.measurement import Outcomes
 from hexmj.physics.physical_walks import physical_outcomes
 from hexmj.physics.settling import settle
+from hexmj.presets import PRESETS
 from hexmj.progress import Progress
 
 if TYPE_CHECKING:
@@ -34,17 +35,19 @@ MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical"
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
 """What a start can do: lose stability on paper, touch the ground, both or none."""
 
-REPORTED = ("clearance", "tilt", "speed", "slip", "saturation", "unreachable")
+REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "saturation", "unreachable")
 """Outcomes that tell how far the bodies did what they were told."""
 
-_UNITS = {
+UNITS = {
     "planned_loss": "time unit",
     "measured_loss": "time unit",
     "fall": "time unit",
     "clearance": "mm",
     "tilt": "rad",
     "slip": "mm/s",
+    "tracking": "mm",
 }
+"""Units of the outcomes; the others are numbers."""
 
 
 def compare(
@@ -114,7 +117,7 @@ def compare(
     )
     for field in fields(Outcomes):
         values = np.array([[getattr(o, field.name) for o in row] for row in table])
-        data[field.name] = (("model", "velocity", "start"), values, {"units": _UNITS.get(field.name, "1")})
+        data[field.name] = (("model", "velocity", "start"), values, {"units": UNITS.get(field.name, "1")})
     data.fall_part.attrs["flag_meanings"] = " ".join(TRUNK)
     for measure, outcome in MEASURES.items():
         lost = data[outcome] < np.inf

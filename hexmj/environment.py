@@ -104,6 +104,8 @@ def load(
     body, network = body or Body(), network or Network()
     if not 0 < velocity < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p")
+    if body.feedback:
+        raise InputError("feedback = True; expected False, since here it is the actions that close the loop")
     if actions not in TASKS:
         raise InputError(f"actions = {actions!r}; valid names: {', '.join(TASKS)}")
     task = TASKS[actions](velocity, model, body, network, int(steps_within(duration, network)), seed)

@@ -88,6 +88,10 @@ class NetworkRun:
         legs = {lanes.X: tips, lanes.S: 1.0, lanes.S_OLD: 1.0, lanes.AEP: self.network.aep0}
         for row, values in (legs | {lanes.PEP_SHIFT: 0.0, lanes.AEP_SHIFT: 0.0}).items():
             self._write(row, np.where(which[:, None], values, self._read(row)))
+        self.slow_down(which)
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
         for row, values in {lanes.V: self._restart_velocity, lanes.DONE: 0.0}.items():
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 

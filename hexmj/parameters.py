@@ -5,10 +5,8 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 """
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
-from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -25,7 +23,7 @@ Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Network.order`."""
 
 
-def _pairs(kind: str) -> list[tuple[int, int]]:
+def pairs(kind: str) -> list[tuple[int, int]]:
     """All (destination, source) pairs of one kind of weight, in the paper's order."""
     return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
 
@@ -66,7 +64,7 @@ class Weights:
             if not np.isfinite(matrix).all():
                 raise InputError(f"{kind} holds a number that is not finite; expected finite weights")
             allowed = np.zeros((6, 6), dtype=bool)
-            allowed[tuple(np.transpose(_pairs(kind)))] = True
+            allowed[tuple(np.transpose(pairs(kind)))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
                 d, e = stray[0] + 1
                 raise InputError(f"{kind} of leg {d} from leg {e} is not 0, but leg {e} is no neighbour there")
@@ -84,13 +82,13 @@ class Weights:
         values = iter(vector)
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
         for kind in _kinds(size, 58):
-            for pair in _pairs(kind):
+            for pair in pairs(kind):
                 matrices[kind][pair] = next(values)
         return cls(**matrices)
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
         """The inverse of `from_vector`."""
-        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in _pairs(kind)])
+        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in pairs(kind)])
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ class Symmetric:
         }
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
         for kind, (ipsilateral, contralateral) in by_kind.items():
-            for d, e in _pairs(kind):
+            for d, e in pairs(kind):
                 matrices[kind][d, e] = contralateral if abs(d - e) == 3 else ipsilateral
         return Weights(**matrices)
 
@@ -169,8 +167,6 @@ LDVS = Symmetric(
 
 UNCOORDINATED = Symmetric()
 """No coordinating mechanism."""
-
-PRESETS: dict[str, Model] = {"hws": HWS, "ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 
 
 @dataclass(frozen=True)
@@ -231,67 +227,3 @@ def weights(model: Model) -> Weights:
     if isinstance(model, Weights):
         return model
     raise InputError(f"model = {model!r}; expected Symmetric or Weights, as a preset or load_model gives them")
-
-
-def load_model(name: str) -> Model:
-    """A preset by its name, or the model in a TOML file.
-
-    The file holds either a table ``[symmetric]`` with fields of `Symmetric`, or tables
-    ``[weights.p1]`` ... ``[weights.p4]`` with keys ``"d,e"`` (the paper's leg numbers).
-
-    Raises:
-        InputError: no such preset or file, or a key, type or value that makes no sense.
-    """
-    if name in PRESETS:
-        return PRESETS[name]
-    path = Path(name)
-    try:
-        exists = path.is_file()
-    except OSError:
-        exists = False
-    if not exists:
-        raise InputError(f"model {name!r} is neither a preset ({', '.join(PRESETS)}) nor a TOML file that exists")
-    try:
-        table = tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path} cannot be read as TOML: {error}") from None
-    if list(table) == ["symmetric"]:
-        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{path} [symmetric]"))
-    if list(table) == ["weights"] and isinstance(table["weights"], dict):
-        return _read_weights(table["weights"], str(path))
-    raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
-
-
-def model_toml(model: Model) -> str:
-    """The text of a TOML file that `load_model` reads to the same bits; general weights that are 0 are left out."""
-    if isinstance(model, Symmetric):
-        return "\n".join(["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(model).items())]) + "\n"
-    lines = []
-    for kind in NEIGHBOURS:
-        matrix = getattr(model, kind)
-        lines += ["", f"[weights.{kind}]"]
-        lines += [f'"{d + 1},{e + 1}" = {matrix[d, e].item()!r}' for d, e in _pairs(kind) if matrix[d, e]]
-    return "\n".join(lines[1:]) + "\n"
-
-
-def _read_weights(table: dict[str, object], where: str) -> Weights:
-    if unknown := set(table) - set(NEIGHBOURS):
-        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
-    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    for kind, entries in table.items():
-        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in _pairs(kind)}
-        for key, value in _numbers(entries, list(keys), f"{where} [weights.{kind}]").items():
-            matrices[kind][keys[key]] = value
-    return Weights(**matrices)
-
-
-def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
-    """The entries of a TOML table, all of which must be numbers with valid keys."""
-    if not isinstance(table, dict):
-        raise InputError(f"{where} is {table!r}; expected a table with the keys {', '.join(valid)}")
-    for key, value in table.items():
-        if key not in valid:
-            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
-            raise InputError(f"{where}: {key} = {str(value)[:40]!r}; expected a number, finite and below 1e100")
-    return {key: float(value) for key, value in table.items()}

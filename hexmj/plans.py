@@ -1,6 +1,8 @@
 """What a body can be told to do: the network as it goes on, or a plan that exists already."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
+
+import numpy as np
 
 from hexmj.parameters import Network
 from hexmj.walks import Walk
@@ -16,4 +18,13 @@ class Plan(Protocol):
 
     def advance(self, steps: int) -> Walk:
         """The next `steps` steps."""
+        ...
+
+
+@runtime_checkable
+class SeeingPlan(Plan, Protocol):
+    """A plan that can go on from other legs than its own."""
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Go on from these tips [mm] and states, both (start, leg)."""
         ...

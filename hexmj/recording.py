@@ -15,7 +15,7 @@ from hexmj.physics import insect
 from hexmj.physics.body import Body
 from hexmj.physics.kinematics import LegDimensions, tips_to_joints
 from hexmj.physics.physical_walks import PhysicalWalk
-from hexmj.physics.targets import TipTargets
+from hexmj.physics.targets import TipTargets, standing_tips
 from hexmj.results import write_whole
 from hexmj.stability import loss_time, walk_margin
 from hexmj.walks import Walk
@@ -48,6 +48,7 @@ MEASURED = {
     "tilt": (_ONCE, "rad", "greatest tilt of the trunk"),
     "speed": (_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
     "slip": (_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
+    "tracking": (_ONCE, "mm", "95th percentile of the distance between a foot and its target on the ground"),
     "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
     "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }
@@ -155,6 +156,15 @@ def load_recording(path: Path | str) -> xr.Dataset:
     return recording
 
 
+def recorded_body(recording: xr.Dataset) -> Body:
+    """The conditions of a recorded walk.
+
+    Raises:
+        InputError: one that makes no sense.
+    """
+    return Body(**{name: type(usual)(recording.attrs[name]) for name, usual in asdict(Body()).items()})
+
+
 def _dataset(planned: Walk, body: Body, network: Network, title: str, **values: np.ndarray) -> xr.Dataset:
     """A recording of a plan of one start and `values` by the names of their variables."""
     values |= {
@@ -174,7 +184,8 @@ def _dataset(planned: Walk, body: Body, network: Network, title: str, **values: 
         if name in values
     }
     coords = {name: variables.pop(name) for name in _TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
-    return xr.Dataset(variables, coords, {"title": title, **asdict(body), **_settings(network)})
+    plain = {name: int(value) if isinstance(value, bool) else value for name, value in asdict(body).items()}
+    return xr.Dataset(variables, coords, {"title": title, **plain, **_settings(network)})
 
 
 def _settings(network: Network) -> dict[str, Any]:
@@ -195,9 +206,8 @@ def _lifted_tips(planned: Walk, body: Body, network: Network) -> tuple[np.ndarra
     """Planned tips of one start in the root frame after each step, (step, leg, 3), and at time 0, (leg, 3) [mm]."""
     x = planned.x[0] + planned.velocity[0, :, None] * network.dt  # all legs retract in the first step
     tips = TipTargets(x, body, network).follow(planned, np.array([0]))[0]
-    start = np.stack([x[0] + network.geometry.origin, network.geometry.y, np.full(6, -body.standing_height)], axis=-1)
     m = body.substeps(network)
-    return tips[m - 1 :: m], start
+    return tips[m - 1 :: m], standing_tips(x[0], body, network)
 
 
 def _held_joints(tips: np.ndarray, legs: LegDimensions) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The one type of walk that both measures of stability read."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,3 +33,11 @@ class Walk:
     def feet(self) -> np.ndarray:
         """(step, start, leg, 2) tips from the centre of mass: ahead, to the left [mm]."""
         return np.stack([self.x + np.array(self.geometry.origin), self.y], axis=-1)
+
+
+def joined(walks: Sequence[Walk]) -> Walk:
+    """One walk of the same starts out of those that follow each other."""
+    if len(walks) == 1:
+        return walks[0]
+    names = ("time", "velocity", "x", "y", "stance")
+    return replace(walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in names})

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from hexmj.parameters import LDVS, load_model
+from hexmj.parameters import LDVS
+from hexmj.presets import load_model
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

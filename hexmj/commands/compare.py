@@ -19,7 +19,8 @@ from hexmj.commands.printing import (
 from hexmj.commands.recorded import recorded
 from hexmj.errors import InputError, RenderingError
 from hexmj.film.film import Film
-from hexmj.parameters import Model, load_model
+from hexmj.parameters import Model
+from hexmj.presets import load_model
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest
 

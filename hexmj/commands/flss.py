@@ -13,7 +13,7 @@ from hexmj.commands.printing import (
     show,
 )
 from hexmj.loss_frequency import SAMPLE, flss
-from hexmj.parameters import load_model
+from hexmj.presets import load_model
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest
 

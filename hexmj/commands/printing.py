@@ -4,8 +4,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.parameters import Model, model_toml
+from hexmj.parameters import Model
 from hexmj.physics.body import Body
+from hexmj.presets import model_toml
 from hexmj.results import json_text, write_whole
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def physical_report(result: "xr.Dataset") -> dict[str, float]:
     """How far the bodies did what they were told, over all walks of a comparison or a physical FLSS."""
     return {
         "mean slip [mm/s]": result.slip.mean().item(),
-        "95 % of feet within [mm] of their targets on the ground": result.tracking.mean().item(),
+        "tracking, 95th percentile [mm]": result.tracking.mean().item(),
         "joints at their torque limit": result.saturation.mean().item(),
         "tip targets out of reach": result.unreachable.sum().item(),
         "least clearance [mm]": result.clearance.min().item(),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from hexmj.commands.printing import print_json, show
 from hexmj.commands.recorded import recorded, walk_summary
 from hexmj.errors import InputError, RenderingError
-from hexmj.parameters import load_model
+from hexmj.presets import load_model
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder
 

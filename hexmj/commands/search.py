@@ -7,6 +7,7 @@ from hexmj.commands.printing import conditions_line, interval, new_table, print_
 from hexmj.errors import InputError
 from hexmj.loss_frequency import SAMPLE
 from hexmj.parameters import HWS, LDVS
+from hexmj.presets import load_model
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_manifest
 
@@ -93,6 +94,7 @@ def _search_settings(options: "Search") -> "tuple[Problem, Plan]":
         algorithm=options.algorithm,
         population=options.population,
         domain=options.domain,
+        begin=load_model(options.begin) if options.begin else None,
         starts=options.starts if options.starts is not None else few,
         budget=options.budget,
         refine_starts=options.refine_starts if options.refine_starts is not None else many,

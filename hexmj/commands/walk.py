@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from hexmj.commands.printing import conditions_line, print_json, save_figure, short, show
 from hexmj.commands.recorded import recorded, walk_summary
 from hexmj.loss_frequency import settings
-from hexmj.parameters import load_model
+from hexmj.presets import load_model
 from hexmj.results import results_folder, save_manifest
 
 if TYPE_CHECKING:

@@ -60,9 +60,9 @@ class Overlay:
         draw.text((image.width - edge, first), state, colour, bold, anchor="rm")
         margin = f"{take.margin[row]:+.1f} mm".replace("-", MINUS) if seconds < take.fell else "unknown"
         fields = (
-            f"{1000 * seconds:.0f} ms = {seconds * take.vp:.1f} time units",
+            f"{1000 * seconds:.0f} ms = {seconds * take.body.vp:.1f} time units",
             f"V = {take.velocity[row]:.2f}",
-            f"Vₚ = {take.vp:g} mm/s",
+            f"Vₚ = {take.body.vp:g} mm/s",
             f"margin {margin}",
         )
         for place, text in zip((0.0, 0.42, 0.57, 0.77), fields, strict=True):

@@ -22,10 +22,10 @@ EMISSION = 0.3
 """Part of a mark's colour that does not depend on the light."""
 
 
-def mark_support(scene: mujoco.MjvScene, corners: np.ndarray, stable: bool) -> None:
-    """The support polygon on the ground, by its corners in order, (corner, 2) [mm]."""
+def mark_support(scene: mujoco.MjvScene, corners: np.ndarray, level: float, stable: bool) -> None:
+    """The support polygon at the level of the ground [mm], by its corners in order, (corner, 2) [mm]."""
     colour = STABLE if stable else UNSTABLE
-    points = np.column_stack([corners, np.full(len(corners), FILL_HEIGHT)])
+    points = np.column_stack([corners, np.full(len(corners), level + FILL_HEIGHT)])
     for second, third in pairwise(points[1:]):
         _triangle(scene, points[0], second, third, (*colour, 0.35))
     for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
@@ -33,9 +33,9 @@ def mark_support(scene: mujoco.MjvScene, corners: np.ndarray, stable: bool) -> N
             _rod(scene, a, b, OUTLINE, (*colour, 1.0))
 
 
-def mark_centre_of_mass(scene: mujoco.MjvScene, centre: np.ndarray, stable: bool) -> None:
-    """The centre of mass, (3,) [mm], projected on the ground."""
-    below = np.array([centre[0], centre[1], 0.0])
+def mark_centre_of_mass(scene: mujoco.MjvScene, centre: np.ndarray, level: float, stable: bool) -> None:
+    """The centre of mass, (3,) [mm], projected on the level of the ground [mm]."""
+    below = np.array([centre[0], centre[1], level])
     _rod(scene, below, centre, 0.12, (*CENTRE, 0.8))
     rim = (*(STABLE if stable else UNSTABLE), 1.0)
     _disc(scene, below, 2.4, 0.3, rim)

@@ -6,7 +6,9 @@ import numpy as np
 import xarray as xr
 
 from hexmj.errors import InputError
+from hexmj.physics.body import Body
 from hexmj.physics.insect import TRUNK
+from hexmj.recording import recorded_body
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,8 +18,8 @@ class Take:
     title: str
     physical: bool
     """Whether a physical insect was recorded, or a puppet."""
-    vp: float
-    """V_p [mm/s]."""
+    body: Body
+    """Conditions of the walk."""
     step: float
     """Duration of a step [s]."""
     duration: float
@@ -60,12 +62,12 @@ class Take:
             ],
             axis=-1,
         )
-        seconds, vp = recording["seconds"].values, float(recording.attrs["vp"])
+        seconds, body = recording["seconds"].values, recorded_body(recording)
         return cls(
             title=recording.attrs["title"],
             physical=physical,
-            vp=vp,
-            step=float(recording.attrs["dt"]) / vp,
+            body=body,
+            step=float(recording.attrs["dt"]) / body.vp,
             duration=float(seconds[-1]),
             velocity=recording["velocity"].values[shown],
             margin=recording[f"{kind}_margin"].values[shown],
@@ -74,8 +76,8 @@ class Take:
             planned_tip=tips,
             centre_of_mass=centre,
             qpos=qpos[shown],
-            lost=float(recording[f"{kind}_loss_time"]) / vp,
-            fell=float(recording["fall_time"]) / vp if physical else np.inf,
+            lost=float(recording[f"{kind}_loss_time"]) / body.vp,
+            fell=float(recording["fall_time"]) / body.vp if physical else np.inf,
             part=TRUNK[int(recording["fall_part"])] if physical else "",
         )
 

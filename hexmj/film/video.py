@@ -1,6 +1,7 @@
 """Films of recordings, rendered without a screen: the insect, its support polygon, caption and footfall diagram."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -16,6 +17,8 @@ from hexmj.film.overlay import Overlay
 from hexmj.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.film.take import Take
 from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.ground import ground_level
 from hexmj.progress import Progress
 from hexmj.results import write_whole
 from hexmj.stability import support_polygon
@@ -63,29 +66,30 @@ def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress:
     """Film the takes side by side."""
     duration = max(take.duration for take in takes)
     overlays = [Overlay(take, film.width, film.height, duration) for take in takes]
-    model = _filmed_insect(film)
-    data = mujoco.MjData(model)
     picture = np.empty((film.height, film.width * len(takes), 3), dtype=np.uint8)
     panels = np.split(picture, len(takes), axis=1)
     encoder = {"fps": film.fps, "crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"}
-    with (
-        mujoco.Renderer(model, film.height, film.width) as renderer,
-        mediapy.VideoWriter(path, picture.shape[:2], **encoder) as writer,
-    ):
+    with ExitStack() as opened:
+        worlds = {take.body: _filmed_insect(film, take.body) for take in takes}
+        stages = {
+            body: (opened.enter_context(mujoco.Renderer(model, film.height, film.width)), mujoco.MjData(model))
+            for body, model in worlds.items()
+        }
+        writer = opened.enter_context(mediapy.VideoWriter(path, picture.shape[:2], **encoder))
         for frame in range(frames):
             seconds = frame / (film.fps * film.slow_motion)
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
-                panel[:] = _view(renderer, data, film.camera, take, row)
+                panel[:] = _view(*stages[take.body], film.camera, take, row)
                 overlay.draw(panel, row, seconds)
             writer.add_image(picture)
             if progress:
                 progress(1 / frames)
 
 
-def _filmed_insect(film: Film) -> mujoco.MjModel:
-    """The insect with the looks and the buffer that a film needs."""
-    model = insect.load()
+def _filmed_insect(film: Film, body: Body) -> mujoco.MjModel:
+    """The insect on its ground, with the looks and the buffer that a film needs."""
+    model = insect.load(body=body)
     model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
     if film.quality == "high":
         model.vis.quality.shadowsize, model.vis.quality.offsamples = 4096, 4
@@ -107,7 +111,9 @@ def _view(renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Tak
     mujoco.mj_camlight(renderer.model, data)
     renderer.update_scene(data, camera)
     stable = bool(take.margin[row] > 0.0)
-    mark_support(renderer.scene, support_polygon(take.feet[row], take.stance[row]), stable)
-    mark_centre_of_mass(renderer.scene, take.centre_of_mass[row], stable)
+    corners, centre = support_polygon(take.feet[row], take.stance[row]), take.centre_of_mass[row]
+    level = float(ground_level(take.body, np.vstack([corners, centre[:2]])).max())
+    mark_support(renderer.scene, corners, level, stable)
+    mark_centre_of_mass(renderer.scene, centre, level, stable)
     mark_planned_tips(renderer.scene, take.planned_tip[row])
     return renderer.render()

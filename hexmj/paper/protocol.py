@@ -15,7 +15,8 @@ from hexmj.loss_frequency import SAMPLE, WINDOWS, draw_starts, observation_time
 from hexmj.network import NetworkRun, first_loss, steps_within
 from hexmj.paper.found_sets import found_set
 from hexmj.paper.late_losses import lost_after
-from hexmj.parameters import PRESETS, Acceleration, Model, Network, Symmetric
+from hexmj.parameters import Acceleration, Model, Network, Symmetric
+from hexmj.presets import PRESETS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,9 @@ Ground = Literal["flat", "step", "gap", "hurdle", "rough"]
 SHORTEST_LEG = 31.0
 """Length of the shortest leg, the middle one [mm]; no obstacle is taller."""
 
+HIGHEST_BUMP = 8.0
+"""Height of the highest bump of rough ground [mm]; they are caps of spheres, 16 mm wide."""
+
 
 @dataclass(frozen=True)
 class Body:
@@ -45,6 +48,9 @@ class Body:
     """Mass of the legs as a fraction of the insect's own; the trunk makes up for it.  The paper's legs have none."""
     grasp: float = 0.0
     """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight."""
+    feedback: bool = False
+    """The network reads the legs before each of its steps, where the tips are and which feet meet the ground, instead
+    of going on by itself."""
     ground: Ground = "flat"
     """What lies ahead: nothing, a step up, a gap, a hurdle, or rough ground."""
     ground_height: float = 3.0
@@ -85,6 +91,8 @@ class Body:
                 raise InputError(f"{name} = {value}; expected {low:g} to {high:g} {unit}")
         if self.ground not in get_args(Ground):
             raise InputError(f"ground = {self.ground!r}; valid names: {', '.join(get_args(Ground))}")
+        if self.ground == "rough" and self.ground_height > HIGHEST_BUMP:
+            raise InputError(f"ground_height = {self.ground_height}; expected at most {HIGHEST_BUMP:g} mm where rough")
         if not (isinstance(self.ground_seed, int) and self.ground_seed >= 0):
             raise InputError(f"ground_seed = {self.ground_seed}; expected an integer of at least 0")
         if not 0 <= self.friction < math.inf:

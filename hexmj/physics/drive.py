@@ -1,65 +1,25 @@
-"""Physical walks: the insect follows the network's plan in MuJoCo, all starts at once on all cores.
+"""Physical walks: the insect follows a plan in MuJoCo, all starts at once on all cores.
 
 Settled starts go in, what was measured comes out, stretch by stretch; a start whose trunk has touched the
-ground is dropped.  While MuJoCo's threads step one stretch, this one plans the next and the caller measures
-the last.  A stretch shows the insect before each of its physics steps: what MuJoCo's sensors hold after a
-step belongs to the state before it.
+ground is dropped.  In the open loop the plan goes on by itself: while MuJoCo's threads step one stretch, this
+one plans the next and the caller measures the last.  `closed_loop` is the other way to walk.
 """
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from mujoco.batch import Batch
-from numba import njit
 
-from hexmj.physics import insect
+from hexmj.network import steps_within
 from hexmj.physics.clock import stopped_clock
-from hexmj.physics.divergence import raise_if_diverged
-from hexmj.physics.joint_targets import JointTargets, Orders
+from hexmj.physics.closed_loop import closed_loop
+from hexmj.physics.joint_targets import JointTargets
 from hexmj.physics.settling import Settled
+from hexmj.physics.stretches import Insects, Push, Stretch
 from hexmj.plans import Plan
 from hexmj.progress import Progress
-from hexmj.threads import thread_count
-from hexmj.walks import Walk
 
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """What some physics steps of the starts that still walk have shown."""
-
-    plan: Walk
-    """The plan over the stretch, of all starts."""
-    first: int
-    """Index of the first substep shown."""
-    ids: np.ndarray
-    """(n,) which starts these are."""
-    qpos: np.ndarray
-    """(n, substep, 25)."""
-    sensors: np.ndarray
-    """(n, substep, column), see `insect.Sensors`."""
-    standing: np.ndarray
-    """(n, substep, leg) whether the ground carried the foot within the last `Body.contact_gap`."""
-    force: np.ndarray
-    """(n, substep, joint) torques of the joints [g mm^2/s^2]."""
-    valid: np.ndarray
-    """(n,) substeps up to the fall, that one included."""
-    fell: np.ndarray
-    """(n,) whether the trunk touched the ground."""
-    unreachable: np.ndarray
-    """(n,) targets out of reach."""
-
-
-@dataclass(frozen=True, eq=False)
-class Push:
-    """A push from the side at the root, for each start; it lasts one stretch, `push_time`."""
-
-    impulse: np.ndarray
-    """(start,) to the left [g mm/s]."""
-    time: np.ndarray
-    """(start,) when it begins, rounded down to the beginning of a stretch [time units]."""
+__all__ = ["Push", "Stretch", "drive"]
 
 
 def drive(
@@ -82,67 +42,31 @@ def drive(
         progress: told the fraction done since it was last called.
 
     Raises:
+        InputError: with `Body.feedback`, a plan that cannot see.
         SimulationError: a simulation that diverged; its state is written for `divergence.replay`.
     """
-    network = settled.network
-    targets = JointTargets(settled, plan, duration)
-    batch = Batch(settled.mujoco_model, len(settled.starts), thread_count(threads))
-    batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
-    batch.bind("qacc_warmstart")[:] = settled.warmstart
-    columns, root = insect.sensors(settled.mujoco_model), settled.mujoco_model.body("mesothorax").id
-    unloaded = np.zeros((len(settled.starts), 6), dtype=int)
-    longest_gap = settled.body.contact_gap / 1000.0 / settled.mujoco_model.opt.timestep
+    insects = Insects(settled, push, threads)
+    loop = closed_loop if settled.body.feedback else _open_loop
+    total = int(steps_within(duration, settled.network)) * settled.body.substeps(settled.network)
+    told = 0.0
+    with stopped_clock():
+        for stretch in loop(insects, plan, duration):
+            yield stretch
+            if progress:
+                done = 1.0 if stretch.fell.all() else min(1.0, (stretch.first + stretch.qpos.shape[1]) / total)
+                progress(done - told)
+                told = done
 
-    def step(orders: Orders) -> tuple[np.ndarray, dict[str, Any]]:
-        """Positions before the stretch, (n, 25), and what MuJoCo records in it."""
-        ids = orders.ids
-        before = {name: batch.bind(name)[ids] for name in ("qpos", "qvel", "qacc_warmstart")}
-        time, speed = orders.plan.time[0] - network.dt, orders.plan.velocity[0]
-        if push:
-            now = (push.time >= time - 1e-9) & (push.time < time + len(orders.plan.time) * network.dt - 1e-9)
-            seconds = len(orders.plan.time) * settled.body.seconds(network)
-            batch.bind("xfrc_applied")[:, root, 1] = np.where(now, push.impulse / seconds, 0.0)
-        record = ("qpos", "sensordata", "actuator_force")
-        seen = batch.rollout(orders.control.shape[1], orders.control, record=record, ids=ids)
-        raise_if_diverged(batch, settled.body, ids, time, speed, before | {"ctrl": orders.control})
-        return before["qpos"], seen
 
-    with stopped_clock(), ThreadPoolExecutor(1) as stepper:
-        now = targets.ahead(np.arange(len(settled.starts)))
-        stepping = now and stepper.submit(step, now)
+def _open_loop(insects: Insects, plan: Plan, duration: float) -> Iterator[Stretch]:
+    """The plan goes on, whatever happens to the insects."""
+    targets = JointTargets(insects.settled, plan, duration)
+    now = targets.ahead(np.arange(len(insects.settled.starts)))
+    with ThreadPoolExecutor(1) as stepper:
+        stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
         while now and stepping:
             ahead = targets.ahead(now.ids)
-            before, seen = stepping.result()
-            touching = (seen["sensordata"][:, :, columns.trunk] > 0).any(axis=2)
-            fell = touching.any(axis=1)
-            following = ahead.only(~fell) if ahead and not fell.all() else None
-            stepping = following and stepper.submit(step, following)
-            valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
-            yield Stretch(
-                plan=now.plan,
-                first=now.first,
-                ids=now.ids,
-                qpos=np.concatenate([before[:, None], seen["qpos"][:, :-1]], axis=1),
-                sensors=seen["sensordata"],
-                standing=_standing(seen["sensordata"][:, :, columns.touch] > 0, unloaded, now.ids, longest_gap),
-                force=seen["actuator_force"][:, :, : insect.JOINT_ACTUATORS],
-                valid=valid,
-                fell=fell,
-                unreachable=np.where(np.arange(now.missed.shape[1]) < valid[:, None], now.missed, 0).sum(axis=1),
-            )
-            if progress:
-                done = following.first / targets.total if following else 1.0
-                progress(done - now.first / targets.total)
-            now = following
-
-
-@njit(cache=True, nogil=True)
-def _standing(touches: Any, unloaded: Any, ids: Any, longest_gap: float) -> Any:
-    """Which feet stand, (n, substep, leg); `unloaded`, (start, leg), counts the substeps since they last touched."""
-    standing = np.empty(touches.shape, dtype=np.bool_)
-    for i, start in enumerate(ids):
-        for t in range(touches.shape[1]):
-            for leg in range(6):
-                unloaded[start, leg] = 0 if touches[i, t, leg] else unloaded[start, leg] + 1
-                standing[i, t, leg] = unloaded[start, leg] <= longest_gap
-    return standing
+            stretch = stepping.result()
+            now = ahead.only(~stretch.fell) if ahead and not stretch.fell.all() else None
+            stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
+            yield stretch

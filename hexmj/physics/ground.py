@@ -3,14 +3,18 @@
 import mujoco
 import numpy as np
 
-from hexmj.physics.body import SHORTEST_LEG, Body
+from hexmj.physics.body import HIGHEST_BUMP, SHORTEST_LEG, Body
 
 WIDE = 200.0
 """Half the width of everything that lies ahead [mm]."""
 FAR = 1000.0
-"""Where it ends, if it has no length of its own [mm]."""
-CELL = 5.0
-"""Distance of the knots of rough ground [mm], a quarter of a step."""
+"""How far steps and the banks of a gap reach [mm]."""
+SPACING = 12.0
+"""Distance of the bumps' centres on rough ground [mm]; neighbours leave only small gaps."""
+BUMPS = (15, 9)
+"""Bumps along the way and across it, a field of 180 by 108 mm."""
+LOOK = {"contype": 0, "conaffinity": 0, "material": "ground", "rgba": (0.78, 0.84, 0.90, 1.0)}
+"""Of everything that lies ahead: the plane's colours, tinted to tell it from the plane."""
 
 
 def lay_ground(spec: mujoco.MjSpec, body: Body, legs: tuple[str, ...], trunk: tuple[str, ...]) -> None:
@@ -18,17 +22,30 @@ def lay_ground(spec: mujoco.MjSpec, body: Body, legs: tuple[str, ...], trunk: tu
     near, length, height = body.ground_at, body.ground_length, body.ground_height
     pieces = []
     if body.ground == "step":
-        pieces = [_box(spec, "step", near, FAR, height)]
+        pieces = [_box(spec, "step", near, near + FAR, height)]
     elif body.ground == "hurdle":
         pieces = [_box(spec, "hurdle", near, near + length, height)]
     elif body.ground == "gap":
         spec.geom("ground").pos[2] = -SHORTEST_LEG
         pieces = [_box(spec, "bank", -FAR, near, 0.0), _box(spec, "far_bank", near + length, near + length + FAR, 0.0)]
     elif body.ground == "rough":
-        pieces = [_bumps(spec, body)]
+        pieces = _caps(spec, body)
     for piece in pieces:
         for touching in (*trunk, *(f"{leg}_foot" for leg in legs)):
             spec.add_pair(name=f"{piece}_{touching}", geomname1=piece, geomname2=touching)
+
+
+def ground_level(body: Body, places: np.ndarray) -> np.ndarray:
+    """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
+    x = places[..., 0]
+    if body.ground == "rough":
+        centres, heights, radii = _bumps(body)
+        off = np.linalg.norm(places[..., None, :] - centres, axis=-1)
+        caps = np.sqrt(np.maximum(radii**2 - off**2, 0.0)) - (radii - heights)
+        return np.maximum(caps.max(axis=-1), 0.0)
+    end = np.inf if body.ground == "step" else body.ground_at + body.ground_length
+    height = {"flat": 0.0, "gap": -SHORTEST_LEG}.get(body.ground, body.ground_height)
+    return np.where((x > body.ground_at) & (x < end), height, 0.0)
 
 
 def _box(spec: mujoco.MjSpec, name: str, begin: float, end: float, top: float) -> str:
@@ -39,32 +56,35 @@ def _box(spec: mujoco.MjSpec, name: str, begin: float, end: float, top: float) -
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[(end - begin) / 2, WIDE, half],
         pos=[(begin + end) / 2, 0.0, top - half],
-        contype=0,
-        conaffinity=0,
-        material="ground",
+        **LOOK,
     )
     return name
 
 
-def _bumps(spec: mujoco.MjSpec, body: Body) -> str:
-    """Heights drawn uniformly at knots `CELL` apart, from the plane up to the height, rising over the first two."""
-    rows, columns = int(2 * WIDE / CELL) + 1, int((FAR - body.ground_at) / CELL) + 1
-    heights = np.random.default_rng(body.ground_seed).random((rows, columns))
-    heights[:, :2] *= (0.0, 0.5)
-    spec.add_hfield(
-        name="bumps",
-        nrow=rows,
-        ncol=columns,
-        size=[(columns - 1) * CELL / 2, WIDE, body.ground_height, SHORTEST_LEG],
-        userdata=heights.ravel(),
-    )
-    spec.worldbody.add_geom(
-        name="bumps",
-        type=mujoco.mjtGeom.mjGEOM_HFIELD,
-        hfieldname="bumps",
-        pos=[body.ground_at + (columns - 1) * CELL / 2, 0.0, 0.0],
-        contype=0,
-        conaffinity=0,
-        material="ground",
-    )
-    return "bumps"
+def _caps(spec: mujoco.MjSpec, body: Body) -> list[str]:
+    """Caps of spheres that lie under the plane.
+
+    However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that is
+    deeper than its distance from their sides sideways into the next, and there it stays.
+    """
+    names = []
+    for i, ((x, y), height, radius) in enumerate(zip(*_bumps(body), strict=True)):
+        names.append(f"bump_{i}")
+        spec.worldbody.add_geom(
+            name=names[-1],
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[radius, 0.0, 0.0],
+            pos=[x, y, height - radius],
+            **LOOK,
+        )
+    return names
+
+
+def _bumps(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
+    along, across = BUMPS
+    x = body.ground_at + HIGHEST_BUMP + SPACING * np.arange(along)
+    y = SPACING * (np.arange(across) - (across - 1) / 2)
+    heights = body.ground_height * np.random.default_rng(body.ground_seed).random(along * across)
+    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return centres, heights, (HIGHEST_BUMP**2 + heights**2) / (2 * heights)

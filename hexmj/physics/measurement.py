@@ -33,6 +33,9 @@ class Outcomes:
     """(start,) distance walked ahead over distance commanded, until the fall; NaN at V = 0."""
     slip: np.ndarray
     """(start,) mean sliding speed of a foot in contact [mm/s]."""
+    tracking: np.ndarray
+    """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], to
+    0.01 mm; inf beyond 20 mm."""
     saturation: np.ndarray
     """(start,) fraction of joints times physics steps in which the torque stood at its limit."""
     unreachable: np.ndarray
@@ -112,6 +115,7 @@ class Tally:
         self._walked, self._commanded = np.zeros(size), np.zeros(size)
         self._sums = np.zeros((size, len(_SUMS)))
         self._sums[:, _CLEARANCE], self._sums[:, _UPRIGHT] = np.inf, 1.0
+        self._misses = np.zeros((size, BINS + 1), dtype=np.uint32)
         self._corners = insect.trunk_corners(settled.mujoco_model)
 
     def add(self, stretch: Stretch) -> None:
@@ -120,8 +124,9 @@ class Tally:
         model, dt, m = settled.mujoco_model, settled.network.dt, settled.body.substeps(settled.network)
         columns, limit = insect.sensors(model), model.actuator_forcerange[: insect.JOINT_ACTUATORS, 1]
         feet, touch = columns.foot.start, columns.touch.start
-        seen = stretch.qpos, stretch.sensors, stretch.force, stretch.valid
-        _scan(*seen, feet, touch, *self._corners, 0.999 * limit, self._sums, ids)
+        seen = stretch.qpos, stretch.sensors, stretch.targets, stretch.force, stretch.valid
+        ground = -settled.body.standing_height
+        _scan(*seen, feet, touch, ground, *self._corners, 0.999 * limit, self._sums, self._misses, ids)
         n, last = np.arange(len(ids)), stretch.valid - 1
         trunk = stretch.sensors[n, last, columns.trunk] > 0
         fell = stretch.fell
@@ -151,9 +156,21 @@ class Tally:
             tilt=np.arccos(np.clip(sums[:, _UPRIGHT], -1.0, 1.0)),
             speed=speed,
             slip=slip,
+            tracking=_percentile(self._misses, 0.95),
             saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * insect.JOINT_ACTUATORS),
             unreachable=self._unreachable,
         )
+
+
+BIN, BINS = 0.01, 2000
+"""Width [mm] and number of the bins in which distances between feet and their targets are counted."""
+
+
+def _percentile(counts: np.ndarray, share: float) -> np.ndarray:
+    """Upper end [mm] of the bin that holds this share of the counts, (start, bin); inf in the last, open one."""
+    reached = np.cumsum(counts, axis=1) >= share * counts.sum(axis=1, keepdims=True)
+    ends = np.append(np.arange(1, BINS + 1) * BIN, np.inf)
+    return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
 
 
 _SUMS = _CLEARANCE, _UPRIGHT, _SLID, _CONTACTS, _SATURATED, _SHOWN = range(6)
@@ -161,13 +178,14 @@ _SUMS = _CLEARANCE, _UPRIGHT, _SLID, _CONTACTS, _SATURATED, _SHOWN = range(6)
 
 @njit(cache=True, nogil=True)
 def _scan(
-    qpos: Any, sensors: Any, force: Any, valid: Any, feet: int, touch: int,
-    corner: Any, radius: Any, limit: Any, sums: Any, ids: Any,
+    qpos: Any, sensors: Any, targets: Any, force: Any, valid: Any, feet: int, touch: int, ground: float,
+    corner: Any, radius: Any, limit: Any, sums: Any, misses: Any, ids: Any,
 ) -> None:  # fmt: skip
-    """Take a stretch's substeps into the sums of its starts."""
+    """Take a stretch's substeps into the sums and counts of its starts."""
     for i, start in enumerate(ids):
         total = sums[start]
         for t in range(valid[i]):
+            _count_misses(qpos[i, t], sensors[i, t, feet : feet + 18], targets[i, t], ground, misses[start])
             z, w, x, y, k = qpos[i, t, 2], qpos[i, t, 3], qpos[i, t, 4], qpos[i, t, 5], qpos[i, t, 6]
             up_x, up_y, up_z = 2 * (x * k - w * y), 2 * (y * k + w * x), 1 - 2 * (x * x + y * y)
             for c in range(len(corner)):
@@ -183,3 +201,20 @@ def _scan(
             for joint in range(len(limit)):
                 total[_SATURATED] += abs(force[i, t, joint]) >= limit[joint]
             total[_SHOWN] += 1.0
+
+
+@njit(cache=True, nogil=True)
+def _count_misses(qpos: Any, feet: Any, targets: Any, ground: float, counts: Any) -> None:
+    """Count the distance of each foot, (leg * axis), from its target, (leg, 3), if that is on the ground."""
+    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
+    xx, xy, xz = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    yx, yy, yz = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    zx, zy, zz = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    for leg in range(6):
+        a, b, c = targets[leg, 0], targets[leg, 1], targets[leg, 2]
+        if c == ground:
+            off_x = qpos[0] + xx * a + xy * b + xz * c - feet[3 * leg]
+            off_y = qpos[1] + yx * a + yy * b + yz * c - feet[3 * leg + 1]
+            off_z = qpos[2] + zx * a + zy * b + zz * c - feet[3 * leg + 2]
+            distance = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
+            counts[min(int(distance / BIN), BINS)] += 1

@@ -23,7 +23,7 @@ class PhysicalWalk:
     """Physical walks kept whole.  After a fall everything measured is NaN, and no foot stands."""
 
     planned: Walk
-    """What the network planned."""
+    """What the network planned; with `Body.feedback`, what it plans by itself."""
     measured: Walk
     """What the insect did: feet in contact, seen from its own centre of mass and heading."""
     outcomes: Outcomes
@@ -49,6 +49,9 @@ def physical_outcomes(
     progress: Progress | None = None,
 ) -> Outcomes:
     """How every settled start goes; only outcomes are kept.
+
+    The planned loss is always that of the network by itself, so that it stays the paper's measure, and the same
+    with and without `Body.feedback`.
 
     Args:
         settled: starts at rest, see `settling.settle`.

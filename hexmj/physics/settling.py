@@ -15,6 +15,7 @@ from hexmj.physics.body import Body
 from hexmj.physics.clock import stopped_clock
 from hexmj.physics.divergence import raise_if_diverged
 from hexmj.physics.kinematics import tips_to_joints
+from hexmj.physics.targets import standing_tips
 from hexmj.threads import thread_count
 
 AT_REST = 5.0
@@ -59,8 +60,7 @@ def settle(
     body, network = body or Body(), network or Network()
     x = checked_starts(starts, network)
     model = insect.load(body.seconds(network) / body.substeps(network), body, looks=False)
-    tips = np.stack([x + np.array(network.geometry.origin), np.broadcast_to(network.geometry.y, x.shape),
-                     np.full(x.shape, -body.standing_height)], axis=-1)  # fmt: skip
+    tips = standing_tips(x, body, network)
     joints, reachable = tips_to_joints(tips, legs := insect.dimensions(model))
     if not reachable.all():
         start, leg = np.argwhere(~reachable)[0]

@@ -46,6 +46,12 @@ class TipTargets:
         return tips
 
 
+def standing_tips(x: np.ndarray, body: Body, network: Network) -> np.ndarray:
+    """Tips on the ground in the root frame, (..., leg, 3) [mm], where they are at `x`, (..., leg), on their axes."""
+    tips = x + np.array(network.geometry.origin), np.broadcast_to(network.geometry.y, x.shape)
+    return np.stack([*tips, np.full(x.shape, -body.standing_height)], axis=-1)
+
+
 @njit(cache=True, nogil=True)
 def _follow(
     x: Any, stance: Any, ids: Any, x_old: Any, s_old: Any, lift: Any,

@@ -11,7 +11,10 @@ STEP = 0.5
 
 
 class CovarianceAdaptation:
-    """CMA-ES on the domain scaled to -1 ... 1 (binary: 0 ... 1); begins in its middle, and anew once converged."""
+    """CMA-ES on the domain scaled to -1 ... 1 (binary: 0 ... 1).
+
+    It begins in the middle or where the domain says, and somewhere else once it has converged.
+    """
 
     def __init__(self, domain: Domain, population: int = 10, seed: int = 0) -> None:
         if population < 4:
@@ -19,7 +22,7 @@ class CovarianceAdaptation:
         self._domain, self._population, self._rng = domain, population, np.random.default_rng([seed, 3])
         self._middle = np.where(domain.binary, 0.0, (domain.low + domain.high) / 2)
         self._half = np.where(domain.binary, 1.0, (domain.high - domain.low) / 2)
-        self._begin((domain.low + domain.high) / 2)
+        self._begin((domain.low + domain.high) / 2 if domain.begin is None else domain.begin)
 
     def ask(self) -> np.ndarray:
         """The next generation's parameters, (candidate, parameter)."""

@@ -15,6 +15,8 @@ class Domain:
     """(parameter,) greatest values; above 1/2 where binary."""
     binary: np.ndarray
     """(parameter,) whether the cost function takes only 0 or 1 there."""
+    begin: np.ndarray | None = None
+    """(parameter,) a set from which the search begins; each algorithm has a beginning of its own without it."""
 
     def read(self, individuals: np.ndarray) -> np.ndarray:
         """The parameters of individuals, both (..., parameter): a binary one is 1 where the number is above 1/2."""

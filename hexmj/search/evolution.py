@@ -18,13 +18,13 @@ class Evolution:
     """Q^n, the population of the n-th generation, behind ask and tell."""
 
     def __init__(self, domain: Domain, population: int = 10, seed: int = 0) -> None:
-        """Q^0: the '0'-individual and `population` - 1 individuals drawn over the domain."""
+        """Q^0: the '0'-individual or the domain's `begin`, and `population` - 1 individuals drawn over the domain."""
         if population < 2:
             raise InputError(f"population = {population}; expected at least 2 individuals")
         self._domain, self._rng = domain, np.random.default_rng([seed, 2])
         self.individuals = domain.draw(population, self._rng)
         """(individual, parameter) before binary parameters are read."""
-        self.individuals[0] = 0.0
+        self.individuals[0] = 0.0 if domain.begin is None else domain.begin
         self._known = np.empty(0)
 
     def ask(self) -> np.ndarray:

@@ -60,13 +60,14 @@ class Problem:
         """Names of the parameters, in the order of the vector."""
         return list(FORMS[self.form].names)
 
-    def domain(self, reach: float) -> Domain:
+    def domain(self, reach: float, begin: Model | None = None) -> Domain:
         """Where a search begins, not printed in the paper: -reach to reach for the neutral positions [mm], 0 to
         reach for shifts [mm] and weights (the signs of the printed sets), 0 to 1 for the binary P^2 and P^4."""
         if not 0 < reach < math.inf:
             raise InputError(f"domain = {reach}; expected a finite number above 0")
         form = FORMS[self.form]
-        return Domain(np.where(form.neutral, -reach, 0.0), np.where(form.binary, 1.0, reach), form.binary)
+        vector = None if begin is None else form.vector(begin)
+        return Domain(np.where(form.neutral, -reach, 0.0), np.where(form.binary, 1.0, reach), form.binary, vector)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.parameters import Model
 from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
@@ -41,6 +42,8 @@ class Plan:
     """Individuals of a generation; the paper's L."""
     domain: float = 10.0
     """Reach of the initial population [mm, or 1], see `Problem.domain`."""
+    begin: Model | None = None
+    """A set from which the population begins; without it the paper's '0'-individual, or the middle of the domain."""
     starts: int = 500
     """Starts of each candidate."""
     budget: int = 1000
@@ -96,8 +99,9 @@ def search(
         InputError: settings that make no sense, or a file that is damaged or of another search.
         SimulationError: a physical walk that failed; the history up to it is kept.
     """
-    domain = problem.domain(plan.domain)
-    history = History(path, problem.names(), {"problem": asdict(problem), "plan": asdict(plan)})
+    domain = problem.domain(plan.domain, plan.begin)
+    begin = None if domain.begin is None else domain.begin.tolist()
+    history = History(path, problem.names(), {"problem": asdict(problem), "plan": asdict(plan) | {"begin": begin}})
     work = plan.budget * plan.starts + plan.refine_budget * plan.refine_starts
 
     def costs(stage: str, starts: int) -> Costs:

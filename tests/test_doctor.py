@@ -1,0 +1,117 @@
+"""Every check of `hexmj doctor` passes here and, where its failure is simulated, reports it and names a remedy."""
+
+import json
+import sys
+from importlib import metadata
+
+import pytest
+
+from hexmj.cli import main
+from hexmj.errors import SimulationError
+from hexmj.physics import physical_walks
+from hexmj.trust import machine
+from hexmj.trust.machine import CHECKS, Unfit, examine
+
+
+def only(monkeypatch, name: str) -> None:
+    monkeypatch.setattr(machine, "CHECKS", {name: CHECKS[name]})
+
+
+def doctor(monkeypatch, capsys, *words: str) -> tuple[int, str]:
+    monkeypatch.setattr(sys, "argv", ["hexmj", "doctor", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return int(stop.value.code or 0), capsys.readouterr().out
+
+
+def test_this_machine_is_fit(monkeypatch, capsys):
+    code, out = doctor(monkeypatch, capsys)
+    lines = out.splitlines()
+    assert code == 0, out
+    assert len(lines) == len(CHECKS)
+    assert all(line.startswith(f"well   {name}: ") for line, name in zip(lines, CHECKS, strict=True))
+
+
+def an_old_mujoco(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine, "version", lambda name: "4.0.0" if name == "mujoco" else metadata.version(name))
+
+
+def a_missing_package(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine, "requires", lambda name: [*(metadata.requires(name) or []), "no-such-package"])
+
+
+def an_old_python(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine.platform, "python_version", lambda: "3.10.4")
+
+
+def a_small_quota(monkeypatch, tmp_path):
+    (tmp_path / "cpu.max").write_text("50000 100000\n")
+    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
+
+
+def no_driver(monkeypatch, tmp_path):
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+
+
+def no_ffmpeg(monkeypatch, tmp_path):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "ffmpeg"))
+
+
+def no_cache(monkeypatch, tmp_path):
+    def refuse(dir: str) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(machine.tempfile, "TemporaryFile", refuse)
+
+
+def no_walk(monkeypatch, tmp_path):
+    def diverge(*arguments: object, **options: object) -> None:
+        raise SimulationError("start 0 diverged")
+
+    monkeypatch.setattr(physical_walks, "physical_walk", diverge)
+
+
+@pytest.mark.parametrize(
+    ("name", "failure", "found"),
+    [
+        ("versions", an_old_mujoco, "mujoco 4.0.0, expected <4,>=3.17"),
+        ("versions", a_missing_package, "no-such-package is not installed"),
+        ("versions", an_old_python, "Python 3.10.4, expected >=3.11"),
+        ("threads", a_small_quota, "would share 0.5 cores"),
+        ("rendering", no_driver, "GLContext"),
+        ("films", no_ffmpeg, "ffmpeg"),
+        ("compiled code", no_cache, "Permission denied"),
+        ("walking", no_walk, "start 0 diverged"),
+    ],
+)
+def test_a_failure_is_reported_with_its_remedy(monkeypatch, capsys, tmp_path, name, failure, found):
+    only(monkeypatch, name)
+    failure(monkeypatch, tmp_path)
+    code, out = doctor(monkeypatch, capsys, "--json")
+    answer = json.loads(out)
+    (check,) = answer["checks"]
+    assert code == 1
+    assert answer["well"] is False
+    assert check["name"] == name and check["well"] is False
+    assert found in check["found"]
+    assert check["remedy"] == CHECKS[name][1]
+
+
+def test_one_failure_does_not_hide_the_others(monkeypatch):
+    def broken() -> str:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(machine, "CHECKS", {"first": (broken, "mend it"), "second": (lambda: "all is well", "")})
+    first, second = examine()
+    assert (first.well, first.found, first.remedy) == (False, "ZeroDivisionError", "mend it")
+    assert (second.well, second.found) == (True, "all is well")
+
+
+def test_quotas_are_read_where_there_are_any(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
+    assert "one for each core" in machine.threads()
+    (tmp_path / "cpu.max").write_text("max 100000\n")
+    assert "one for each core" in machine.threads()
+    (tmp_path / "cpu.max").write_text("1000 100000\n")
+    with pytest.raises(Unfit, match=r"share 0\.01 cores"):
+        machine.threads()

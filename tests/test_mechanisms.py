@@ -1,0 +1,141 @@
+"""Mechanisms of falls and rescues: they share out all starts, know no left and right, and their names are true."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hexmj.experiments.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
+from hexmj.legs import FIG1, MIRROR, Geometry
+from hexmj.loss_frequency import draw_starts
+from hexmj.network import first_loss, walk
+from hexmj.parameters import LDVS, Network
+from hexmj.physics.body import Body
+from hexmj.physics.measurement import Outcomes
+from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
+from hexmj.stability import loss_time
+from hexmj.walks import Walk
+
+NAMES = np.array(list(MECHANISMS))
+RIGHT_AND_FRONT = [0, 3, 4, 5]  # lifted, these leave two feet on the left
+STEPS, LOST, LANDED, END = 300, 100, 140, 200  # of 1.25 ms; END is that of a fall
+
+
+@pytest.fixture(scope="module", params=[80.0, 320.0])
+def walked(request):
+    return physical_walk(draw_starts(24, 0), LDVS, 0.7, 80.0, vp=request.param)
+
+
+def staged(*, fall: bool = False, lean: dict[int, tuple[float, float]] | None = None, **stands: slice) -> PhysicalWalk:
+    """A walk of one start on a stage: four legs are in the air from `LOST` to `LANDED`.
+
+    Args:
+        fall: at `END`.
+        lean: step -> how far the trunk leans ahead and to the left from there on [rad].
+        stands: when each of the legs in the air is measured to stand all the same.
+    """
+    steps = END if fall else STEPS
+    planned = np.ones((STEPS, 1, 6), dtype=bool)
+    planned[LOST:LANDED, 0, RIGHT_AND_FRONT] = False
+    measured = planned.copy()
+    for leg, when in stands.items():
+        measured[when, 0, int(leg[3:])] = True
+    measured[steps:] = False
+    qpos = np.zeros((STEPS, 1, 25))
+    qpos[..., 3] = 1.0
+    for step, (ahead, left) in (lean or {}).items():
+        angle = np.hypot(ahead, left)
+        axis = np.array([-left, ahead]) / max(angle, 1e-9)  # the trunk turns about it
+        qpos[step:, 0, 3], qpos[step:, 0, 4:6] = np.cos(angle / 2), np.sin(angle / 2) * axis
+    qpos[steps:] = np.nan
+    time, x = np.arange(1, STEPS + 1) * 0.1, np.zeros((STEPS, 1, 6))
+    y, v = np.broadcast_to(FIG1.y, x.shape), np.full((STEPS, 1), 0.5)
+    seen = np.where(np.isnan(qpos[..., :1]), np.nan, x)
+    outcomes = Outcomes(**{name: np.full(1, np.inf) for name in Outcomes.__dataclass_fields__})
+    outcomes = replace(outcomes, fall=np.array([END * 0.1 if fall else np.inf]))
+    walks = Walk(time, v, x, y, planned), Walk(time, v, seen, y, measured)
+    return PhysicalWalk(*walks, outcomes, qpos, np.zeros((STEPS, 1, 3)), Body(), Network())
+
+
+def mirrored(walk: PhysicalWalk) -> PhysicalWalk:
+    """The same walk in a mirror: left and right legs change places, rolling and turning their sign."""
+    legs = list(MIRROR)
+
+    def reflect(one: Walk) -> Walk:
+        return replace(one, x=one.x[..., legs], y=-one.y[..., legs], stance=one.stance[..., legs])
+
+    qpos = walk.qpos.copy()
+    qpos[..., [1, 4, 6]] *= -1.0
+    return replace(walk, planned=reflect(walk.planned), measured=reflect(walk.measured), qpos=qpos)
+
+
+def test_every_start_has_the_mechanism_that_its_outcomes_allow(walked):
+    names = NAMES[mechanisms(walked)]
+    fell, lost = np.isfinite(walked.outcomes.fall), np.isfinite(walked.outcomes.planned_loss)
+    assert fell.any()
+    assert (lost & ~fell).any()
+    assert np.array_equal(np.isin(names, SAVED), lost & ~fell)
+    assert np.array_equal(names == "never_lost", ~lost & ~fell)
+    assert np.array_equal(np.isfinite(fall_direction(walked)), fell)
+    assert (lost | (names == "unplanned"))[fell].all()
+
+
+def test_in_a_mirror_the_mechanisms_are_the_same_and_falls_go_to_the_other_side(walked):
+    assert np.array_equal(mechanisms(mirrored(walked)), mechanisms(walked))
+    assert_allclose(fall_direction(mirrored(walked)), -fall_direction(walked))
+
+
+def test_other_thresholds_move_few_falls(walked):
+    """Half or twice the tilt that counts as tipped moves few falls between names."""
+    fell = np.isfinite(walked.outcomes.fall)
+    usual = mechanisms(walked)[fell]
+    for tipped in (0.025, 0.1):
+        assert (mechanisms(walked, tipped)[fell] == usual).mean() >= 0.8
+
+
+STAGED = {
+    "never_lost": {},
+    "still_standing": {},
+    "too_short": {"lean": {110: (0.0, -0.04), 150: (0.0, 0.0)}},
+    "landed_in_time": {"lean": {110: (0.0, -0.08), 150: (0.0, 0.0)}},
+    "caught": {"lean": {110: (0.1, -0.2), 150: (0.0, 0.0)}, "leg4": slice(120, 140)},
+    "tipped_behind": {"lean": {120: (-0.1, -0.1)}, "fall": True},
+    "tipped_ahead": {"lean": {120: (0.1, -0.1)}, "fall": True},
+    "thrown": {"lean": {110: (0.1, -0.2), 150: (-0.2, 0.1)}, "leg4": slice(120, 140), "fall": True},
+    "unplanned": {"lean": {190: (-0.2, 0.1)}, "fall": True},
+}
+
+
+@pytest.mark.parametrize("name", STAGED)
+def test_names_are_true_on_a_stage(name):
+    walk = staged(**STAGED[name])
+    if name in ("never_lost", "still_standing"):  # all feet stay down, by plan or by delay
+        walk.measured.stance[:] = True
+    if name == "never_lost":
+        walk.planned.stance[:] = True
+    assert NAMES[mechanisms(walk)[0]] == name
+
+
+def test_a_leg_that_catches_and_then_lets_the_trunk_on_is_not_said_to_throw_it():
+    lean = {110: (-0.1, -0.1), 150: (-0.15, -0.15)}
+    walk = staged(lean=lean, leg4=slice(120, 140), fall=True)
+    assert NAMES[mechanisms(walk)[0]] == "tipped_behind"
+    assert_allclose(fall_direction(walk), np.radians(-135.0))
+
+
+def test_of_several_losses_the_hardest_names_the_start():
+    walk = staged(lean={110: (0.0, -0.08), 150: (0.0, 0.0)})
+    walk.planned.stance[220:230, 0, RIGHT_AND_FRONT] = False  # the feet stay down
+    assert NAMES[mechanisms(walk)[0]] == "landed_in_time"
+
+
+def test_the_static_criterion_sees_the_body_from_its_own_centre_of_mass():
+    """To move the centre of mass ahead is to move all legs behind."""
+    starts, behind = draw_starts(40, 1), -6.0
+    front, middle, hind = FIG1.origins
+    moved = Network(geometry=Geometry(origins=(front - behind, middle - behind, hind - behind)))
+    seen = replace(staged(), planned=walk(starts, LDVS, 0.5, 60.0), body=Body(centre_of_mass=behind))
+    losses = loss_time(static_plan(seen))
+    assert np.array_equal(losses, first_loss(starts, LDVS, 0.5, 60.0, network=moved))
+    assert np.isfinite(losses).any()

@@ -1,0 +1,231 @@
+"""Real obstacles: what lies ahead is solid, is not felt before it is reached, and every start is counted once."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
+
+from film_reader import read_film
+from hexmj.cli import Conditions, Terrain
+from hexmj.commands.terrain import run_terrain
+from hexmj.errors import InputError
+from hexmj.experiments.terrain import obstacles, reach, terrain
+from hexmj.experiments.terrain_figure import terrain_figure
+from hexmj.film.film import Film
+from hexmj.film.video import render
+from hexmj.legs import LEGS
+from hexmj.loss_frequency import draw_starts
+from hexmj.parameters import LDVS, Network
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.ground import ground_level
+from hexmj.physics.physical_walks import PhysicalWalk, physical_outcomes, physical_walk
+from hexmj.physics.settling import settle
+from hexmj.recording import load_recording, record, recorded_body, save_recording
+
+GROUNDS = {
+    "flat": Body(ground_at=45.0),
+    "step": Body(ground="step", ground_at=45.0),
+    "gap": Body(ground="gap", ground_at=45.0, ground_length=5.0),
+    "hurdle": Body(ground="hurdle", ground_at=45.0),
+    "rough": Body(ground="rough", ground_at=45.0, ground_height=4.0),
+}
+FEW = {"velocities": (0.6,), "grounds": ("step",), "heights": (4.0,), "grasps": (0.0,), "starts": 6}
+
+
+@cache
+def walked(ground: str) -> PhysicalWalk:
+    """A few starts that reach the obstacle when they have walked 7 mm, and cross it."""
+    return physical_walk(draw_starts(3, seed=0), LDVS, 0.6, 150.0, body=GROUNDS[ground])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("walks")
+
+
+@pytest.fixture(scope="module")
+def few(folder) -> xr.Dataset:
+    return terrain(LDVS, folder, **FEW)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_the_ground_is_as_high_as_it_says(ground):
+    """Rays from above meet the compiled geoms where `ground_level` has the ground."""
+    body = GROUNDS[ground]
+    model = insect.load(body=body)
+    data = mujoco.MjData(model)
+    data.qpos[1] = 5000.0  # the insect out of the way
+    mujoco.mj_forward(model, data)
+    places = np.random.default_rng(1).uniform((30.0, -40.0), (90.0, 40.0), (200, 2))
+    hit = np.zeros(1, dtype=np.int32)
+    down = [
+        mujoco.mj_ray(model, data, np.array([*place, 50.0]), np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
+        for place in places
+    ]
+    levels = ground_level(body, places)
+    assert_allclose(50.0 - np.array(down), levels, atol=1e-6)
+    assert (levels != 0).any() == (ground != "flat")
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_the_trunk_on_any_ground_is_a_fall(ground):
+    """Laid down with its legs in the air, on the obstacle itself."""
+    body = replace(GROUNDS[ground], ground_length=300.0) if ground == "hurdle" else GROUNDS[ground]
+    model = insect.load(body=body)
+    data = mujoco.MjData(model)
+    data.qpos[:7] = 150.0, 0.0, ground_level(body, np.array([150.0, 0.0])) + 1.0, 0.0, 1.0, 0.0, 0.0
+    mujoco.mj_forward(model, data)
+    assert data.sensordata[insect.sensors(model).trunk].any()
+    assert {model.geom(geom).name for geom in data.contact.geom[:, 0]} != ({"ground"} if ground != "flat" else set())
+
+
+@pytest.mark.parametrize("ground", ["step", "hurdle"])
+def test_feet_stand_on_top_as_on_the_plane(ground):
+    body = replace(GROUNDS[ground], ground_length=300.0)
+    depths, forces = [], []
+    for one, ahead, up in ((GROUNDS["flat"], 0.0, 0.0), (body, 150.0, body.ground_height)):
+        model = insect.load(body=one)
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        data.qpos[0] += ahead
+        data.qpos[2] += up
+        mujoco.mj_step(model, data, nstep=500)
+        mujoco.mj_forward(model, data)
+        depths.append(np.sort(data.contact.dist))
+        forces.append(data.sensordata[insect.sensors(model).touch].copy())
+    assert_allclose(depths[1], depths[0], atol=0.001)
+    assert_allclose(forces[1], forces[0], rtol=0.01)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_no_foot_stays_in_the_ground(ground):
+    """It may be deep for a moment, as on the plane, when it lands fast; within 25 ms it is out."""
+    walk = walked(ground)
+    model = insect.load()
+    data, radius = mujoco.MjData(model), insect.dimensions(model).foot
+    for start in range(walk.qpos.shape[1]):
+        seen = walk.qpos[np.isfinite(walk.qpos[:, start, 0]), start]
+        feet = np.empty((len(seen), 6, 3))
+        for step, data.qpos[:] in enumerate(seen):
+            mujoco.mj_kinematics(model, data)
+            feet[step] = [data.site(f"{leg}_foot").xpos for leg in LEGS]
+        above = feet[..., 2] - radius - ground_level(walk.body, feet[..., :2])
+        out = np.lib.stride_tricks.sliding_window_view(above, 20, axis=0).max(axis=-1)
+        assert out.min() > -0.06
+
+
+@pytest.mark.parametrize("ground", ["step", "gap", "hurdle", "rough"])
+def test_nothing_is_felt_before_it_is_reached(ground):
+    """The same bits as on flat ground; a bank's box rounds other than a plane."""
+    flat, ahead = walked("flat").qpos, walked(ground).qpos
+    far = np.where(np.isfinite(flat), flat, 0.0)[..., 0].max(axis=1) < GROUNDS[ground].ground_at - reach(Network())[0]
+    assert 50 < far.sum() < len(far)
+    if ground == "gap":
+        assert_allclose(ahead[far], flat[far], atol=1e-9)
+    else:
+        assert_array_equal(ahead[far], flat[far])
+    assert not np.array_equal(ahead, flat, equal_nan=True)
+
+
+def test_every_start_is_counted_once(few):
+    """Reached are those that did not fall before; of them some fall, some cross, the rest is held up."""
+    flat, step = few.isel(obstacle=0), few.isel(obstacle=1)
+    assert few.obstacle.values.tolist() == ["flat", "step 4 mm"]
+    assert_array_equal(step.reached, flat.reached)
+    begin = few.attrs["body"]["ground_at"] - reach(Network())[0]
+    before = few.fall * few.velocity <= begin
+    assert_array_equal(few.reached + before.sum("start"), few.sizes["start"])
+    assert_array_equal(before.isel(obstacle=0), before.isel(obstacle=1))
+    assert_array_equal(flat.fall.where(before.isel(obstacle=0)), step.fall.where(before.isel(obstacle=1)))
+    assert_allclose(few.flss * few.reached, few.after.sum("start"))
+    assert (few.flss_low <= few.flss).all()
+    assert (few.flss <= few.flss_high).all()
+    assert (few.crossed + few.after.sum("start") <= few.reached).all()
+
+
+def test_a_cell_is_a_physical_walk_of_that_body(few):
+    body = Body(ground_at=80.0, ground="step", ground_height=4.0)
+    settled = settle(draw_starts(6, 0), body)
+    walks = physical_outcomes(settled, LDVS, 0.6, few.attrs["distance"] / 0.6, threads=1)
+    one = few.sel(obstacle="step 4 mm").squeeze()
+    for name in ("fall", "fall_part", "tilt", "speed"):
+        assert_array_equal(one[name], getattr(walks, name))
+
+
+def test_what_is_finished_is_not_walked_again(few, folder, monkeypatch):
+    monkeypatch.setattr("hexmj.experiments.terrain.settle", lambda *_: pytest.fail("walked again"))
+    xr.testing.assert_identical(terrain(LDVS, folder, **FEW), few)
+
+
+def test_where_nothing_is_reached_there_is_no_frequency(folder):
+    """At V = 0.95 this start falls at once."""
+    alone = np.isnan(terrain(LDVS, folder, **FEW | {"starts": 1, "seed": 1, "velocities": (0.95,)}).flss)
+    assert alone.all()
+
+
+def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
+    figure = terrain_figure(few)
+    assert [axes.get_xlabel() for axes in figure.axes] == ["height of the step [mm]"]
+
+
+def test_the_command_prints_what_it_measured(few, folder, tmp_path, capsys):
+    names = {name: FEW[name] for name in ("velocities", "grounds", "heights", "grasps", "starts")}
+    (tmp_path / "walks").symlink_to(folder)
+    run_terrain(Terrain(**names, out=tmp_path, json=True))
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["flss"] == few.flss.values.tolist()
+    run_terrain(Terrain(**names, out=tmp_path))
+    assert "step 4 mm" in capsys.readouterr().out
+    with xr.open_dataset(tmp_path / "terrain.nc", engine="h5netcdf") as saved:
+        assert_array_equal(saved.fall, few.fall)
+    assert {"terrain.png", "manifest.json"} <= {file.name for file in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"heights": (32.0,)}, "ground_height = 32.0; expected above 0 and at most 31 mm"),
+        ({"heights": (float("nan"),)}, "ground_height = nan; expected above 0"),
+        ({"heights": (2.0, 2.0)}, "heights = .*; expected at least one, and none of them twice"),
+        ({"grounds": ("gap",), "lengths": ()}, "lengths = .*; expected at least one"),
+        ({"grounds": ("gap",), "lengths": (0.0,)}, "ground_length = 0.0; expected above 0"),
+        ({"grounds": ("rough",), "heights": (9.0,)}, "ground_height = 9.0; expected at most 8 mm where rough"),
+        ({"grounds": ("flat",)}, "'flat' is none of step, gap, hurdle, rough"),
+        ({"grasps": (-1.0,)}, "grasp = -1.0; expected 0 to 100"),
+        ({"velocities": (0.0,)}, "velocities = .*; expected V > 0"),
+        ({"starts": 0}, "starts = 0; expected a whole number"),
+        ({"conditions": Conditions(body=Body(ground="step"))}, "--ground = step; expected --grounds"),
+        ({"conditions": Conditions(body=Body(grasp=1.0))}, "--grasp = 1.0; expected --grasps"),
+        ({"conditions": Conditions(window="start")}, "--window = start; expected none"),
+        ({"conditions": Conditions(acceleration=0.00008)}, "--acceleration = 8e-05; expected none"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(wrong, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        run_terrain(Terrain(**{"starts": 2, "velocities": (0.6,), "out": tmp_path / "out"} | wrong))
+    assert not (tmp_path / "out").exists()
+
+
+def test_obstacles_have_their_names_and_sizes():
+    worlds = obstacles(Body(), ("gap", "hurdle"), (2.0,), (5.0,))
+    assert list(worlds) == ["flat", "gap 5 mm", "hurdle 2 mm"]
+    assert worlds["gap 5 mm"] == Body(ground="gap", ground_length=5.0)
+    assert worlds["hurdle 2 mm"] == Body(ground="hurdle", ground_height=2.0)
+
+
+def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
+    path = save_recording(record(walked("step"), 0).isel(step=slice(600, 640)), tmp_path / "recording.nc")
+    film, shown = Film(width=160, height=120, slow_motion=1.0), []
+    with load_recording(path) as recording:
+        assert recorded_body(recording) == GROUNDS["step"]
+        for ground in ("step", "flat"):
+            render([recording.assign_attrs(ground=ground)], tmp_path / "film.mp4", film)
+            shown.append(read_film(tmp_path / "film.mp4")[0].astype(int))
+    assert np.abs(shown[0] - shown[1]).mean() > 2.0

@@ -1,0 +1,299 @@
+"""Laws that the physics must keep: units, mirror, time step, momentum, penetration, energy, and the static limit."""
+
+import copy
+import json
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+from numpy.testing import assert_allclose
+
+from hexmj.cli import main
+from hexmj.comparison import physical_flss
+from hexmj.errors import InputError
+from hexmj.legs import MIRROR
+from hexmj.loss_frequency import draw_starts
+from hexmj.network import NetworkRun
+from hexmj.parameters import LDVS
+from hexmj.physics import insect
+from hexmj.physics.body import Body
+from hexmj.physics.drive import drive
+from hexmj.physics.joint_targets import JointTargets
+from hexmj.physics.physical_walks import physical_outcomes, physical_walk
+from hexmj.physics.settling import Settled, settle
+from hexmj.trust import static_limit
+from hexmj.trust.static_limit import converge
+
+MM, G = 1e-3, 1e-3  # in m and kg
+LENGTHS = (
+    "body_pos", "body_ipos", "jnt_pos", "geom_pos", "geom_size", "geom_rbound", "geom_aabb", "bvh_aabb", "site_pos",
+    "site_size", "pair_margin", "pair_gap",
+)  # fmt: skip
+TORQUES = ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "dof_damping")
+INERTIAS = ("body_inertia", "dof_armature")
+WEIGHT = insect.MASS * insect.GRAVITY
+FALL_HEIGHT = 20.0  # mm
+
+
+def in_si(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The same insect in m, kg, s: every number of the compiled model that has a length or a mass in its unit."""
+    si = copy.copy(model)
+    scales = [(MM, LENGTHS), (G, ("body_mass",)), (G * MM**2, TORQUES + INERTIAS)]
+    for scale, names in scales:
+        for name in names:
+            getattr(si, name)[:] *= scale
+    si.pair_solimp[:, 2] *= MM  # the width of the transition; that of joint limits is an angle
+    si.pair_friction[:, 2:] *= MM  # torsion and rolling
+    for qpos in (si.qpos0, si.qpos_spring, si.key_qpos[0]):
+        qpos[:3] *= MM
+    si.opt.gravity[:] *= MM
+    si.opt.tolerance *= MM  # an acceleration
+    si.opt.ccd_tolerance *= MM
+    mujoco.mj_setConst(si, mujoco.MjData(si))
+    si.stat.meaninertia = si.dof_M0.mean()  # as the compiler has it
+    return si
+
+
+def walk_of(model: mujoco.MjModel, settled: Settled, control: np.ndarray, length: float) -> np.ndarray:
+    """Paths of the roots, (start, substep, 3), in a model whose unit of length is `length` mm."""
+    batch = Batch(model, len(settled.starts), 2)
+    for name, values in {"qpos": settled.qpos, "qvel": settled.qvel, "qacc_warmstart": settled.warmstart}.items():
+        batch.bind(name)[:] = values
+        batch.bind(name)[:, :3] /= length
+    return batch.rollout(control.shape[1], control, record=("qpos",))["qpos"][:, :, :3] * length
+
+
+def test_the_same_insect_in_si_units_walks_the_same_way():
+    settled = settle(draw_starts(6, 0))
+    targets = JointTargets(settled, NetworkRun(settled.starts, LDVS, 0.5), 60.0)
+    orders = list(iter(lambda: targets.ahead(np.arange(6)), None))
+    control = np.concatenate([one.control for one in orders], axis=1)
+    model = settled.mujoco_model
+    assert_allclose(model.dof_M0.mean(), model.stat.meaninertia)
+    ours, si = walk_of(model, settled, control, 1.0), walk_of(in_si(model), settled, control, 1 / MM)
+    length = np.linalg.norm(ours[:, -1] - ours[:, 0], axis=1)
+    assert (length > 20.0).all()
+    assert (np.linalg.norm(ours - si, axis=2).max(axis=1) < 0.005 * length).all()
+    forgotten = in_si(model)
+    forgotten.pair_solimp[:, 2] /= MM
+    off = np.linalg.norm(ours - walk_of(forgotten, settled, control, 1 / MM), axis=2).max(axis=1)
+    assert (off > 0.005 * length).any(), "this test would not notice a length that was left in mm"
+
+
+def test_mirrored_starts_walk_mirrored_paths():
+    starts, mirror = draw_starts(8, 3), list(MIRROR)
+    one, other = (physical_walk(x, LDVS, 0.5, 40.0) for x in (starts, starts[:, mirror]))
+    assert np.array_equal(one.outcomes.fall, other.outcomes.fall)
+    assert_allclose(one.qpos[..., :3], other.qpos[..., :3] * [1, -1, 1], atol=1e-9)
+    assert_allclose(one.measured.x, other.measured.x[..., mirror], atol=1e-9)
+    assert np.array_equal(one.measured.stance, other.measured.stance[..., mirror])
+
+
+def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
+    """`test_physics` has the half of it, with 200 starts."""
+    whole, quarter = (
+        physical_flss(LDVS, [0.5], starts=60, window="start", body=Body(longest_substep=ms)) for ms in (0.625, 0.15625)
+    )
+    assert whole.low.item() <= quarter.flss.item() <= whole.high.item()
+
+
+@pytest.fixture(scope="module")
+def resting():
+    """Forces, (start, leg) [g mm/s^2], and heights, (start, leg) [mm], of the feet of 30 starts that stand still."""
+    settled = settle(draw_starts(30, 4))
+    first = next(iter(drive(settled, NetworkRun(settled.starts, LDVS, 0.0), 1.0)))
+    columns = insect.sensors(settled.mujoco_model)
+    return first.sensors[:, 0, columns.touch], heights(settled, first.sensors[:, 0])
+
+
+def heights(settled: Settled, sensors: np.ndarray) -> np.ndarray:
+    """Of the feet's lowest points, (..., leg) [mm]."""
+    model = settled.mujoco_model
+    feet = sensors[..., insect.sensors(model).foot]
+    return feet.reshape(*feet.shape[:-1], 6, 3)[..., 2] - insect.dimensions(model).foot
+
+
+def test_at_rest_the_feet_carry_the_weight_and_hardly_sink_in(resting):
+    force, height = resting
+    assert_allclose(force.sum(axis=1), WEIGHT, rtol=0.01)
+    assert -height.min() < 0.02 * Body().standing_height
+
+
+@pytest.fixture(scope="module")
+def walking():
+    """12 settled starts and what their sensors showed in 40 time units, (start, substep, column)."""
+    settled = settle(draw_starts(12, 4))
+    shown = [one for one in drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 40.0)]
+    assert not any(one.fell.any() for one in shown), "this test needs starts that do not fall"
+    return settled, np.concatenate([one.sensors for one in shown], axis=1)
+
+
+def test_over_a_walk_the_ground_carries_the_weight(walking):
+    """Momentum: mean vertical force = weight + change of vertical momentum over time."""
+    settled, sensors = walking
+    columns, h = insect.sensors(settled.mujoco_model), settled.mujoco_model.opt.timestep
+    force = sensors[:, 1:-1, columns.touch].sum(axis=2)
+    height = sensors[:, :, columns.centre_of_mass][:, :, 2]
+    momentum = insect.MASS * np.diff(height, axis=1) / h
+    balance = force.mean(axis=1) - (momentum[:, -1] - momentum[:, 0]) / (h * force.shape[1])
+    assert_allclose(balance, WEIGHT, rtol=0.001)
+
+
+def test_feet_sink_in_only_when_they_land(walking):
+    """95 % of the time by less than 2 % of the standing height; on landing by up to 1.8 mm, see the README."""
+    settled, sensors = walking
+    depth = -heights(settled, sensors)[sensors[:, :, insect.sensors(settled.mujoco_model).touch] > 0]
+    assert np.percentile(depth, 95) < 0.02 * settled.body.standing_height
+    assert depth.max() < 2.0
+
+
+def fall_energy(timestep: float, integrator: mujoco.mjtIntegrator, seconds: float, seed: int) -> np.ndarray:
+    """Total energy, (step,) [g mm^2/s^2], of an insect without muscles, turning and waving its legs as it falls."""
+    model = insect.load(timestep, looks=False)
+    model.opt.integrator = integrator
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.qpos[2] += FALL_HEIGHT
+    rng = np.random.default_rng(seed)
+    data.qvel[3:6], data.qvel[6:] = rng.normal(0.0, 5.0, 3), rng.normal(0.0, 1.0, 18)
+    energy = []
+    for _ in range(round(seconds / timestep)):
+        mujoco.mj_forward(model, data)
+        energy.append(data.energy.sum())
+        mujoco.mj_step(model, data)
+    assert data.warning.number.sum() == 0
+    return np.array(energy)
+
+
+def test_free_flight_conserves_energy_as_far_as_the_integrator_does():
+    """To 1e-9 of the potential energy lost with Runge-Kutta; ours loses a share that halves with the time step."""
+    seconds, integrators = 0.05, mujoco.mjtIntegrator
+    gained = WEIGHT * insect.GRAVITY * seconds**2 / 2
+    exact = fall_energy(0.001, integrators.mjINT_RK4, seconds, 0)
+    assert np.ptp(exact) < 1e-9 * gained
+    coarse, fine = (-np.diff(fall_energy(h, integrators.mjINT_IMPLICITFAST, seconds, 0)).sum() for h in (1e-3, 5e-4))
+    assert 0 < coarse < 0.02 * gained
+    assert coarse / fine == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_passive_fall_never_gains_energy(seed):
+    """What soft contacts give back within it is below 1 % of what they and the joints' limits take."""
+    energy = fall_energy(0.000625, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, 0.4, seed)
+    lost = energy[0] - energy[-1]
+    assert lost > WEIGHT * FALL_HEIGHT
+    assert energy.max() == energy[0]
+    assert (energy - np.minimum.accumulate(energy)).max() < 0.01 * lost
+
+
+def test_tracking_is_the_percentile_of_the_feets_distances():
+    """The same distances, kept whole: root, foot and target of every substep until the fall."""
+    settled = settle(draw_starts(6, 0))
+    outcomes = physical_outcomes(settled, LDVS, 0.5, 40.0)
+    columns = insect.sensors(settled.mujoco_model)
+    seen: list[list[np.ndarray]] = [[] for _ in range(6)]
+    for one in drive(settled, NetworkRun(settled.starts, LDVS, 0.5), 40.0):
+        for row, start in enumerate(one.ids):
+            qpos, targets = one.qpos[row, : one.valid[row]], one.targets[row, : one.valid[row]]
+            feet = one.sensors[row, : one.valid[row], columns.foot].reshape(-1, 6, 3)
+            turned = np.empty_like(targets)
+            matrix = np.empty(9)
+            for t in range(len(qpos)):
+                mujoco.mju_quat2Mat(matrix, qpos[t, 3:7])
+                turned[t] = targets[t] @ matrix.reshape(3, 3).T + qpos[t, :3]
+            off = np.linalg.norm(feet - turned, axis=2)
+            seen[start].append(off[targets[:, :, 2] == -settled.body.standing_height])
+    whole = [np.percentile(np.concatenate(one), 95) for one in seen]
+    assert_allclose(outcomes.tracking, whole, atol=0.011)
+
+
+def test_targets_belong_to_the_state_that_is_shown():
+    """Standing legs shall stay where they are from the first substep on, the one after the last step included."""
+    settled = settle(draw_starts(4, 0))
+    shown = list(drive(settled, NetworkRun(settled.starts, LDVS, 0.0), 2.0))
+    targets = np.concatenate([one.targets for one in shown], axis=1)
+    assert targets.shape[1] == sum(one.qpos.shape[1] for one in shown)
+    assert (targets[..., 2] == -settled.body.standing_height).all()
+    assert (targets[..., 0] == (settled.starts + settled.network.geometry.origin)[:, None]).all()
+
+
+def test_feet_keep_to_their_targets():
+    """The aim is 1 mm at V = 0.5; the mean of 60 starts over the window `walk` is 0.93 mm."""
+    outcomes = physical_outcomes(settle(draw_starts(20, 0)), LDVS, 0.5, 60.0)
+    assert outcomes.tracking.mean() < 1.0
+
+
+@pytest.fixture(scope="module")
+def slower(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("converge")
+    return folder, converge(LDVS, folder, vps=(400.0, 100.0, 25.0), starts=12, window="start")
+
+
+def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
+    _, result = slower
+    fast, slow = result.sel(vp=400.0), result.sel(vp=25.0)
+    assert (slow.margin.mean("start") < 0.25 * fast.margin.mean("start")).all()
+    assert (slow.margin_same_feet.mean("start") < fast.margin_same_feet.mean("start")).all()
+    assert (result.same_feet.mean("start").diff("vp") > 0).all()
+    assert (slow.same_feet.mean("start") > 0.9).all()
+    assert (slow.agreement >= fast.agreement).all()
+    assert (abs(slow.physical - slow.kinematic) < abs(fast.physical - fast.kinematic)).all()
+
+
+def test_light_legs_keep_the_centre_of_mass_at_o(slower):
+    _, result = slower
+    assert (result.drift.sel(leg_mass=0.01) < 0.02).all()
+    assert (result.drift.sel(leg_mass=1.0) > 0.05).all()
+    assert (result.kinematic == result.kinematic[0, 0]).all()
+
+
+def test_finished_walks_are_not_walked_again(slower, monkeypatch):
+    folder, result = slower
+    monkeypatch.setattr(static_limit, "physical_walk", None)
+    told: list[float] = []
+    again = converge(
+        LDVS, folder, vps=(100.0, 25.0), leg_masses=(0.01,), starts=12, window="start", progress=told.append
+    )
+    assert again.equals(result.sel(leg_mass=[0.01], vp=[100.0, 25.0]))
+    assert sum(told) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("name", "values"), [("vps", ()), ("vps", (80.0, 80.0)), ("leg_masses", ())])
+def test_lists_without_sense_are_refused(tmp_path, name, values):
+    with pytest.raises(InputError, match=f"{name} = .*; expected at least one, and none of them twice"):
+        converge(LDVS, tmp_path, **{name: values})
+
+
+def run(monkeypatch, *words: object) -> int:
+    """The exit code of a command."""
+    monkeypatch.setattr(sys, "argv", ["hexmj", "converge", *map(str, words)])
+    try:
+        main()
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, monkeypatch, capsys):
+    words = ("--vps", 100, 50, "--starts", 4, "--window", 10, "--out", tmp_path)
+    assert run(monkeypatch, *words, "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {path.name for path in tmp_path.iterdir()} == {"converge.nc", "converge.png", "manifest.json", "walks"}
+    assert len(list((tmp_path / "walks").iterdir())) == 4
+    assert np.shape(answer["margin"]) == np.shape(answer["agreement"]) == (2, 2)
+    assert answer["settings"]["body"]["longest_substep"] == 0.5
+    assert not {"vp", "leg_mass"} & set(answer["settings"]["body"])
+    assert run(monkeypatch, *words) == 0
+    told = capsys.readouterr().out
+    assert f"{answer['margin'][0][1]:.3f}" in told
+    assert "vp 80" not in told
+
+
+@pytest.mark.parametrize(("option", "wanted"), [("--vp", "--vps"), ("--leg-mass", "--leg-masses")])
+def test_one_value_where_a_list_is_wanted_is_refused(tmp_path, monkeypatch, capsys, option, wanted):
+    assert run(monkeypatch, option, 0.5, "--out", tmp_path) == 2
+    assert f"{option} = 0.5; expected {wanted}" in capsys.readouterr().err
