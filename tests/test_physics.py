@@ -41,11 +41,12 @@ def test_settled_starts_stand_still_on_six_feet(settled):
 
 
 def test_same_bits_for_any_threads_and_any_batch(settled):
-    one, two = (physical_outcomes(settled, LDVS, 0.5, 40.0, threads=n) for n in (1, 2))
-    part = physical_outcomes(settle(settled.starts[5:9]), LDVS, 0.5, 40.0)
-    for name in OUTCOMES:
-        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
-        assert np.array_equal(getattr(one, name)[5:9], getattr(part, name), equal_nan=True)
+    one, two = (physical_outcomes(settled, LDVS, 0.35, 40.0, threads=n) for n in (1, 2))
+    for some in (slice(5, 9), slice(7, 8)):
+        part = physical_outcomes(settle(settled.starts[some]), LDVS, 0.35, 40.0)
+        for name in OUTCOMES:
+            assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
+            assert np.array_equal(getattr(one, name)[some], getattr(part, name), equal_nan=True)
 
 
 def test_walks_kept_whole_have_the_same_outcomes(walked):

@@ -135,7 +135,7 @@ class Tally:
         self._unreachable[ids] += stretch.unreachable
         self._walked[ids] = stretch.qpos[n, last, 0] - settled.qpos[ids, 0]
         share = np.clip(np.where(fell, last, stretch.valid) / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
-        self._commanded[ids] += (share * stretch.plan.velocity[:, ids]).sum(axis=0) * dt
+        self._commanded[ids] += np.cumsum(share * stretch.plan.velocity[:, ids], axis=0)[-1] * dt
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
         _, measured, _ = measured_walk(stretch, settled, stable)
         if measured.stance.size:
