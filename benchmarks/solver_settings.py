@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.table import print_table
 from hexmj import LDVS, Body, Network, SimulationError, draw_starts
-from hexmj.loss_frequency import wilson_interval
+from hexmj.intervals import wilson_interval
 from hexmj.physics import insect
 from hexmj.physics.physical_walks import physical_outcomes
 from hexmj.physics.settling import Settled, settle

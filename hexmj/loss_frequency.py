@@ -1,6 +1,5 @@
 """FLSS, the frequency of the loss of static stability (paper, Section 3): starts, windows, I_N and J_N."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.intervals import wilson_interval, wilson_intervals
 from hexmj.network import first_loss
 from hexmj.parameters import Acceleration, Model, Network, Symmetric
 from hexmj.progress import Progress
@@ -23,9 +23,6 @@ SAMPLE = 1000
 
 SLAB = 64 * SAMPLE
 """Starts that FLSS holds in memory at a time; only counts are kept of them."""
-
-WILSON_Z = 1.959963984540054
-"""Standard normal quantile of 97.5 %."""
 
 MOST_STARTS = 10**10
 """Most starts of one FLSS; on two cores they take hours to days."""
@@ -80,15 +77,6 @@ def observation_time(
         raise InputError("velocity = 0 has no period; expected V > 0 with the window 'walk'")
     time = 3.0 * stride * (1.0 + 1.0 / v) if window == "walk" else np.full(v.shape, 2.0 * stride)
     return time + (v - acceleration.start) / acceleration.rate if acceleration else time
-
-
-def wilson_interval(lost: int, size: int) -> tuple[float, float]:
-    """The 95 % Wilson interval of a frequency, from `lost` losses in `size` starts."""
-    z2, f = WILSON_Z**2, lost / size
-    centre = f + z2 / (2 * size)
-    half = math.sqrt(z2 * (f * (1 - f) / size + z2 / (4 * size**2)))
-    low, high = (centre - half) / (1 + z2 / size), (centre + half) / (1 + z2 / size)
-    return low if lost > 0 else 0.0, high if lost < size else 1.0
 
 
 def flss(
@@ -229,15 +217,15 @@ def frequency_table(losses: np.ndarray, starts: int, velocities: np.ndarray, dur
     import xarray as xr
 
     total = losses.sum(axis=1)
-    intervals = np.array([wilson_interval(int(n), starts) for n in total])
+    low, high = wilson_intervals(total, starts)
     samples = losses[:, : starts // SAMPLE] / SAMPLE
     spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
     unit = {"units": "1"}
     return xr.Dataset(
         {
             "flss": ("velocity", total / starts, unit | {"long_name": "frequency of the loss of static stability"}),
-            "low": ("velocity", intervals[:, 0], unit | {"long_name": "lower end of the 95 % Wilson interval"}),
-            "high": ("velocity", intervals[:, 1], unit | {"long_name": "upper end of the 95 % Wilson interval"}),
+            "low": ("velocity", low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
+            "high": ("velocity", high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             "sample_sd": ("velocity", spread, unit | {"long_name": "standard deviation over samples of 1000 starts"}),
             "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
         },

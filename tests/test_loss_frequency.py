@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import binomtest
 
 from hexmj.errors import InputError
-from hexmj.loss_frequency import SLAB, draw_starts, flss, flss_over_range, observation_time, wilson_interval
+from hexmj.intervals import wilson_interval
+from hexmj.loss_frequency import SLAB, draw_starts, flss, flss_over_range, observation_time
 from hexmj.network import first_loss
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
 

@@ -14,7 +14,8 @@ from hexmj.comparison import compare
 from hexmj.errors import InputError
 from hexmj.experiments import stability_map as module
 from hexmj.experiments.mechanisms import MECHANISMS, SAVED
-from hexmj.experiments.stability_map import CONDITIONS, FLSS, froude, paired_difference, stability_map
+from hexmj.experiments.stability_map import CONDITIONS, FLSS, froude, stability_map
+from hexmj.intervals import paired_difference
 from hexmj.parameters import LDVS
 from hexmj.physics.body import Body
 

@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.experiments.stability_map import paired_difference
-from hexmj.loss_frequency import wilson_interval
+from hexmj.intervals import paired_difference, wilson_interval
 
 if TYPE_CHECKING:
     import xarray as xr

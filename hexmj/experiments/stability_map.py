@@ -11,7 +11,8 @@ from hexmj.cells import kept
 from hexmj.comparison import MEASURES, UNITS
 from hexmj.errors import InputError, SimulationError
 from hexmj.experiments.mechanisms import MECHANISMS, fall_direction, mechanisms, static_plan
-from hexmj.loss_frequency import WILSON_Z, checked_list, draw_starts, observation_time, settings, wilson_interval
+from hexmj.intervals import paired_difference, wilson_intervals
+from hexmj.loss_frequency import checked_list, draw_starts, observation_time, settings
 from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
 from hexmj.physics.insect import GRAVITY
@@ -148,23 +149,6 @@ def froude(body: Body, velocity: np.ndarray) -> np.ndarray:
     return (velocity * body.vp) ** 2 / (GRAVITY * body.standing_height)
 
 
-def paired_difference(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Difference of two frequencies on the same starts, `one` less `other`, and its 95 % interval.
-
-    Args:
-        one: whether it happened, (..., start).
-        other: the same under another condition or measure.
-
-    Returns:
-        Difference, low and high, each (...).  The interval is that of Agresti and Min (Statistics in Medicine 24,
-        2005): half a start is added to each of the four cells.
-    """
-    size, only_one, only_other = one.shape[-1], (one & ~other).sum(axis=-1), (other & ~one).sum(axis=-1)
-    middle = (only_one - only_other) / (size + 2)
-    half = WILSON_Z * np.sqrt((only_one + only_other + 1) / (size + 2) - middle**2) / np.sqrt(size + 2)
-    return (only_one - only_other) / size, np.maximum(middle - half, -1.0), np.minimum(middle + half, 1.0)
-
-
 def _bodies(over: str, values: Sequence[float], body: Body) -> dict[float, Body]:
     """The body at each value of the condition, if that is one of a map's and every value makes sense."""
     if over not in CONDITIONS:
@@ -224,10 +208,10 @@ def _with_frequencies(data: "xr.Dataset", reference: float) -> "xr.Dataset":
 
     size = data.sizes["start"]
     for measure, lost in happened.items():
-        put(measure, lost.mean(axis=-1), *_intervals(lost.sum(axis=-1), np.full(lost.shape[:-1], size)))
+        put(measure, lost.mean(axis=-1), *wilson_intervals(lost.sum(axis=-1), size))
     fell, static = happened["physical"], happened["static"]
     lost, saved = static.sum(axis=-1), (static & ~fell).sum(axis=-1)
-    put("saved", np.where(lost > 0, saved / np.maximum(lost, 1), np.nan), *_intervals(saved, lost))
+    put("saved", np.where(lost > 0, saved / np.maximum(lost, 1), np.nan), *wilson_intervals(saved, lost))
     put("dynamics", *paired_difference(fell, static))
     row = data.value.values.tolist().index(reference)
     put("change", *paired_difference(fell, np.broadcast_to(fell[row], fell.shape)))
@@ -235,11 +219,3 @@ def _with_frequencies(data: "xr.Dataset", reference: float) -> "xr.Dataset":
     count = np.stack([(names == number).sum(axis=-1) for number in range(len(MECHANISMS))], axis=-1)
     new["count"] = ((*cells, "mechanism_name"), count, {"units": "1", "long_name": "number of starts"})
     return data.assign(new)
-
-
-def _intervals(counts: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the 95 % Wilson intervals of counts in sizes; NaN where there is nothing to count."""
-    pairs = zip(counts.flat, sizes.flat, strict=True)
-    ends = [wilson_interval(int(n), int(size)) if size else (np.nan, np.nan) for n, size in pairs]
-    low, high = np.array(ends).T
-    return low.reshape(counts.shape), high.reshape(counts.shape)

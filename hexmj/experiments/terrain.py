@@ -13,7 +13,8 @@ import numpy as np
 
 from hexmj.cells import kept
 from hexmj.errors import InputError
-from hexmj.loss_frequency import checked_list, draw_starts, settings, wilson_interval
+from hexmj.intervals import wilson_intervals
+from hexmj.loss_frequency import checked_list, draw_starts, settings
 from hexmj.parameters import Model, Network
 from hexmj.physics.body import Body, Ground
 from hexmj.physics.physical_walks import physical_outcomes
@@ -173,9 +174,7 @@ def _with_frequencies(data: "xr.Dataset", distance: float, begin: float, behind:
     upright, reaching = np.isinf(data.fall), commanded > begin
     after = reaching & ~upright
     reached, fell = reaching.sum("start"), after.sum("start")
-    pairs = zip(fell.values.ravel(), reached.values.ravel(), strict=True)
-    ends = np.array([wilson_interval(int(n), int(of)) if of else (np.nan, np.nan) for n, of in pairs])
-    ends = ends.reshape(*fell.shape, 2)
+    low, high = wilson_intervals(fell.values, reached.values)
     crossed = (upright & (walked > data.end + behind)).sum("start")
     unit = {"units": "1"}
     return data.assign(
@@ -184,8 +183,8 @@ def _with_frequencies(data: "xr.Dataset", distance: float, begin: float, behind:
         reached=reached.assign_attrs(unit, long_name="starts that reached the obstacle"),
         crossed=crossed.assign_attrs(unit, long_name="starts that crossed it without a fall"),
         flss=(fell / xr.where(reached > 0, reached, np.nan)).assign_attrs(unit, long_name="FLSS from there on"),
-        flss_low=(fell.dims, ends[..., 0], unit),
-        flss_high=(fell.dims, ends[..., 1], unit),
+        flss_low=(fell.dims, low, unit),
+        flss_high=(fell.dims, high, unit),
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
-from hexmj.loss_frequency import WILSON_Z, wilson_interval
+from hexmj.intervals import WILSON_Z, wilson_interval
 from hexmj.paper.found_sets import found_sets
 from hexmj.paper.protocol import NO_SET
 

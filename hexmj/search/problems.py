@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.loss_frequency import WINDOWS, draw_starts, observation_time, wilson_interval
+from hexmj.intervals import wilson_intervals
+from hexmj.loss_frequency import WINDOWS, draw_starts, observation_time
 from hexmj.network import checked_velocities, first_loss, steps_within
 from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
@@ -115,13 +116,13 @@ class Sample:
 
         size, windows = len(self.starts), self.problem.windows
         lost = np.array([self._losses(model, windows, self.threads) for model in models.values()])
-        interval = np.array([[wilson_interval(int(n), size) for n in row] for row in lost])
+        low, high = wilson_intervals(lost, size)
         over, unit = ("model", "window"), {"units": "1"}
         return xr.Dataset(
             {
                 "flss": (over, lost / size, unit | {"long_name": "frequency of the loss of static stability"}),
-                "flss_low": (over, interval[..., 0], unit | {"long_name": "lower end of the 95 % Wilson interval"}),
-                "flss_high": (over, interval[..., 1], unit | {"long_name": "upper end of the 95 % Wilson interval"}),
+                "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
+                "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             },
             coords={"model": list(models), "window": [str(window) for window in windows]},
         )

@@ -7,14 +7,14 @@ as the paper has them.
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexmj.cells import kept
-from hexmj.comparison import MEASURES
+from hexmj.comparison import MEASURES, with_frequencies
 from hexmj.errors import InputError
-from hexmj.loss_frequency import draw_starts, observation_time, settings, wilson_interval
+from hexmj.loss_frequency import draw_starts, observation_time, settings
 from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
 from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
@@ -108,7 +108,7 @@ def converge(
         leg_mass=("leg_mass", list(leg_masses), {"units": "1", "long_name": "mass of the legs over the insect's own"}),
     )
     others = {name: value for name, value in asdict(body).items() if name not in VARIED}
-    return _with_frequencies(data).assign_attrs(told | {"velocity": velocity, "duration": duration, "body": others})
+    return with_frequencies(data).assign_attrs(told | {"velocity": velocity, "duration": duration, "body": others})
 
 
 def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
@@ -143,21 +143,6 @@ def _kept_of(walk: PhysicalWalk) -> "xr.Dataset":
         for name, values in distances(walk).items()
     }
     return xr.Dataset(lost | off | told)
-
-
-def _with_frequencies(data: "xr.Dataset") -> "xr.Dataset":
-    """The three FLSS with their intervals, and the agreement, beside the outcomes of every start."""
-    size = data.sizes["start"]
-    new: dict[str, Any] = {}
-    for measure, outcome in MEASURES.items():
-        lost = data[outcome] < np.inf
-        new[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
-        ends = np.array([[wilson_interval(int(n), size) for n in row] for row in lost.sum("start").values])
-        new[f"{measure}_low"] = new[measure].copy(data=ends[..., 0]).assign_attrs(units="1")
-        new[f"{measure}_high"] = new[measure].copy(data=ends[..., 1]).assign_attrs(units="1")
-    same = (data.planned_loss < np.inf) == (data.fall < np.inf)
-    new["agreement"] = same.mean("start").assign_attrs(units="1", long_name="kinematic and physical answer agree")
-    return data.assign(new)
 
 
 def _check_distinct(name: str, values: Sequence[float]) -> None:
