@@ -22,14 +22,17 @@ def all_tips(body: Body, model=LDVS, velocity=0.6, steps=600, size=20, stretch=6
 @pytest.mark.parametrize("vp", [20.0, 80.0, 400.0])
 @pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
 def test_no_tip_jumps(vp, model):
-    """Along its line a tip moves at most V_p; up and down at most 1.5 step heights in a lift time (smoothstep)."""
+    """Along its line a tip moves at most V_p; up and down at most 16/9 step heights in its time, the greatest slope."""
     body = Body(vp=vp)
     tips, _ = all_tips(body, model)
     seconds = body.seconds(Network()) / body.substeps(Network())
     moved = np.abs(np.diff(tips, axis=1))
     assert moved[..., 0].max() <= vp * seconds * (1 + 1e-9)
     assert moved[..., 1].max() == 0.0
-    assert moved[..., 2].max() <= 1.5 * body.step_height * 1000 * seconds / body.lift_time * (1 + 1e-9)
+    up = np.diff(tips[..., 2], axis=1)
+    steepest = 16 / 9 * body.step_height * 1000 * seconds * (1 + 1e-9)
+    assert up.max() <= steepest / body.lift_time
+    assert -up.min() <= steepest / body.landing_time
     assert tips[..., 2].min() >= -body.standing_height
     assert tips[..., 2].max() <= body.step_height - body.standing_height + 1e-12
 
@@ -55,6 +58,25 @@ def test_lift_takes_its_milliseconds_whatever_vp():
         assert full * substep_ms == pytest.approx(body.lift_time, abs=substep_ms)
 
 
+@pytest.mark.parametrize("vp", [20.0, 80.0])
+def test_feet_meet_the_ground_at_their_aep(vp):
+    """Wherever a swing ends at AEP_0, within a step of the network; those that end earlier take their landing time."""
+    body, network = Body(vp=vp), Network()
+    tips, plan = all_tips(body, velocity=0.3, steps=900)
+    m = body.substeps(network)
+    height = tips[:, m - 1 :: m, :, 2].swapaxes(0, 1) + body.standing_height
+    lands = ~plan.stance[:-1] & plan.stance[1:]
+    there = lands & (plan.x[1:] >= network.aep0)
+    assert there.sum() > 100
+    assert (height[1:][there] < 1e-9).all()
+    wait = int(np.ceil(body.landing_time / 1000.0 / body.seconds(network))) + 1
+    early = np.argwhere(lands[:-wait] & (plan.x[1:-wait] < network.aep0 - vp * body.landing_time / 1000.0))
+    stay = [one for one in early.tolist() if plan.stance[one[0] + 1 : one[0] + 1 + wait, one[1], one[2]].all()]
+    assert stay
+    for step, start, leg in stay:
+        assert height[step + wait, start, leg] < 1e-9
+
+
 def test_starts_left_out_change_nothing_for_the_others():
     network, starts, body = Network(), draw_starts(6, 1), Body()
     whole, part = TipTargets(starts, body, network), TipTargets(starts, body, network)
@@ -68,15 +90,15 @@ def test_substeps_are_whole_and_short_enough():
     for vp in (20.0, 80.0, 99.9, 100.0, 400.0):
         body, network = Body(vp=vp), Network()
         m = body.substeps(network)
-        assert body.seconds(network) / m <= 0.001 + 1e-12
-        assert m == 1 or body.seconds(network) / (m - 1) > 0.001
+        assert body.seconds(network) / m <= 0.000625 + 1e-12
+        assert m == 1 or body.seconds(network) / (m - 1) > 0.000625
     assert Body().substeps(Network()) == 2
 
 
 @pytest.mark.parametrize(
     "change",
     [{"vp": 0.0}, {"vp": float("nan")}, {"step_height": -1.0}, {"step_height": 20.0}, {"friction": -0.1},
-     {"lift_time": 0.0}, {"longest_substep": 2.0}, {"standing_height": float("inf")}],
+     {"lift_time": 0.0}, {"landing_time": 0.0}, {"longest_substep": 1.0}, {"standing_height": float("inf")}],
 )  # fmt: skip
 def test_conditions_that_make_no_sense(change):
     with pytest.raises(InputError, match=f"{next(iter(change))} = .*expected"):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hexmj.cli import Conditions
 
 
-TOLD = ("vp", "step_height", "standing_height", "lift_time", "friction", "contact_gap")
+TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
 """Conditions of a body that stand beside every physical measure; the others only if they are not the usual ones."""
 
 

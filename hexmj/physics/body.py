@@ -30,10 +30,12 @@ class Body:
     standing_height: float = 10.0
     """Height of the middle coxae above the standing tips [mm]."""
     lift_time: float = 5.0
-    """Time in which a foot is raised, and in which it is lowered again [ms]."""
+    """Time in which a foot is raised [ms]."""
+    landing_time: float = 20.0
+    """Time in which a foot is lowered, from before its AEP [ms]; shorter ones let it strike the ground."""
     friction: float = 1.0
     """Coefficient of sliding friction between the ground and feet or trunk."""
-    longest_substep: float = 1.0
+    longest_substep: float = 0.625
     """Longest physics step [ms]; the network's step is divided into the fewest whole substeps within it."""
     contact_gap: float = 10.0
     """A foot that leaves the ground for no longer still stands in the measured polygon [ms]; 0 counts every bounce."""
@@ -68,7 +70,8 @@ class Body:
             "step_height": (0.0, 14.0, "mm"),
             "standing_height": (0.0, 14.0, "mm"),
             "lift_time": (0.0, 1000.0, "ms"),
-            "longest_substep": (0.001, 1.0, "ms"),
+            "landing_time": (0.0, 1000.0, "ms"),
+            "longest_substep": (0.001, 0.625, "ms, which the contacts are made for"),
             "settling_time": (0.0, 10000.0, "ms"),
             "leg_mass": (0.0, 2.0, "times the insect's own"),
             "ground_height": (0.0, SHORTEST_LEG, "mm, the length of the shortest leg"),

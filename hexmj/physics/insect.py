@@ -38,7 +38,7 @@ MASS, GRAVITY = 1.0, 9810.0
 JOINT_ACTUATORS = 18
 """Columns of `ctrl` that hold joint targets; with `Body.grasp` the adhesion of the six feet follows."""
 
-LONGEST_STEP = 0.001
+LONGEST_STEP = 0.000625
 """The longest time step [s] that the gains and contacts of the MJCF allow."""
 
 
@@ -56,11 +56,11 @@ class Sensors:
     """Centre of mass of the whole insect in the world, (..., axis) [mm]."""
 
 
-def load(timestep: float = 0.001, body: Body | None = None, *, looks: bool = True) -> mujoco.MjModel:
+def load(timestep: float = LONGEST_STEP, body: Body | None = None, *, looks: bool = True) -> mujoco.MjModel:
     """The compiled insect on its ground; every call gives a copy of its own.
 
     Args:
-        timestep: integration step [s], at most the 0.001 that gains and contacts are made for.
+        timestep: integration step [s], at most the 0.000625 that gains and contacts are made for.
         body: friction, masses, adhesion and ground are taken from it.
         looks: with the geoms that are only to look at; without them it walks to the same bits, 2 % faster.
     """

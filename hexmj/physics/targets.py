@@ -1,9 +1,12 @@
 """From the planned walk to the tips that the legs must follow, physics step by physics step.
 
-The plan says where a tip is along its line and whether it swings; here it gets a height.  A foot rises
-while its leg protracts and sinks while it retracts, from ground to full height in `Body.lift_time` of
-physical time, so the lift vanishes against the stride as V_p goes to zero.  The phase of the lift only
-ever moves on, forwards or backwards, so no tip jumps, also where mechanism 4 ends a swing early.
+The plan says where a tip is along its line and whether it swings; here it gets a height.  A foot is raised in
+`Body.lift_time` as its leg begins to protract, and lowered over the last `Body.landing_time` before AEP_0, so that it
+meets the ground where the plan lets it stand.  Where a swing ends elsewhere it is lowered from then on.  These are
+times of the physical world: both transitions vanish against the stride as V_p goes to zero.
+
+A foot that was lowered in 5 ms from AEP_0 on struck the ground at up to 2.2 m/s and sank in by up to 1.8 mm, stood
+late, and bounced: the measured FLSS was 0.63 at V = 0.5 and V_p = 20 mm/s (60 starts, planned 0.52).
 """
 
 from typing import Any
@@ -37,10 +40,12 @@ class TipTargets:
         Returns:
             (n, substep, leg, 3) [mm]: forward, left, up.
         """
-        m = self._body.substeps(self._network)
+        body, network = self._body, self._network
+        m = body.substeps(network)
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
-        rate = 1000.0 * self._body.seconds(self._network) / m / self._body.lift_time
-        shape = m, rate, self._body.step_height, self._body.standing_height, self._origin, self._y
+        substep = 1000.0 * body.seconds(network) / m
+        lift = substep / body.lift_time, substep / body.landing_time, body.vp * body.landing_time / 1000.0
+        shape = m, *lift, network.aep0, body.step_height, body.standing_height, self._origin, self._y
         _follow(plan.x, plan.stance, ids, self._x, self._stance, self._lift, *shape, tips)
         self._x[ids], self._stance[ids] = plan.x[-1, ids], plan.stance[-1, ids]
         return tips
@@ -54,20 +59,25 @@ def standing_tips(x: np.ndarray, body: Body, network: Network) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def _follow(
-    x: Any, stance: Any, ids: Any, x_old: Any, s_old: Any, lift: Any,
-    m: int, rate: float, step_height: float, standing_height: float, origin: Any, y: Any, tips: Any,
+    x: Any, stance: Any, ids: Any, x_old: Any, s_old: Any, lift: Any, m: int, rise: float, sink: float, landing: float,
+    aep0: float, step_height: float, standing_height: float, origin: Any, y: Any, tips: Any,
 ) -> None:  # fmt: skip
-    """Between two steps a tip moves evenly; its height is a smooth function of the phase of its lift."""
+    """Between two steps a tip moves evenly; its height is a smooth function of the phase of its lift, 0 to 1.
+
+    The phase tends to 1 in swing and to 0 in stance, and to the distance from AEP_0 within `landing` of it [mm].
+    """
     for i, start in enumerate(ids):
         for leg in range(6):
             x_from, s, phase = x_old[start, leg], s_old[start, leg], lift[start, leg]
             for n in range(len(x)):
                 x_to = x[n, start, leg]
                 for sub in range(m):
-                    phase = max(phase - rate, 0.0) if s else min(phase + rate, 1.0)
-                    height = step_height * phase * phase * (3.0 - 2.0 * phase)
+                    at = x_from + (x_to - x_from) * ((sub + 1.0) / m)
+                    wanted = 0.0 if s else min(max((aep0 - at) / landing, 0.0), 1.0)
+                    phase = min(phase + rise, max(phase - sink, wanted))
+                    height = step_height * phase**3 * (4.0 - 3.0 * phase)
                     tip = tips[i, n * m + sub, leg]
-                    tip[0] = origin[leg] + x_from + (x_to - x_from) * ((sub + 1.0) / m)
+                    tip[0] = origin[leg] + at
                     tip[1] = y[leg]
                     tip[2] = height - standing_height
                 x_from, s = x_to, stance[n, start, leg]
