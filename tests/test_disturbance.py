@@ -16,6 +16,8 @@ from hexmj.experiments.disturbed_walks import Case, cases, disturb, planned_loss
 from hexmj.experiments.strategies import Postures, collect_postures, reorganise
 from hexmj.network import NetworkRun, first_loss, walk
 from hexmj.parameters import LDVS, UNCOORDINATED, Acceleration, Network
+from hexmj.physics.body import Body
+from hexmj.physics.closed_loop import SensedPlan
 from hexmj.stability import stability_margin, walk_margin
 
 NETWORK, V, GRID = Network(), 0.5, 20
@@ -187,6 +189,41 @@ def test_only_losses_after_the_disturbance_and_within_the_window_count():
     np.testing.assert_allclose(result.kinematic.sel(window="whole"), [3 / 5, 1 / 6])
     np.testing.assert_allclose(result.kinematic_buys.sel(window="whole")[1], 2 / 5)  # of the five that reach both
     assert (result.kinematic_low <= result.kinematic).all() and (result.kinematic <= result.kinematic_high).all()
+
+
+@pytest.mark.parametrize("kind", ["halt", "leg", "push"])
+@pytest.mark.parametrize("strategy", ["none", "reorganise", "slow_down"])
+def test_a_disturbed_plan_that_senses_nothing_goes_on_by_itself(kind, strategy, postures):
+    answer = {"reorganise": {"postures": postures}, "slow_down": {"acceleration": Acceleration(0.01, 0.1)}}
+    alone, sensed = (plan(kind, **answer.get(strategy, {})) for _ in range(2))
+    one, other = SensedPlan(sensed, WALKERS.starts).advance(STEPS), alone.advance(STEPS)
+    assert np.array_equal(one.stance, other.stance)
+    np.testing.assert_allclose(one.x, other.x, atol=1e-9)
+
+
+def test_a_halted_start_holds_on_to_where_its_tips_were_seen():
+    """From the second step on, whatever is read while it rests; it goes on from there."""
+    whole = SensedPlan(plan("halt"), WALKERS.starts)
+    start = int(np.argmin(WALKERS.step))
+    step, one, feet = WALKERS.step[start], np.array([start]), np.ones((1, 6), dtype=bool)
+    before = whole.advance(step)
+    tips = before.x[-1, one] - 0.2
+    whole.sense(one, tips, feet)
+    rest = [whole.advance(1)]
+    for _ in range(PAUSED):
+        whole.sense(one, tips + 0.3, feet)
+        rest.append(whole.advance(1))
+    assert all((row.x[0, start] == tips[0]).all() and row.stance[0, start].all() for row in rest[1:-1])
+    np.testing.assert_allclose(rest[-1].x[0, start], tips[0] - V * NETWORK.dt)
+
+
+def test_disturbed_walks_can_read_their_legs(tmp_path):
+    walked = [Case("push", "none"), Case("halt", "none"), Case("leg", "reorganise")]
+    settings = {"velocities": [V], "starts": 4, "window": 30.0}
+    alone = disturb(LDVS, tmp_path / "open", walked, **settings)
+    reading = disturb(LDVS, tmp_path / "closed", walked, **settings, body=Body(feedback=True))
+    assert np.isfinite(reading.physical.sel(window="whole")).all()
+    assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
 
 
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):

@@ -11,12 +11,12 @@ from hexmj.parameters import Acceleration, Model, Network
 from hexmj.walks import Walk, joined
 
 PAUSE = 4.0
-"""Time for which a halted body stands before anything else happens [time units]; 50 ms at V_p = 80 mm/s, ten times
-what it takes to lower a foot.  It changes no planned loss."""
+"""Time for which a halted body stands before anything else happens [time units]; 50 ms at V_p = 80 mm/s, two and
+a half times what it takes to lower a foot.  It changes no planned loss."""
 
 
 class DisturbedPlan:
-    """A `plans.Plan`: the network's walk with one disturbance of every start, and a strategy against it.
+    """A `plans.SeeingPlan`: the network's walk with one disturbance of every start, and a strategy against it.
 
     Without a strategy a halted body stands for `PAUSE`, then the network starts from there; any other goes on at once.
     With postures it is halted too, reorganises its legs and goes on from the posture, its states included.  With an
@@ -73,6 +73,10 @@ class DisturbedPlan:
             coming = np.concatenate([self._disturbance.step, self.resumed, [end]])
             parts.append(self._go_on(int(coming[coming > self.done].min()) - self.done))
         return joined(parts)
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Go on from these tips [mm] and states, both (start, leg); a start that rests keeps to its rest."""
+        self._run.see(tips, standing)
 
     def _disturb(self, which: np.ndarray) -> None:
         """Let it happen to these starts, (start,): how long they rest, and the legs with which they go on."""

@@ -10,8 +10,8 @@ A leg that should stand and has no ground counts as standing.  Told to its neigh
 its foot has met the ground, it keeps them down until they hang as well: over a step of 3 mm the FLSS was 0.52 instead
 of 0.41 (0.36 in the open loop; LDVS, V = 0.3, the same 96 starts, a trial before this module was written).
 
-The targets of the servos are not the tips as read.  They go on by -V_r dt or +dt and take up the tip as read only
-where the leg changes its state; a target that restarts from the lagging tip at every step never loads its servo,
+The targets of the servos are not the tips as read.  They go on by -V_r dt or +dt and take up what the plan makes of the
+tip as read only where the leg changes its state, or where the plan puts it elsewhere, as after a halt; a target that restarts from the lagging tip at every step never loads its servo,
 and all of 48 starts fell at V = 0.5 and V_p = 20 mm/s instead of 24 (the same trial).
 
 On the flat ground at V_p = 80 mm/s the tips as read lie 0.1 mm from the targets of standing legs, within 0.3 mm for
@@ -29,6 +29,10 @@ from hexmj.physics.joint_targets import JointTargets, Orders
 from hexmj.physics.stretches import Insects, Stretch
 from hexmj.plans import Plan, SeeingPlan
 from hexmj.walks import Walk, joined
+
+
+SAME = 1e-9
+"""A tip moved on from where the plan saw it if it is no farther than this from there by one step's way [mm]."""
 
 
 def closed_loop(insects: Insects, plan: Plan, duration: float) -> Iterator[Stretch]:
@@ -90,7 +94,8 @@ class SensedPlan:
         self._plan.see(self._tips, self._stance)
         step = self._plan.advance(1)
         self.done = self._plan.done
-        moved = self._targets + np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.network.dt
-        self._tips = self._targets = np.where(step.stance[0] == self._stance, moved, step.x[0])
+        way = np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.network.dt
+        goes_on = (step.stance[0] == self._stance) & (np.abs(step.x[0] - self._tips - way) < SAME)
+        self._tips = self._targets = np.where(goes_on, self._targets + way, step.x[0])
         self._stance = step.stance[0]
         return replace(step, x=self._targets[None])
