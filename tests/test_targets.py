@@ -9,6 +9,7 @@ from hexmj.network import NetworkRun, walk
 from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Network
 from hexmj.physics.body import Body
 from hexmj.physics.targets import TipTargets
+from hexmj.walks import Walk
 
 
 def all_tips(body: Body, model=LDVS, velocity=0.6, steps=600, size=20, stretch=60):
@@ -75,6 +76,19 @@ def test_feet_meet_the_ground_at_their_aep(vp):
     assert stay
     for step, start, leg in stay:
         assert height[step + wait, start, leg] < 1e-9
+
+
+def test_a_leg_that_swings_back_is_lifted_at_once():
+    network, body, steps, one = Network(), Body(), 60, np.arange(1)
+    x, stance = np.full((steps, 1, 6), network.aep0), np.ones((steps, 1, 6), dtype=bool)
+    x[:, 0, 0] -= network.dt * np.arange(steps)
+    stance[:, 0, 0] = False
+    y = np.broadcast_to(network.geometry.y, x.shape)
+    plan = Walk(network.dt * np.arange(1, steps + 1), np.zeros((steps, 1)), x, y, stance, network.geometry)
+    height = TipTargets(x[0], body, network).follow(plan, one)[0, :, 0, 2] + body.standing_height
+    m = body.substeps(network)
+    full = 2 * m + round(body.lift_time / 1000.0 / body.seconds(network) * m)  # it swings from the first step's end
+    assert height[full - 1] == pytest.approx(body.step_height)
 
 
 def test_starts_left_out_change_nothing_for_the_others():

@@ -11,8 +11,9 @@ its foot has met the ground, it keeps them down until they hang as well: over a 
 of 0.41 (0.36 in the open loop; LDVS, V = 0.3, the same 96 starts, a trial before this module was written).
 
 The targets of the servos are not the tips as read.  They go on by -V_r dt or +dt and take up what the plan makes of the
-tip as read only where the leg changes its state, or where the plan puts it elsewhere, as after a halt; a target that restarts from the lagging tip at every step never loads its servo,
-and all of 48 starts fell at V = 0.5 and V_p = 20 mm/s instead of 24 (the same trial).
+tip as read only where the leg changes its state, or where the plan puts it elsewhere, as after a halt; a target that
+restarts from the lagging tip at every step never loads its servo, and all of 48 starts fell at V = 0.5 and
+V_p = 20 mm/s instead of 24 (the same trial).
 
 On the flat ground at V_p = 80 mm/s the tips as read lie 0.1 mm from the targets of standing legs, within 0.3 mm for
 95 % of the time, and feedback changes next to nothing.  A load spreads the feet: with twice the insect's weight the
@@ -29,7 +30,6 @@ from hexmj.physics.joint_targets import JointTargets, Orders
 from hexmj.physics.stretches import Insects, Stretch
 from hexmj.plans import Plan, SeeingPlan
 from hexmj.walks import Walk, joined
-
 
 SAME = 1e-9
 """A tip moved on from where the plan saw it if it is no farther than this from there by one step's way [mm]."""

@@ -64,7 +64,8 @@ def _follow(
 ) -> None:  # fmt: skip
     """Between two steps a tip moves evenly; its height is a smooth function of the phase of its lift, 0 to 1.
 
-    The phase tends to 1 in swing and to 0 in stance, and to the distance from AEP_0 within `landing` of it [mm].
+    The phase tends to 1 in swing and to 0 in stance, and on the way ahead to the distance from AEP_0 within `landing`
+    of it [mm]; on the way back, as when legs are reorganised, nothing tells where a swing will end.
     """
     for i, start in enumerate(ids):
         for leg in range(6):
@@ -73,7 +74,7 @@ def _follow(
                 x_to = x[n, start, leg]
                 for sub in range(m):
                     at = x_from + (x_to - x_from) * ((sub + 1.0) / m)
-                    wanted = 0.0 if s else min(max((aep0 - at) / landing, 0.0), 1.0)
+                    wanted = 0.0 if s else 1.0 if x_to < x_from else min(max((aep0 - at) / landing, 0.0), 1.0)
                     phase = min(phase + rise, max(phase - sink, wanted))
                     height = step_height * phase**3 * (4.0 - 3.0 * phase)
                     tip = tips[i, n * m + sub, leg]
