@@ -287,3 +287,14 @@ def record(blocks: Any, begin: int, end: int, order: int, p: Any, k: Any, veloci
                 for leg in range(6):
                     x[n, first + j, leg] = z[(X + leg) * LANES + j]
                     stance[n, first + j, leg] = z[(S + leg) * LANES + j] == 1.0
+
+
+@njit(cache=True, nogil=True)
+def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, order: int, p: Any, k: Any) -> None:
+    """Step blocks `begin` to `end` on; their rows `LOST` then hold the first losses after the `unseen` steps."""
+    for b in range(begin, end):
+        z = blocks[b]
+        for n in range(unseen + seen):
+            if n == unseen:
+                z[STEPS * LANES : (STEPS + 1) * LANES] = unseen + seen  # before, none counts
+            _step(z, order, p, k)

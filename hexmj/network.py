@@ -65,6 +65,20 @@ class NetworkRun:
         geometry = self.network.geometry
         return Walk(time, velocity, x, np.broadcast_to(geometry.y, x.shape), stance, geometry)
 
+    def first_losses(self, unseen: int, seen: int) -> np.ndarray:
+        """Begin with `unseen` steps and go on by `seen` more.
+
+        Returns:
+            The first of the latter that is statically unstable, counted from time 0, (start,); 0 where none is.
+        """
+
+        def work(begin: int, end: int) -> None:
+            lanes.lose(self._blocks, begin, end, unseen, seen, *self._settings)
+
+        run_blocks(work, len(self._blocks), 1, self._threads)
+        self.done += unseen + seen
+        return self._read(lanes.LOST, 1)[:, 0]
+
     @property
     def tips(self) -> np.ndarray:
         """Where the tips are now, (start, leg) [mm]."""
