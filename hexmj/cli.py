@@ -237,7 +237,7 @@ class Terrain:
     """Lengths of gaps [mm]; --ground-length is the hurdle's."""
     grasps: tuple[float, ...] = (0.0, 1.0)
     """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight, instead of --grasp."""
-    starts: int = 40
+    starts: int = 30
     """Number of random starts, the same for every obstacle."""
     out: Path = Path("results/terrain")
     """Folder for figure, NetCDF, manifest and finished walks."""

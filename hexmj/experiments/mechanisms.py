@@ -120,9 +120,13 @@ def _long_upright(walk: PhysicalWalk, upright: np.ndarray) -> np.ndarray:
 
 
 def _caught(walk: PhysicalWalk) -> np.ndarray:
-    """Where a foot that the plan holds in the air stands again after it had left the ground, (step, start, leg)."""
+    """Where a foot that the plan holds in the air stands again after it had left the ground, (step, start, leg).
+
+    One that is lowered to its AEP lands.
+    """
     stance, stands = walk.planned.stance, walk.measured.stance
+    held = ~stance & (walk.planned.x < walk.network.aep0 - walk.body.vp * walk.body.landing_time / 1000.0)
     step = np.arange(len(stance), dtype=np.int32)[:, None, None]
     planned_down = np.maximum.accumulate(np.where(stance, step, -1), axis=0)
     off = np.maximum.accumulate(np.where(stands, -1, step), axis=0)
-    return ~stance & stands & (off > planned_down)
+    return held & stands & (off > planned_down)

@@ -45,7 +45,7 @@ def terrain(
     heights: Sequence[float] = (2.0, 4.0, 6.0),
     lengths: Sequence[float] = (2.5, 5.0, 10.0),
     grasps: Sequence[float] = (0.0, 1.0),
-    starts: int = 40,
+    starts: int = 30,
     seed: int = 0,
     body: Body | None = None,
     network: Network | None = None,
