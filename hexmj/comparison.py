@@ -35,7 +35,7 @@ MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical"
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
 """What a start can do: lose stability on paper, touch the ground, both or none."""
 
-REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "saturation", "unreachable")
+REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturation", "unreachable")
 """Outcomes that tell how far the bodies did what they were told."""
 
 UNITS = {
@@ -46,6 +46,7 @@ UNITS = {
     "tilt": "rad",
     "slip": "mm/s",
     "tracking": "mm",
+    "depth": "mm",
 }
 """Units of the outcomes; the others are numbers."""
 

@@ -189,12 +189,13 @@ def test_a_passive_fall_never_gains_energy(seed):
     assert (energy - np.minimum.accumulate(energy)).max() < 0.01 * lost
 
 
-def test_tracking_is_the_percentile_of_the_feets_distances():
-    """The same distances, kept whole: root, foot and target of every substep until the fall."""
+def test_tracking_and_depth_are_percentiles_of_all_feet():
+    """The same distances and depths, kept whole: root, foot and target of every substep until the fall."""
     settled = settle(draw_starts(6, 0))
     outcomes = physical_outcomes(settled, LDVS, 0.5, 40.0)
     columns = insect.sensors(settled.mujoco_model)
     seen: list[list[np.ndarray]] = [[] for _ in range(6)]
+    depths: list[list[np.ndarray]] = [[] for _ in range(6)]
     for one in drive(settled, NetworkRun(settled.starts, LDVS, 0.5), 40.0):
         for row, start in enumerate(one.ids):
             qpos, targets = one.qpos[row, : one.valid[row]], one.targets[row, : one.valid[row]]
@@ -206,8 +207,13 @@ def test_tracking_is_the_percentile_of_the_feets_distances():
                 turned[t] = targets[t] @ matrix.reshape(3, 3).T + qpos[t, :3]
             off = np.linalg.norm(feet - turned, axis=2)
             seen[start].append(off[targets[:, :, 2] == -settled.body.standing_height])
+            sensors = one.sensors[row, : one.valid[row]]
+            depths[start].append(-heights(settled, sensors)[sensors[:, columns.touch] > 0])
     whole = [np.percentile(np.concatenate(one), 95) for one in seen]
     assert_allclose(outcomes.tracking, whole, atol=0.011)
+    deepest = [np.percentile(np.concatenate(one), 99.9, method="inverted_cdf") for one in depths]
+    assert_allclose(outcomes.depth, deepest, atol=0.011)
+    assert np.isnan(physical_outcomes(settle(settled.starts, Body(ground="hurdle")), LDVS, 0.5, 5.0).depth).all()
 
 
 def test_targets_belong_to_the_state_that_is_shown():
