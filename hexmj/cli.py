@@ -137,9 +137,9 @@ class Search:
     Repeat the command to go on with a search that was stopped.
     """
 
-    form: Literal["hws", "ldvs", "mirrored"] = "ldvs"
+    form: Literal["hws", "ldvs", "mirrored", "general"] = "ldvs"
     """Nine parameters (hws), ten with a neutral position that depends on the velocity (ldvs), or 29, in which only
-    left and right are alike (mirrored)."""
+    left and right are alike (mirrored), or all 58 weights (general)."""
     velocity: float | None = None
     """Problem 1: this velocity V_r as a fraction of V_p, 0 <= V < 1; 0.3 unless one or a range is given."""
     velocities: tuple[float, float] | None = None

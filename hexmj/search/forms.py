@@ -1,7 +1,8 @@
 """Forms of the model whose parameters a search can choose, as vectors.
 
 Appendix A makes all legs of a side alike: nine numbers, or ten.  In the form 'mirrored' only the two sides are alike,
-and each leg's neighbours have weights of their own: 29 of the 58 general weights of Section 2.
+and each leg's neighbours have weights of their own: 29 of the 58 general weights of Section 2.  In the form 'general'
+all 58 are free.
 """
 
 from collections.abc import Callable
@@ -13,11 +14,12 @@ import numpy as np
 from hexmj.legs import MIRROR
 from hexmj.parameters import BINARY, NEIGHBOURS, Model, Symmetric, Weights, weights
 
-Form = Literal["hws", "ldvs", "mirrored"]
+Form = Literal["hws", "ldvs", "mirrored", "general"]
 """Names of the forms."""
 
 _NEUTRAL = ("p31", "p34")
-_LEFT = [(kind, d, e) for kind, neighbours in NEIGHBOURS.items() for d in range(3) for e in neighbours[d]]
+_ALL = [(kind, d, e) for kind, neighbours in NEIGHBOURS.items() for d in range(6) for e in neighbours[d]]
+_LEFT = [(kind, d, e) for kind, d, e in _ALL if d < 3]
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,10 @@ def _symmetric(size: Literal[9, 10]) -> Parameters:
     return Parameters(tuple(names), Symmetric.from_vector, vector)
 
 
+def _names(places: list[tuple[str, int, int]]) -> tuple[str, ...]:
+    return tuple(f"{kind} {d + 1},{e + 1}" for kind, d, e in places)
+
+
 def _mirrored(vector: np.ndarray) -> Weights:
     matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
     for (kind, d, e), value in zip(_LEFT, vector, strict=True):
@@ -66,6 +72,7 @@ def _left(model: Model) -> np.ndarray:
 FORMS: dict[Form, Parameters] = {
     "hws": _symmetric(9),
     "ldvs": _symmetric(10),
-    "mirrored": Parameters(tuple(f"{kind} {d + 1},{e + 1}" for kind, d, e in _LEFT), _mirrored, _left),
+    "mirrored": Parameters(_names(_LEFT), _mirrored, _left),
+    "general": Parameters(_names(_ALL), Weights.from_vector, lambda model: weights(model).to_vector()),
 }
 """Forms by their names."""
