@@ -1,5 +1,7 @@
 """What can go wrong, each with one clear sentence."""
 
+from collections.abc import Sequence
+
 
 class InputError(Exception):
     """A value that makes no sense: says what was given, what is expected and the valid names."""
@@ -11,3 +13,13 @@ class SimulationError(RuntimeError):
 
 class RenderingError(RuntimeError):
     """No video can be rendered on this machine; names the package that brings it."""
+
+
+def check_distinct(name: str, values: Sequence[object]) -> None:
+    """Refuse a list, such as one of conditions that are varied, that is empty or holds a value twice.
+
+    Raises:
+        InputError: with the list's `name` and its values.
+    """
+    if not values or len(set(values)) < len(values):
+        raise InputError(f"{name} = {list(values)}; expected at least one, and none of them twice")

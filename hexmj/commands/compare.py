@@ -17,7 +17,7 @@ from hexmj.commands.printing import (
     show,
 )
 from hexmj.commands.recorded import recorded
-from hexmj.errors import InputError, RenderingError
+from hexmj.errors import InputError, RenderingError, check_distinct
 from hexmj.film.film import Film
 from hexmj.parameters import Model
 from hexmj.presets import load_model
@@ -35,9 +35,8 @@ def run_compare(options: "Compare") -> None:
     from hexmj import figures
     from hexmj.comparison import AGREEMENT, MEASURES, compare
 
+    check_distinct("models", options.models)
     models = {name: load_model(name) for name in options.models}
-    if len(models) < max(1, len(options.models)):
-        raise InputError(f"models = {list(options.models)}; expected at least one, and none of them twice")
     if clash := set(models) & {"velocity", "report", "settings", "files"}:
         raise InputError(f"a parameter file has the name {min(clash)!r}, which the results need; rename it")
     names = ("comparison.nc", "comparison.png", "manifest.json", "recording.nc", "gait.mp4")

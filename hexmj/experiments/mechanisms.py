@@ -125,7 +125,7 @@ def _caught(walk: PhysicalWalk) -> np.ndarray:
     One that is lowered to its AEP lands.
     """
     stance, stands = walk.planned.stance, walk.measured.stance
-    held = ~stance & (walk.planned.x < walk.network.aep0 - walk.body.vp * walk.body.landing_time / 1000.0)
+    held = ~stance & (walk.planned.x < walk.network.aep0 - walk.body.landing_distance)
     step = np.arange(len(stance), dtype=np.int32)[:, None, None]
     planned_down = np.maximum.accumulate(np.where(stance, step, -1), axis=0)
     off = np.maximum.accumulate(np.where(stands, -1, step), axis=0)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from hexmj.cells import kept
-from hexmj.errors import InputError
+from hexmj.errors import InputError, check_distinct
 from hexmj.intervals import wilson_intervals
 from hexmj.loss_frequency import checked_list, draw_starts, settings
 from hexmj.parameters import Model, Network
@@ -86,7 +86,7 @@ def terrain(
     if not (v > 0).all():
         raise InputError(f"velocities = {v.tolist()}; expected V > 0, or no obstacle is ever reached")
     worlds = obstacles(body, grounds, heights, lengths)
-    _check_distinct("grasps", grasps)
+    check_distinct("grasps", grasps)
     ahead, behind = reach(network)
     end = np.array([_end(world) for world in worlds.values()])
     distance = end.max() + behind + network.aep0 - network.pep0
@@ -138,7 +138,7 @@ def obstacles(
         InputError: none, or one twice; a ground, height or length that makes no sense.
     """
     for name, values in {"grounds": grounds, "heights": heights, "lengths": lengths}.items():
-        _check_distinct(name, values)
+        check_distinct(name, values)
     if wrong := [ground for ground in grounds if ground not in get_args(Ground)[1:]]:
         raise InputError(f"grounds = {list(grounds)}; {wrong[0]!r} is none of {', '.join(get_args(Ground)[1:])}")
     worlds = {"flat": body}
@@ -186,8 +186,3 @@ def _with_frequencies(data: "xr.Dataset", distance: float, begin: float, behind:
         flss_low=(fell.dims, low, unit),
         flss_high=(fell.dims, high, unit),
     )
-
-
-def _check_distinct(name: str, values: Sequence[float] | Sequence[str]) -> None:
-    if not values or len(set(values)) < len(values):
-        raise InputError(f"{name} = {list(values)}; expected at least one, and none of them twice")

@@ -101,6 +101,11 @@ class Body:
         if not 0 <= self.friction < math.inf:
             raise InputError(f"friction = {self.friction}; expected a finite number of at least 0")
 
+    @property
+    def landing_distance(self) -> float:
+        """How far before its AEP a tip begins to be lowered [mm]."""
+        return self.vp * self.landing_time / 1000.0
+
     def seconds(self, network: Network) -> float:
         """Duration of one step of the network [s]."""
         return network.dt / self.vp

@@ -44,7 +44,7 @@ class TipTargets:
         m = body.substeps(network)
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
         substep = 1000.0 * body.seconds(network) / m
-        lift = substep / body.lift_time, substep / body.landing_time, body.vp * body.landing_time / 1000.0
+        lift = substep / body.lift_time, substep / body.landing_time, body.landing_distance
         shape = m, *lift, network.aep0, body.step_height, body.standing_height, self._origin, self._y
         _follow(plan.x, plan.stance, ids, self._x, self._stance, self._lift, *shape, tips)
         self._x[ids], self._stance[ids] = plan.x[-1, ids], plan.stance[-1, ids]

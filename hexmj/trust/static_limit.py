@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.cells import kept
 from hexmj.comparison import MEASURES, with_frequencies
-from hexmj.errors import InputError
+from hexmj.errors import check_distinct
 from hexmj.loss_frequency import draw_starts, observation_time, settings
 from hexmj.parameters import Acceleration, Model, Network
 from hexmj.physics.body import Body
@@ -83,8 +83,8 @@ def converge(
     import xarray as xr
 
     body, network = body or Body(longest_substep=0.5), network or Network()
-    _check_distinct("vps", vps)
-    _check_distinct("leg_masses", leg_masses)
+    check_distinct("vps", vps)
+    check_distinct("leg_masses", leg_masses)
     duration = float(observation_time(window, np.array([velocity]), network, acceleration)[0])
     told = settings({"model": model}, window, starts, seed, network, acceleration)
     bodies = [[replace(body, leg_mass=mass, vp=vp) for vp in vps] for mass in leg_masses]
@@ -143,8 +143,3 @@ def _kept_of(walk: PhysicalWalk) -> "xr.Dataset":
         for name, values in distances(walk).items()
     }
     return xr.Dataset(lost | off | told)
-
-
-def _check_distinct(name: str, values: Sequence[float]) -> None:
-    if not values or len(set(values)) < len(values):
-        raise InputError(f"{name} = {list(values)}; expected at least one, and none of them twice")
