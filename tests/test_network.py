@@ -187,6 +187,24 @@ def test_tips_stay_within_the_step_range():
     assert walked.x.min() >= -20.0 - 0.1
 
 
+def test_a_pep_that_recedes_is_not_crossed_while_the_neighbour_is_lifted():
+    """The argument of ``examples/receding_pep.py``: the PEP of L2 recedes a little faster than L2 itself."""
+    starts = np.full((2001, 6), 5.0)
+    starts[:, 0], starts[:, 1] = -5.0, np.linspace(-2.0, 0.0, len(starts))  # L1 is lifted after 50 time units
+
+    def together(neutral: float) -> int:
+        vector = dict.fromkeys(("p1", "p2", "p31", "p32", "p33", "p34", "p4"), np.zeros((6, 6)))
+        one = np.zeros((6, 6))
+        one[1, 0] = 1.0
+        walked = walk(starts, Weights(**vector | {"p31": neutral * one, "p33": -1.05 * one}), 0.1, 60.0)
+        lifted = (~walked.stance[:, :, :2]).argmax(axis=0)  # (start, leg)
+        assert walked.stance[lifted - 1, np.arange(len(starts))[:, None], [0, 1]].all()
+        return int((abs(lifted[:, 0] - lifted[:, 1]) <= 1).sum())
+
+    assert together(neutral=-30.0) > 20  # 4 mm ahead all the time, the cap of Eq. 4
+    assert together(neutral=-9.5 - 4 / 1.05) == 0
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
