@@ -84,9 +84,9 @@ def coupled(numbers: np.ndarray) -> hexmj.Weights:
 class Options:
     """A set for V = 0.1 whose PEPs recede."""
 
-    starts: int = 2000
+    starts: int = 1000
     """Starts of each candidate; the best ten are judged on five times as many others."""
-    budget: int = 24
+    budget: int = 12
     """Evaluations of CMA-ES."""
     seed: int = 0
     """Of the starts and of CMA-ES."""
