@@ -42,6 +42,11 @@ def load_model(name: str) -> Model:
     raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
 
 
+def model_title(name: str) -> str:
+    """What a model is called in titles: a preset's name, or that of its file."""
+    return name if name in PRESETS else Path(name).stem
+
+
 def model_toml(model: Model) -> str:
     """The text of a TOML file that `load_model` reads to the same bits; general weights that are 0 are left out."""
     if isinstance(model, Symmetric):

@@ -11,7 +11,7 @@ from hexmj.legs import N1, N2, N3, N4
 from hexmj.loss_frequency import flss
 from hexmj.network import walk
 from hexmj.parameters import HWS, LDVS, NEIGHBOURS, UNCOORDINATED, Network, Symmetric, Weights, weights
-from hexmj.presets import OWN, PRESETS, load_model, model_toml
+from hexmj.presets import OWN, PRESETS, load_model, model_title, model_toml
 
 
 def test_neighbours_are_the_paper_s():
@@ -108,6 +108,11 @@ def test_files_that_make_no_sense(tmp_path, text, words):
 def test_names_that_do_not_exist():
     with pytest.raises(InputError, match=r"neither a preset .hws, ldvs, uncoordinated, own-0.1, .* nor a TOML file"):
         load_model("lvds")
+
+
+def test_titles_of_models():
+    names = ("hws", "own-0.1", "results/found-0.1.toml")
+    assert [model_title(name) for name in names] == ["hws", "own-0.1", "found-0.1"]
 
 
 def test_weights_off_the_neighbour_sets():

@@ -1,6 +1,5 @@
 """`hexmj flss`."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexmj.commands.printing import (
@@ -13,7 +12,7 @@ from hexmj.commands.printing import (
     show,
 )
 from hexmj.loss_frequency import SAMPLE, flss
-from hexmj.presets import load_model
+from hexmj.presets import load_model, model_title
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest
 
@@ -48,7 +47,7 @@ def run_flss(options: "Flss") -> None:
     if options.out:
         from hexmj import figures
 
-        title = f"{Path(options.model).stem}, {kind} FLSS, {starts} starts, window {conditions.window}"
+        title = f"{model_title(options.model)}, {kind} FLSS, {starts} starts, window {conditions.window}"
         files = [
             save_dataset(table, options.out / "flss.nc"),
             save_figure(figures.flss_figure(table, title), options.out / "flss.png"),

@@ -1,12 +1,11 @@
 """`hexmj walk`."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexmj.commands.printing import conditions_line, print_json, save_figure, short, show
 from hexmj.commands.recorded import recorded, walk_summary
 from hexmj.loss_frequency import settings
-from hexmj.presets import load_model
+from hexmj.presets import load_model, model_title
 from hexmj.results import results_folder, save_manifest
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ def run_walk(options: "Walk") -> None:
 
     model, conditions = load_model(options.model), options.conditions
     out = results_folder(options.out, ("recording.nc", "walk.png", "manifest.json"))
-    title = f"{Path(options.model).stem}, V = {options.velocity:g}"
+    title = f"{model_title(options.model)}, V = {options.velocity:g}"
     walked = recorded(model, options.velocity, options.start, conditions, title, options.physical)
     told = {"velocity": options.velocity, "start": options.start, "physical": options.physical}
     acceleration, body = conditions.options["acceleration"], conditions.body
