@@ -9,8 +9,8 @@ lifted late because it had to wait itself; so the slopes of the hind legs end at
 gives way, or both would recede together.
 
 Every number is a length on a leg's axis [mm] or a slope.  `--starts 80000 --budget 600` made the preset `own-0.1`: FLSS
-0.00182 where it begins, 0.00152 found, on 400,000 other starts.  Seven of ten losses that are left are hind legs lifted
-together with a middle leg.
+0.00181 where it begins, 0.00159 found, on the 400,000 starts of seed 1998, which chose neither.  Seven of ten losses
+that are left are hind legs lifted together with a middle leg.
 """
 
 from dataclasses import dataclass
@@ -21,12 +21,14 @@ import tyro
 
 import hexmj
 from hexmj.legs import MIRROR
+from hexmj.parameters import NEIGHBOURS
 from hexmj.presets import model_toml
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.domain import Domain
 
-V, DURATION = 0.1, 660.0  # the window `walk`
-AEP, PEP, CAP = 10.0, -10.0, 4.0  # AEP_0, PEP_0, and the greatest shift of mechanism 3, Eq. 4
+V = 0.1
+AEP, PEP = hexmj.Network().aep0, hexmj.Network().pep0
+CAP = 4.0  # the greatest shift of mechanism 3, Eq. 4
 HELD = 14.0  # P^1: no leg is lifted while the leg behind it or opposite it protracts
 FAR = 1000.0  # a neutral position that no leg reaches: a shift that is the same wherever the other leg stands
 L1, L2, L3, R1, R2, R3 = range(6)
@@ -52,7 +54,7 @@ NUMBERS = {  # where the search begins, and how far it looks
 def coupled(numbers: np.ndarray) -> hexmj.Weights:
     """The general weights, from the numbers in their order."""
     before, l2, r2, l3, r3, rear, r1_ahead, l3_aep, l3_pep, r3_aep, r3_from, r3_slope, l1_from, l1_slope = numbers
-    w = {kind: np.zeros((6, 6)) for kind in ("p1", "p2", "p31", "p32", "p33", "p34", "p4")}
+    w = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
 
     def mechanism_3(d: int, e: int, neutral: float, ahead: float, behind: float) -> None:
         w["p31"][d, e], w["p33"][d, e], w["p32"][d, e] = neutral, ahead, behind
@@ -69,7 +71,7 @@ def coupled(numbers: np.ndarray) -> hexmj.Weights:
         recede(hind, middle, PEP + CAP - rear + before, slope_3)
         constant(middle, MIRROR[middle], -rear)
         w["p1"][middle, MIRROR[middle]] = rear
-        w["p4"][middle, front] = w["p4"][hind, middle] = 1.0
+        w["p4"][middle, front] = w["p4"][hind, middle] = 1.0  # as the published sets have it; nothing is lost without
         for leg, other in ((front, middle), (middle, hind), (front, MIRROR[front]), (hind, MIRROR[hind])):
             w["p1"][leg, other] = HELD
     constant(R1, L1, r1_ahead)
@@ -85,7 +87,8 @@ class Options:
     """A set for V = 0.1 whose PEPs recede."""
 
     starts: int = 1000
-    """Starts of each candidate; the best ten are judged on five times as many others."""
+    """Starts of each candidate; the best ten are compared on five times as many others, the best of them judged on as
+    many again."""
     budget: int = 12
     """Evaluations of CMA-ES."""
     seed: int = 0
@@ -95,24 +98,24 @@ class Options:
 def main(options: Options) -> None:
     """Search, and print the FLSS of the best on starts that the search has not seen."""
 
-    def cost(numbers: np.ndarray, starts: np.ndarray) -> float:
-        return float(np.isfinite(hexmj.first_loss(starts, coupled(numbers), V, DURATION)).mean())
+    def cost(numbers: np.ndarray, starts: int, seed: int) -> float:
+        return hexmj.flss(coupled(numbers), [V], starts=starts, seed=seed).flss.item()
 
     begin, reach = np.array(list(NUMBERS.values())).T
     domain = Domain(begin - reach, begin + reach, np.zeros(len(begin), dtype=bool), begin)
     search = CovarianceAdaptation(domain, population=12, seed=options.seed)
-    starts = hexmj.draw_starts(options.starts, options.seed)
-    seen = [(cost(begin, starts), begin)]
+    seen = [(cost(begin, options.starts, options.seed), begin)]
     while len(seen) <= options.budget:
         candidates = search.ask()
-        costs = np.array([cost(candidate, starts) for candidate in candidates])
+        costs = np.array([cost(candidate, options.starts, options.seed) for candidate in candidates])
         search.tell(costs)
         seen += zip(costs.tolist(), candidates, strict=True)
         print(f"{len(seen) - 1:5d} evaluations, the last {len(costs)} on average {costs.mean():.5f}", flush=True)
-    fresh = hexmj.draw_starts(5 * options.starts, options.seed + 1)
-    best = sorted(seen, key=lambda one: one[0])[:10]
-    last, found = min(((cost(numbers, fresh), numbers) for _, numbers in best), key=lambda one: one[0])
-    print(f"begin {cost(begin, fresh):.5f}, found {last:.5f} on {len(fresh)} others")
+    best = [numbers for _, numbers in sorted(seen, key=lambda one: one[0])[:10]]
+    many = 5 * options.starts
+    found = min(best, key=lambda numbers: cost(numbers, many, options.seed + 1))
+    last = [f"{cost(numbers, many, options.seed + 2):.5f}" for numbers in (begin, found)]
+    print(f"begin {last[0]}, found {last[1]} on {many} starts that chose nothing")
     for name, number in zip(NUMBERS, found, strict=True):
         print(f"{number:8.3f}  {name}")
     path = Path("results/examples/receding_pep.toml")
