@@ -187,22 +187,28 @@ def test_tips_stay_within_the_step_range():
     assert walked.x.min() >= -20.0 - 0.1
 
 
-def test_a_pep_that_recedes_is_not_crossed_while_the_neighbour_is_lifted():
-    """The argument of ``examples/receding_pep.py``: the PEP of L2 recedes a little faster than L2 itself."""
+def test_a_pep_that_recedes_and_comes_back_keeps_neighbours_apart():
+    """The argument of ``examples/receding_pep.py``, on L1 and L2: L1 is lifted after 50 time units, or has to wait."""
     starts = np.full((2001, 6), 5.0)
-    starts[:, 0], starts[:, 1] = -5.0, np.linspace(-2.0, 0.0, len(starts))  # L1 is lifted after 50 time units
+    starts[:, 0], starts[:, 1] = -5.0, np.linspace(-6.0, 2.0, len(starts))
 
-    def together(neutral: float) -> int:
-        vector = dict.fromkeys(("p1", "p2", "p31", "p32", "p33", "p34", "p4"), np.zeros((6, 6)))
-        one = np.zeros((6, 6))
-        one[1, 0] = 1.0
-        walked = walk(starts, Weights(**vector | {"p31": neutral * one, "p33": -1.05 * one}), 0.1, 60.0)
-        lifted = (~walked.stance[:, :, :2]).argmax(axis=0)  # (start, leg)
-        assert walked.stance[lifted - 1, np.arange(len(starts))[:, None], [0, 1]].all()
-        return int((abs(lifted[:, 0] - lifted[:, 1]) <= 1).sum())
+    def together(p31: float, p32: float, waits: bool) -> int:
+        """Starts in which L1 and L2 protract at once; PEP of L2 at -10 mm while L1 stands, as far as it may."""
+        starts[:, 3] = -5.1 if waits else 5.0  # R1, for which L1 waits
+        weights = {kind: np.zeros((6, 6)) for kind in ("p1", "p2", "p31", "p32", "p33", "p34", "p4")}
+        weights["p1"][0, [1, 3]] = 14.0
+        weights["p31"][1, 0], weights["p32"][1, 0], weights["p33"][1, 0] = p31, p32, -4.0
+        weights["p31"][1, 4], weights["p32"][1, 4] = 1000.0, -0.004
+        walked = walk(starts, Weights(**weights), 0.1, 110.0)
+        return int((~walked.stance[:, :, 0] & ~walked.stance[:, :, 1]).any(axis=0).sum())
 
-    assert together(neutral=-30.0) > 20  # 4 mm ahead all the time, the cap of Eq. 4
-    assert together(neutral=-9.5 - 4 / 1.05) == 0
+    ahead = {"p31": -30.0, "p32": 0.0}  # 4 mm all the time, the cap of Eq. 4
+    stays_back, comes_back = ({"p31": -10.92, "p32": p32} for p32 in (0.0, 50.0))
+    by_chance = together(**ahead, waits=False)  # L2 reaches its PEP in the step in which L1 is lifted, or beside it
+    assert by_chance > 0
+    assert together(**stays_back, waits=False) == together(**comes_back, waits=False) == 0
+    assert together(**stays_back, waits=True) > 4 * by_chance  # L2 runs out of its 4 mm
+    assert together(**comes_back, waits=True) == together(**ahead, waits=True) == by_chance
 
 
 @pytest.mark.parametrize(
