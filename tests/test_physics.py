@@ -123,14 +123,9 @@ def test_speed_keeps_to_the_command():
 
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
-    result = compare(LDVS, [0.3, 0.5, 0.8], starts=200, body=Body(vp=20.0))
+    result = compare(LDVS, [0.3, 0.5, 0.8], starts=100, body=Body(vp=20.0))
     assert (abs(result.kinematic - result.physical) <= 0.06).all()
     assert (result.agreement >= 0.88).all()
-
-
-def test_fast_walks_are_saved_by_dynamics():
-    slow, fast = (physical_flss(LDVS, [0.5], starts=60, body=Body(vp=vp)).flss.item() for vp in (20.0, 400.0))
-    assert fast < slow / 2
 
 
 def test_mirrored_starts_give_mirrored_outcomes():

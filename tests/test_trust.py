@@ -247,6 +247,7 @@ def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
     assert (slow.same_feet.mean("start") > 0.9).all()
     assert (slow.agreement >= fast.agreement).all()
     assert (abs(slow.physical - slow.kinematic) < abs(fast.physical - fast.kinematic)).all()
+    assert (fast.physical < slow.physical / 2).all()  # dynamics saves fast walks
 
 
 def test_light_legs_keep_the_centre_of_mass_at_o(slower):
