@@ -29,8 +29,8 @@ class Body:
     body."""
     standing_height: float = 10.0
     """Height of the middle coxae above the standing tips [mm]."""
-    lift_time: float = 5.0
-    """Time in which a foot is raised [ms]."""
+    lift_time: float = 20.0
+    """Time in which a foot is raised [ms]; much shorter ones make feet hop that stand."""
     landing_time: float = 20.0
     """Time in which a foot is lowered, from before its AEP [ms]; shorter ones let it strike the ground."""
     friction: float = 1.0
