@@ -38,6 +38,17 @@ def test_no_tip_jumps(vp, model):
     assert tips[..., 2].max() <= body.step_height - body.standing_height + 1e-12
 
 
+def test_a_foot_is_slow_where_the_ground_may_come_early():
+    """Half a millimetre above the planned ground, as far as the body sags, a foot falls at less than 0.2 m/s."""
+    body = Body()
+    tips, _ = all_tips(body)
+    height = tips[..., 2] + body.standing_height
+    speed = -np.diff(height, axis=1) / (1000.0 * body.seconds(Network()) / body.substeps(Network()))  # mm/ms = m/s
+    low = (height[:, 1:] <= 0.5) & (speed > 0)
+    assert low.any()
+    assert speed[low].max() < 0.2 < speed.max()
+
+
 def test_targets_at_the_network_s_steps_are_the_plan():
     body = Body()
     tips, plan = all_tips(body)
