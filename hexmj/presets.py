@@ -10,7 +10,7 @@ from hexmj.errors import InputError
 from hexmj.parameters import HWS, LDVS, NEIGHBOURS, UNCOORDINATED, Model, Symmetric, Weights, pairs
 
 OWN = Path(__file__).with_name("own.toml")
-"""Sets that our searches found, with the commands that find them again."""
+"""Sets of our own, with the commands that found or built them."""
 
 
 def load_model(name: str) -> Model:
