@@ -293,7 +293,7 @@ class Disturb:
     adhesion: float = 1.0
     """Adhesion of a foot that the plan lets stand where the strategy is to grasp, in multiples of the insect's weight,
     instead of --grasp."""
-    starts: int = 50
+    starts: int = 40
     """Number of random starts that walk stably until they are disturbed, the same in every case."""
     kinematic: bool = False
     """Leave physics out, and with it pushes and grasping."""

@@ -35,6 +35,7 @@ from typing import Literal
 import numpy as np
 from dm_control import mujoco
 from dm_control.mujoco import wrapper
+from dm_control.mujoco.wrapper import mjbindings
 from dm_control.rl import control
 from dm_control.utils import rewards
 from dm_env import specs
@@ -46,8 +47,10 @@ from hexmj.network import NetworkRun, steps_within
 from hexmj.parameters import LDVS, Model, Network
 from hexmj.physics import insect
 from hexmj.physics.body import Body
+from hexmj.physics.ground import depth_in_ground
 from hexmj.physics.kinematics import tips_to_joints
 from hexmj.physics.settling import settle
+from hexmj.physics.strikes import FINER, FINEST, in_whole_steps, strikes
 from hexmj.physics.targets import TipTargets
 from hexmj.stability import stability_margin
 
@@ -125,6 +128,7 @@ class InsectPhysics(mujoco.Physics):
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
         self._columns = insect.sensors(self.model.ptr)
+        self._body, self._foot = insect.body_of(self.model.ptr), insect.dimensions(self.model.ptr).foot
         self._corners, self._radii = insect.trunk_corners(self.model.ptr)
         self._next: list[np.ndarray] = []
 
@@ -138,14 +142,37 @@ class InsectPhysics(mujoco.Physics):
         super().set_control(now)
 
     def step(self, nstep: int = 1) -> None:
-        """Advance by `nstep` substeps."""
-        seen = np.empty((nstep, self.model.nsensordata))
-        for row in seen:
+        """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `strikes`."""
+        rows = [self.data.ctrl.copy(), *self._next]
+        control, self._next = np.array((rows + nstep * rows[-1:])[:nstep]), []
+        before = [values.copy() for values in (self.data.qpos, self.data.qvel, self.data.qacc_warmstart)]
+        seen, depth = self._advance(control)
+        parts = 1
+        while strikes(depth, parts * nstep, self._body.standing_height).any() and parts < FINEST:
+            parts *= FINER
+            self.data.qpos[:], self.data.qvel[:], self.data.qacc_warmstart[:] = before
+            seen, depth = self._advance_finely(control, parts)
+        self.touch, self.trunk = seen[:, self._columns.touch], seen[:, self._columns.trunk]
+
+    def _advance(self, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the sensors held after a substep for each row, (row, column), and the feet's depths, (1 + row, leg)."""
+        feet, seen = [self._feet()], np.empty((len(control), self.model.nsensordata))
+        for now, row in zip(control, seen, strict=True):
+            super().set_control(now)
             super().step()
             row[:] = self.data.sensordata
-            if self._next:
-                super().set_control(self._next.pop(0))
-        self.touch, self.trunk = seen[:, self._columns.touch], seen[:, self._columns.trunk]
+            feet.append(self._feet())
+        return seen, depth_in_ground(self._body, np.array(feet), self._foot)
+
+    def _advance_finely(self, control: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same with substeps in parts and harder contacts, from a state just put back; depths of every part."""
+        model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
+        model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
+        mjbindings.mjlib.mj_step1(model.ptr, self.data.ptr)
+        seen, depth = self._advance(control.repeat(parts, axis=0))
+        model.opt.timestep, model.pair_solref[:] = timestep, usual
+        mjbindings.mjlib.mj_step1(model.ptr, self.data.ptr)
+        return in_whole_steps(seen, parts, self._columns.touch), depth
 
     def rotation(self) -> np.ndarray:
         """From the root frame to the world, (axis, axis)."""
@@ -173,7 +200,7 @@ class InsectPhysics(mujoco.Physics):
         return stability_margin((self._feet() - centre)[:, :2], standing, threads=1)
 
     def _feet(self) -> np.ndarray:
-        return self.data.sensordata[self._columns.foot].reshape(6, 3)
+        return self.data.sensordata[self._columns.foot].reshape(6, 3).copy()
 
 
 class Walking(control.Task):

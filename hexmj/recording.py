@@ -49,7 +49,7 @@ MEASURED = {
     "speed": (_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
     "slip": (_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
     "tracking": (_ONCE, "mm", "95th percentile of the distance between a foot and its target on the ground"),
-    "depth": (_ONCE, "mm", "99.9th percentile of the depth of a foot in the ground that it touches"),
+    "depth": (_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
     "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
     "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }

@@ -119,6 +119,19 @@ def test_other_conditions_are_those_of_the_physical_walk(body: Body, network: Ne
     assert np.isfinite(qpos).all()
 
 
+def test_a_copy_of_the_physics_goes_on_the_same_way():
+    """As planners need it, even where a foot is thrown into the ground and the step has to be fine."""
+    walking = environment.load(actions="joints", duration=5.0)
+    walking.reset()
+    physics = walking.physics
+    physics.data.qvel[2] = -1000.0
+    other = physics.copy()
+    physics.step(2)
+    other.step(2)
+    np.testing.assert_array_equal(other.position(), physics.position())
+    assert physics.data.qvel[2] > -1000.0
+
+
 @KINDS
 def test_same_seed_same_bits(actions):
     def episodes(seed: int) -> list[np.ndarray]:

@@ -155,6 +155,9 @@ def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_p
     model, data = replay(path)
     assert data.qvel[0] == 1e12
     assert model.opt.timestep == broken.mujoco_model.opt.timestep
+    data.ctrl[:] = np.load(path)["ctrl"][0]
+    mujoco.mj_step(model, data)
+    assert data.warning.number.any()
 
 
 def test_starts_out_of_reach_are_refused():

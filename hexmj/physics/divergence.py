@@ -29,10 +29,12 @@ def raise_if_diverged(
     kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
     path = Path(f"diverged-start-{ids[i]}.npz").resolve()
     when = "while settling" if speeds is None else f"while walking at V = {speeds[ids[i]]:g}"
-    model = batch.model
+    model = batch.get_model(ids[i])
     saved = {name: values[i] for name, values in state.items()}
+    saved |= {"xfrc_applied": batch.bind("xfrc_applied")[ids[i]], "contact": model.pair_solref[:, 0]}
+    saved["timestep"] = np.array(model.opt.timestep)
     try:
-        np.savez(path, allow_pickle=False, **saved, timestep=model.opt.timestep, body=json.dumps(asdict(body)))
+        np.savez(path, allow_pickle=False, **saved, body=json.dumps(asdict(body)))
         written = f"its last good state is in {path} (hexmj.physics.divergence.replay)"
     except OSError as error:
         written = f"its last good state could not be written to {path}: {error.strerror}"
@@ -43,7 +45,8 @@ def replay(path: Path | str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A written state of divergence, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep, actuator)."""
     with np.load(path) as saved:
         model = insect.load(float(saved["timestep"]), Body(**json.loads(str(saved["body"]))))
+        model.pair_solref[:, 0] = saved["contact"]
         data = mujoco.MjData(model)
-        for name in ("qpos", "qvel", "qacc_warmstart"):
+        for name in ("qpos", "qvel", "qacc_warmstart", "xfrc_applied"):
             getattr(data, name)[:] = saved[name]
     return model, data

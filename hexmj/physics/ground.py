@@ -48,6 +48,44 @@ def ground_level(body: Body, places: np.ndarray) -> np.ndarray:
     return np.where((x > body.ground_at) & (x < end), height, 0.0)
 
 
+def depth_in_ground(body: Body, feet: np.ndarray, radius: float) -> np.ndarray:
+    """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
+
+    Args:
+        body: has the ground.
+        feet: their centres in the world, (..., 3) [mm].
+        radius: of the spheres [mm].
+
+    Returns:
+        (...,) [mm].
+    """
+    x, z = feet[..., 0], feet[..., 2]
+    near, length = body.ground_at, body.ground_length
+    if body.ground == "flat":
+        return radius - z
+    if body.ground == "rough":
+        return np.maximum(radius - z, _depth_in_bumps(body, feet, radius))
+    off_middle = np.abs(x - near - length / 2)
+    outside = {"step": near - x, "hurdle": off_middle - length / 2, "gap": length / 2 - off_middle}[body.ground]
+    above = z - (0.0 if body.ground == "gap" else body.ground_height)
+    from_block = np.hypot(np.maximum(outside, 0.0), np.maximum(above, 0.0)) + np.minimum(np.maximum(outside, above), 0)
+    floor = -SHORTEST_LEG if body.ground == "gap" else 0.0
+    return radius - np.minimum(from_block, z - floor)
+
+
+def _depth_in_bumps(body: Body, feet: np.ndarray, radius: float) -> np.ndarray:
+    """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
+    centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(body))
+    corner = np.floor((feet[..., :2] - centres[0, 0]) / SPACING).astype(int)
+    depth = np.full(feet.shape[:-1], -np.inf)
+    for along, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        i, j = (np.clip(corner[..., k] + step, 0, BUMPS[k] - 1) for k, step in enumerate((along, across)))
+        below = (heights - radii)[i, j]
+        centre = np.concatenate([centres[i, j], below], axis=-1)
+        depth = np.maximum(depth, radii[i, j, 0] + radius - np.linalg.norm(feet - centre, axis=-1))
+    return depth
+
+
 def _box(spec: mujoco.MjSpec, name: str, begin: float, end: float, top: float) -> str:
     """A block from `begin` to `end` along the way whose upper side lies at `top` [mm]."""
     half = (top + SHORTEST_LEG) / 2

@@ -6,7 +6,8 @@ reshape to (leg, joint).
 """
 
 import copy
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -71,6 +72,11 @@ def load(timestep: float = LONGEST_STEP, body: Body | None = None, *, looks: boo
     return model
 
 
+def body_of(model: mujoco.MjModel) -> Body:
+    """The conditions with which a model of the insect was loaded."""
+    return Body(**json.loads(bytes(model.text_data).rstrip(b"\0")))
+
+
 def mjcf() -> str:
     """The insect's MJCF text."""
     packaged = files("hexmj") / "assets"
@@ -130,6 +136,7 @@ def _compiled(body: Body, looks: bool) -> mujoco.MjModel:
     if body.load:
         load = spec.body("mesothorax").add_body(name="load", mass=body.load * MASS, inertia=3 * [4 * body.load * MASS])
         load.explicitinertial = True
+    spec.add_text(name="body", data=json.dumps(asdict(body)))
     for leg in LEGS if body.grasp else ():
         spec.add_actuator(
             name=f"{leg}_grasp",

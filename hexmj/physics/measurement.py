@@ -37,8 +37,7 @@ class Outcomes:
     """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], to
     0.01 mm; inf beyond 20 mm."""
     depth: np.ndarray
-    """(start,) 99.9th percentile of how deep a foot that touches the ground is in it [mm], to 0.01 mm; NaN where the
-    ground is not flat."""
+    """(start,) how deep the deepest foot was in the ground until the fall [mm]."""
     saturation: np.ndarray
     """(start,) fraction of joints times physics steps in which the torque stood at its limit."""
     unreachable: np.ndarray
@@ -118,7 +117,7 @@ class Tally:
         self._walked, self._commanded = np.zeros(size), np.zeros(size)
         self._sums = np.zeros((size, len(_SUMS)))
         self._sums[:, _CLEARANCE], self._sums[:, _UPRIGHT] = np.inf, 1.0
-        self._misses, self._depths = np.zeros((2, size, BINS + 1), dtype=np.uint32)
+        self._misses, self._depth = np.zeros((size, BINS + 1), dtype=np.uint32), np.zeros(size)
         self._corners = insect.trunk_corners(settled.mujoco_model)
 
     def add(self, stretch: Stretch) -> None:
@@ -130,16 +129,16 @@ class Tally:
         seen = stretch.qpos, stretch.sensors, stretch.targets, stretch.force, stretch.valid
         ground = -settled.body.standing_height
         _scan(*seen, feet, touch, ground, *self._corners, 0.999 * limit, self._sums, self._misses, ids)
-        if settled.body.ground == "flat":
-            _count_depths(stretch.sensors, stretch.valid, feet, touch, insect.dimensions(model).foot, self._depths, ids)
         n, last = np.arange(len(ids)), stretch.valid - 1
         trunk = stretch.sensors[n, last, columns.trunk] > 0
-        fell = stretch.fell
+        fell, until = stretch.fell, np.where(stretch.fell, last, stretch.valid)
         self._fall[ids[fell]] = ((stretch.first + last) / m * dt)[fell]
         self._fall_part[ids[fell]] = np.argmax(trunk, axis=1)[fell]
         self._unreachable[ids] += stretch.unreachable
         self._walked[ids] = stretch.qpos[n, last, 0] - settled.qpos[ids, 0]
-        share = np.clip(np.where(fell, last, stretch.valid) / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
+        depth = np.where(np.arange(stretch.depth.shape[1]) < until[:, None], stretch.depth, 0.0)
+        self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
+        share = np.clip(until / m - np.arange(len(stretch.plan.time))[:, None], 0.0, 1.0)
         self._commanded[ids] += np.cumsum(share * stretch.plan.velocity[:, ids], axis=0)[-1] * dt
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
         _, measured, _ = measured_walk(stretch, settled, stable)
@@ -162,14 +161,14 @@ class Tally:
             speed=speed,
             slip=slip,
             tracking=_percentile(self._misses, 0.95),
-            depth=_percentile(self._depths, 0.999),
+            depth=self._depth,
             saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * insect.JOINT_ACTUATORS),
             unreachable=self._unreachable,
         )
 
 
 BIN, BINS = 0.01, 2000
-"""Width [mm] and number of the bins in which distances of feet from their targets, and depths, are counted."""
+"""Width [mm] and number of the bins in which distances of feet from their targets are counted."""
 
 
 def _percentile(counts: np.ndarray, share: float) -> np.ndarray:
@@ -224,16 +223,3 @@ def _count_misses(qpos: Any, feet: Any, targets: Any, ground: float, counts: Any
             off_z = qpos[2] + zx * a + zy * b + zz * c - feet[3 * leg + 2]
             distance = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
             counts[min(int(distance / BIN), BINS)] += 1
-
-
-@njit(cache=True, nogil=True)
-def _count_depths(
-    sensors: Any, valid: Any, feet: int, touch: int, radius: float, depths: Any, ids: Any
-) -> None:  # fmt: skip
-    """Count how deep each foot is in flat ground while it touches it."""
-    for i, start in enumerate(ids):
-        for t in range(valid[i]):
-            for leg in range(6):
-                if sensors[i, t, touch + leg] > 0:
-                    depth = radius - sensors[i, t, feet + 3 * leg + 2]
-                    depths[start, min(int(max(depth, 0.0) / BIN), BINS)] += 1
