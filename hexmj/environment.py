@@ -35,7 +35,6 @@ from typing import Literal
 import numpy as np
 from dm_control import mujoco
 from dm_control.mujoco import wrapper
-from dm_control.mujoco.wrapper import mjbindings
 from dm_control.rl import control
 from dm_control.utils import rewards
 from dm_env import specs
@@ -62,6 +61,9 @@ NO_FOOT = -100.0
 
 ROUNDING = 1e-6
 """Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that a step goes on from, the solver's warm start included."""
 
 OBSERVATIONS = (
     specs.Array((18,), float, "joint_angles"),
@@ -121,7 +123,8 @@ class InsectPhysics(mujoco.Physics):
     """The insect in dm_control, and what is measured on it."""
 
     touch: np.ndarray
-    """(substep, leg) normal force of the ground on each foot in the last step [g mm/s^2]."""
+    """(substep, leg) normal force of the ground on each foot in the last step, its mean over a substep in parts
+    [g mm/s^2]."""
     trunk: np.ndarray
     """(substep, part) contacts of each part of the trunk with the ground in the last step."""
 
@@ -144,15 +147,15 @@ class InsectPhysics(mujoco.Physics):
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `strikes`."""
         rows = [self.data.ctrl.copy(), *self._next]
-        control, self._next = np.array((rows + nstep * rows[-1:])[:nstep]), []
-        before = [values.copy() for values in (self.data.qpos, self.data.qvel, self.data.qacc_warmstart)]
-        seen, depth = self._advance(control)
+        before = self.get_state(_STATE)
+        seen, depth = self._advance(control := np.array((rows + nstep * rows[-1:])[:nstep]))
         parts = 1
         while strikes(depth, parts * nstep, self._body.standing_height).any() and parts < FINEST:
             parts *= FINER
-            self.data.qpos[:], self.data.qvel[:], self.data.qacc_warmstart[:] = before
+            self.set_state(before, _STATE)
             seen, depth = self._advance_finely(control, parts)
         self.touch, self.trunk = seen[:, self._columns.touch], seen[:, self._columns.trunk]
+        self.set_control(np.array(rows[nstep:] or rows[-1:]))
 
     def _advance(self, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the sensors held after a substep for each row, (row, column), and the feet's depths, (1 + row, leg)."""
@@ -168,10 +171,12 @@ class InsectPhysics(mujoco.Physics):
         """The same with substeps in parts and harder contacts, from a state just put back; depths of every part."""
         model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
         model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
-        mjbindings.mjlib.mj_step1(model.ptr, self.data.ptr)
-        seen, depth = self._advance(control.repeat(parts, axis=0))
-        model.opt.timestep, model.pair_solref[:] = timestep, usual
-        mjbindings.mjlib.mj_step1(model.ptr, self.data.ptr)
+        try:
+            mujoco.mj_step1(model.ptr, self.data.ptr)
+            seen, depth = self._advance(control.repeat(parts, axis=0))
+        finally:
+            model.opt.timestep, model.pair_solref[:] = timestep, usual
+        mujoco.mj_step1(model.ptr, self.data.ptr)
         return in_whole_steps(seen, parts, self._columns.touch), depth
 
     def rotation(self) -> np.ndarray:

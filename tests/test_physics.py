@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from mujoco.batch import Batch
 from numba import cfunc
 from numpy.testing import assert_allclose
 
@@ -14,7 +15,7 @@ from hexmj.network import NetworkRun
 from hexmj.parameters import LDVS, UNCOORDINATED, Network
 from hexmj.physics import insect
 from hexmj.physics.body import Body
-from hexmj.physics.divergence import replay
+from hexmj.physics.divergence import raise_if_diverged, replay
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.measurement import Outcomes
 from hexmj.physics.physical_walks import physical_outcomes, physical_walk
@@ -158,6 +159,23 @@ def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_p
     data.ctrl[:] = np.load(path)["ctrl"][0]
     mujoco.mj_step(model, data)
     assert data.warning.number.any()
+
+
+def test_a_state_to_replay_has_the_step_the_contacts_and_the_push_of_its_roll(settled, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    batch = Batch(settled.mujoco_model, 2, 1)
+    batch.expand("opt.timestep")[1], batch.expand("pair_solref")[1, :, 0] = 1e-4, 2e-4
+    batch.bind("xfrc_applied")[1, 1, 1] = 7.0
+    batch.bind("qpos")[1] = np.nan
+    state = {"qpos": settled.qpos, "qvel": settled.qvel, "qacc_warmstart": settled.warmstart}
+    with pytest.raises(SimulationError, match=r"start 1 diverged while walking at V = 0.3, at 4 time units: .* finite"):
+        raise_if_diverged(batch, np.arange(2), 4.0, np.full(2, 0.3), state)
+    model, data = replay(tmp_path / "diverged-start-1.npz")
+    assert model.opt.timestep == 1e-4
+    assert (model.pair_solref[:, 0] == 2e-4).all()
+    assert np.array_equal(data.qpos, settled.qpos[1])
+    assert data.xfrc_applied[1, 1] == 7.0
+    assert insect.body_of(model) == settled.body
 
 
 def test_starts_out_of_reach_are_refused():

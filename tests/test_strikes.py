@@ -13,6 +13,8 @@ from hexmj.physics import insect, strikes
 from hexmj.physics.body import Body
 from hexmj.physics.drive import Push, Stretch, drive
 from hexmj.physics.ground import depth_in_ground
+from hexmj.physics.measurement import Outcomes
+from hexmj.physics.physical_walks import outcomes_of_plan
 from hexmj.physics.settling import Settled, settle
 
 OBSTACLES = {
@@ -33,19 +35,17 @@ PUSH = 60.0
 """In multiples of m V_p, as `disturb` has it: the insect slides and tips at up to 4.8 m/s."""
 
 
-def walked(settled: Settled, velocity: float = 0.6, push: Push | None = None) -> list[Stretch]:
+def walked(settled: Settled, velocity: float = 0.6) -> list[Stretch]:
     """80 time units; an obstacle is reached after 7 mm."""
-    return list(drive(settled, NetworkRun(settled.starts, LDVS, velocity), 80.0, push=push))
+    return list(drive(settled, NetworkRun(settled.starts, LDVS, velocity), 80.0))
 
 
-def depths(walk: list[Stretch], starts: int) -> np.ndarray:
-    """(start,) deepest of all until the fall [mm]."""
-    deepest = np.full(starts, -np.inf)
-    for one in walk:
-        until = np.where(one.fell, one.valid - 1, one.valid)
-        seen = np.where(np.arange(one.depth.shape[1]) < until[:, None], one.depth, -np.inf)
-        deepest[one.ids] = np.maximum(deepest[one.ids], seen.max(axis=1))
-    return deepest
+def outcomes(settled: Settled, push: float = 0.0, threads: int | None = None) -> Outcomes:
+    """Of the same walks, pushed aside at 20 time units by a multiple of m V_p."""
+    size = len(settled.starts)
+    pushed = Push(np.full(size, push * insect.MASS * settled.body.vp), np.full(size, 20.0))
+    plan = NetworkRun(settled.starts, LDVS, 0.6)
+    return outcomes_of_plan(settled, plan, 80.0, np.full(size, np.inf), push=pushed, threads=threads)
 
 
 @pytest.mark.parametrize("ground", OBSTACLES)
@@ -74,19 +74,56 @@ def test_depth_is_that_of_mujocos_contacts(ground):
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_feet_never_sink_in(name):
+def test_feet_never_sink_in(name, monkeypatch):
     """By 2 % of the standing height, wherever and however fast the insect walks, until it has fallen."""
-    body = CONDITIONS[name]
-    settled = settle(draw_starts(16, 4), body)
-    assert (depths(walked(settled), 16) <= 0.02 * body.standing_height).all()
+    settled, limit = settle(draw_starts(16, 4), CONDITIONS[name]), 0.02 * CONDITIONS[name].standing_height
+    assert (outcomes(settled).depth <= limit).all()
+    monkeypatch.setattr(strikes, "SINK", np.inf)
+    assert outcomes(settled).depth.max() > limit, "this test would notice nothing"
 
 
 def test_feet_never_sink_in_when_the_insect_is_pushed_off_them(monkeypatch):
-    settled, push = settle(draw_starts(16, 4)), Push(np.full(16, PUSH * insect.MASS * 80.0), np.full(16, 20.0))
+    settled = settle(draw_starts(16, 4))
     limit = 0.02 * settled.body.standing_height
-    assert (depths(walked(settled, push=push), 16) <= limit).all()
+    assert (outcomes(settled, PUSH).depth <= limit).all()
     monkeypatch.setattr(strikes, "SINK", np.inf)
-    assert depths(walked(settled, push=push), 16).max() > 5 * limit, "this test would notice nothing"
+    assert outcomes(settled, PUSH).depth.max() > 5 * limit, "this test would notice nothing"
+
+
+def test_fine_steps_depend_on_nothing_but_their_own_insect():
+    """Pushed, so that nearly all take some: the same bits with one thread, and among fewer."""
+    settled, few = settle(draw_starts(16, 4)), settle(draw_starts(16, 4)[5:9])
+    one, two, part = outcomes(settled, PUSH, threads=1), outcomes(settled, PUSH, threads=2), outcomes(few, PUSH)
+    for name in Outcomes.__dataclass_fields__:
+        assert_array_equal(getattr(one, name), getattr(two, name))
+        assert_array_equal(getattr(one, name)[5:9], getattr(part, name))
+
+
+def test_a_dropped_insect_rebounds_as_from_fine_steps_and_hard_contacts_throughout(monkeypatch):
+    """Dividing only the steps that strike neither adds energy nor takes it: within 2 %, from 50 mm.
+
+    Measured: 16.2 mm, 16.3 mm with fine steps throughout, 17.3 mm with the usual steps alone.
+    """
+    usual, fine = (settle(draw_starts(12, 4), Body(longest_substep=ms)) for ms in (0.625, 0.15625))
+    fine.mujoco_model.pair_solref[:, 0] = 2 * fine.mujoco_model.opt.timestep
+    struck, reference = rebound(usual), rebound(fine)
+    assert struck == pytest.approx(reference, rel=0.02)
+    monkeypatch.setattr(strikes, "SINK", np.inf)
+    assert rebound(usual) != pytest.approx(reference, rel=0.02), "this test would notice nothing"
+
+
+def rebound(settled: Settled) -> float:
+    """Mean height to which the root comes back after a drop from 50 mm [mm]."""
+    settled.qpos[:, 2] += 50.0
+    heights = np.full((len(settled.starts), 0), np.nan)
+    for one in drive(settled, NetworkRun(settled.starts, LDVS, 0.0), 24.0):
+        shown = np.full((len(heights), one.qpos.shape[1]), np.nan)
+        shown[one.ids] = np.where(np.arange(shown.shape[1]) < one.valid[:, None], one.qpos[:, :, 2], np.nan)
+        heights = np.concatenate([heights, shown], axis=1)
+    settled.qpos[:, 2] -= 50.0
+    landing = round(0.2 / settled.mujoco_model.opt.timestep)
+    lowest = np.nanargmin(heights[:, :landing], axis=1)
+    return float(np.mean([np.nanmax(one[i:]) for one, i in zip(heights, lowest, strict=True)]))
 
 
 def test_nobody_else_takes_fine_steps(monkeypatch):
@@ -110,20 +147,21 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
     assert 0 < parted < 24
 
 
-def test_a_step_is_fine_if_a_foot_is_too_deep_or_will_be_right_after_it():
-    height, m = 10.0, 2  # the limit is 0.2 mm
-    depth = np.full((5, 5, 6), -1.0)  # (case, 1 + step, leg)
-    depth[1, 3, 4] = 0.21
-    depth[2, 3:, 0] = 0.19, 0.195
-    depth[3, 3:, 0] = -0.3, -0.04
-    depth[4, :, 0] = (
-        -0.3,
-        -0.04,
-        -0.04,
-        -0.04,
-        -0.04,
-    )  # in the middle of a step of the network, where the next shows it anyway
-    assert_array_equal(strikes.strikes(depth, m, height), [4 * [0], [0, 0, 1, 0], 4 * [0], [0, 0, 0, 1], 4 * [0]])
+@pytest.mark.parametrize(
+    ("moves", "struck"),
+    [
+        ((-1.0, -1.0, -1.0, -1.0, -1.0), (0, 0, 0, 0)),
+        ((-1.0, -1.0, -1.0, 0.21, -1.0), (0, 0, 1, 0)),
+        ((-1.0, -1.0, -1.0, -0.3, -0.04), (0, 0, 0, 1)),  # above ground, on at its speed
+        ((-0.3, -0.04, -0.04, -0.04, -0.04), (0, 0, 0, 0)),  # not asked in the middle of a step of the network
+        ((-1.0, -1.0, -1.0, 0.05, 0.16), (0, 0, 0, 1)),  # in the ground, on at half its speed
+        ((-1.0, -1.0, -1.0, 0.13, 0.17), (0, 0, 0, 0)),
+    ],
+)
+def test_a_step_is_fine_if_a_foot_is_too_deep_or_will_be_right_after_it(moves, struck):
+    depth = np.full((2, 5, 6), -1.0)  # (start, 1 + step, leg); the limit is 0.2 mm
+    depth[1, :, 4] = moves
+    assert_array_equal(strikes.strikes(depth, 2, 10.0), [4 * (False,), struck])
 
 
 def test_forces_of_a_fine_step_are_means():

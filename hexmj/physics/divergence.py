@@ -14,7 +14,7 @@ from hexmj.physics.body import Body
 
 
 def raise_if_diverged(
-    batch: Batch, body: Body, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
+    batch: Batch, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
 ) -> None:
     """A MuJoCo warning or a number that is not finite in one of `ids` ends everything; its state is written.
 
@@ -34,7 +34,7 @@ def raise_if_diverged(
     saved |= {"xfrc_applied": batch.bind("xfrc_applied")[ids[i]], "contact": model.pair_solref[:, 0]}
     saved["timestep"] = np.array(model.opt.timestep)
     try:
-        np.savez(path, allow_pickle=False, **saved, body=json.dumps(asdict(body)))
+        np.savez(path, allow_pickle=False, **saved, body=json.dumps(asdict(insect.body_of(model))))
         written = f"its last good state is in {path} (hexmj.physics.divergence.replay)"
     except OSError as error:
         written = f"its last good state could not be written to {path}: {error.strerror}"

@@ -74,7 +74,8 @@ def load(timestep: float = LONGEST_STEP, body: Body | None = None, *, looks: boo
 
 def body_of(model: mujoco.MjModel) -> Body:
     """The conditions with which a model of the insect was loaded."""
-    return Body(**json.loads(bytes(model.text_data).rstrip(b"\0")))
+    begin = model.text_adr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, "body")]
+    return Body(**json.loads(bytes(model.text_data[begin:]).split(b"\0")[0]))
 
 
 def mjcf() -> str:
@@ -136,7 +137,7 @@ def _compiled(body: Body, looks: bool) -> mujoco.MjModel:
     if body.load:
         load = spec.body("mesothorax").add_body(name="load", mass=body.load * MASS, inertia=3 * [4 * body.load * MASS])
         load.explicitinertial = True
-    spec.add_text(name="body", data=json.dumps(asdict(body)))
+    spec.add_text(name="body", data=json.dumps(asdict(body), default=lambda number: number.item()))
     for leg in LEGS if body.grasp else ():
         spec.add_actuator(
             name=f"{leg}_grasp",

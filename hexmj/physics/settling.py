@@ -80,7 +80,7 @@ def settle(
     steps = max(1, round(body.settling_time / 1000.0 / model.opt.timestep))
     with stopped_clock():
         batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
-    raise_if_diverged(batch, body, np.arange(len(x)), 0.0, None, before)
+    raise_if_diverged(batch, np.arange(len(x)), 0.0, None, before)
     for name, failed in {
         "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,
         "a foot is off the ground": (sensordata[:, columns.touch] <= 0).any(axis=1),

@@ -1,6 +1,6 @@
-"""Insects in one MuJoCo batch: they take physics steps, and those in which a foot strikes the ground finely.
+"""Insects in one MuJoCo batch take physics steps; a step of the network in which a foot strikes is taken again, finely.
 
-What is shown belongs to the insects before each of their steps, as MuJoCo's sensors do after it.
+A MuJoCo warning ends everything even in a roll that would have been taken again.
 """
 
 import mujoco
@@ -23,12 +23,12 @@ STATE = ("qpos", "qvel", "qacc_warmstart")
 
 
 class Stepper:
-    """The batch of settled starts, wherever their steps have brought them."""
+    """MuJoCo's batch of settled starts, and where in it the states, contacts and sensors are."""
 
     qpos: np.ndarray
     """(start, 25), as they are now."""
     push: np.ndarray
-    """(start,) force on the root to the left [g mm/s^2]; nothing else sets it."""
+    """(start,) force on the root to the left [g mm/s^2], 0 unless the caller sets it."""
 
     def __init__(self, settled: Settled, threads: int | None) -> None:
         """Put all at rest; `threads` step them, one per core unless given."""
@@ -44,7 +44,7 @@ class Stepper:
         self._substeps = settled.body.substeps(settled.network)
 
     def take(self, orders: Orders) -> Shown:
-        """Take the orders' substeps.
+        """Take the orders' substeps; what is shown of them is named as in `stretches.Stretch`.
 
         Who strikes the ground is put back to where that step of the network began, takes it finely, and goes on.
         """
@@ -61,20 +61,17 @@ class Stepper:
         return shown
 
     def _roll(self, orders: Orders, begin: int, end: int, parts: int = 1) -> tuple[Shown, np.ndarray]:
-        """Substeps, each in equal parts; and where the first step begins in which a foot strikes, (n,), `end` for none.
-
-        Shown is every part.
-        """
+        """Every part of the substeps; and where the first step begins in which a foot strikes, (n,), `end` for none."""
         settled, ids, m = self._settled, orders.ids, self._substeps
         control, before = orders.control[:, begin:end].repeat(parts, axis=1), self._states(ids)
         seen = self._batch.rollout(control.shape[1], control, record=(*STATE, "sensordata", "actuator_force"), ids=ids)
         time = orders.plan.time[0] + (begin / m - 1) * settled.network.dt
         saved = dict(zip(STATE, before, strict=True)) | {"ctrl": control}
-        raise_if_diverged(self._batch, settled.body, ids, time, orders.plan.velocity[0], saved)
+        raise_if_diverged(self._batch, ids, time, orders.plan.velocity[0], saved)
         self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end
-        feet = np.concatenate([seen["sensordata"], self._sensors[ids, None]], axis=1)[:, :, self._columns.foot]
-        depth = depth_in_ground(settled.body, feet.reshape(len(ids), -1, 6, 3), self._foot)
-        struck = strikes(depth, parts * m, settled.body.standing_height)
+        feet = [sensors[:, :, self._columns.foot] for sensors in (seen["sensordata"], self._sensors[ids, None])]
+        depth = depth_in_ground(settled.body, np.concatenate(feet, axis=1).reshape(len(ids), -1, 6, 3), self._foot)
+        strike = strikes(depth, parts * m, settled.body.standing_height)
         shown = {
             "sensors": seen["sensordata"],
             "force": seen["actuator_force"][:, :, : insect.JOINT_ACTUATORS],
@@ -82,7 +79,7 @@ class Stepper:
         }
         for name, values in zip(STATE, before, strict=True):
             shown[name] = np.concatenate([values[:, None], seen[name][:, :-1]], axis=1)
-        return shown, np.where(struck.any(axis=1), begin + np.argmax(struck, axis=1) // (parts * m) * m, end)
+        return shown, np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
 
     def _roll_finely(self, orders: Orders, begin: int, end: int, parts: int = FINER) -> Shown:
         """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""

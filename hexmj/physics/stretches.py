@@ -1,4 +1,8 @@
-"""Settled insects carry out orders, and every stretch shows what happened, before each of their physics steps."""
+"""Settled insects carry out orders, and every stretch shows what happened.
+
+A stretch shows the insects before each of their physics steps: what MuJoCo's sensors hold after a step belongs to the
+state before it.  Of a step in parts (`strikes`) it shows the first part, but for the ground's forces and the depth.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -31,7 +35,7 @@ class Stretch:
     qpos: np.ndarray
     """(n, substep, 25)."""
     sensors: np.ndarray
-    """(n, substep, column), see `insect.Sensors`."""
+    """(n, substep, column), see `insect.Sensors`; the ground's forces are means over a step in parts."""
     standing: np.ndarray
     """(n, substep, leg) whether the ground carried the foot within the last `Body.contact_gap`."""
     targets: np.ndarray

@@ -3,7 +3,7 @@
 A body that tips, or a swing that ends early, brings a foot down at 0.4 m/s and more.  One physics step of 0.625 ms
 takes it 0.25 mm into the ground before any contact can act, so it needs shorter steps and a contact as hard as they
 allow, of two steps: the deepest foot of 30 starts (LDVS, V = 0.5) was 0.47 mm deep at a quarter of the step with the
-usual contact, 0.10 mm with both.  All walks would take four times as long, and only 0.5 % of the network's steps need
+usual contact, 0.10 mm with both.  All walks would take four times as long, and only 0.2 % of the network's steps need
 it.  At 5 m/s, after a push, a sixteenth is needed.
 
 Whether a step is taken again depends on nothing but its own insect, so results do not depend on the batch.
@@ -17,19 +17,25 @@ SINK = 0.02
 FINER, FINEST = 4, 64
 """Into how many parts a physics step is divided, again and again while a foot sinks in; and into how many at most."""
 
-
 BRAKED = 0.5
-"""Share of its speed that a foot in the ground is taken to keep over a physics step; measured: 0.2 to 0.4 over 0.625 ms
-with a contact of two steps, 0.6 to 0.7 over 0.25 ms with one of five (LDVS, 99 % of the feet faster than 0.08 m/s)."""
+"""Share of its speed that a foot in the ground is taken to keep over a physics step.
+
+Measured are 0.2 to 0.4 over 0.625 ms with a contact of two steps, 0.6 to 0.7 over 0.25 ms with one of five (LDVS, 99 %
+of the feet faster than 0.08 m/s).  Too low a share lets a foot go on to the next step, where it is still stopped; 1
+takes three times as many steps again.
+"""
 
 
 def strikes(depth: np.ndarray, substeps: int, standing_height: float) -> np.ndarray:
-    """By the end of which physics steps a foot is too deep, or will be one later where a step of the network ends.
+    """In which physics steps a foot gets too deep, or will be too deep one step later.
+
+    The latter is asked only where a step of the network ends: the next one can be taken again from there, not from
+    before, and then it would begin with a foot that is too deep and too fast.
 
     Args:
         depth: of the feet before the first and after each physics step, (..., 1 + step, leg) [mm]; negative above
-            ground.
-        substeps: physics steps in one of the network, the first of which begins with the first.
+            ground.  It begins where a step of the network begins.
+        substeps: physics steps in one of the network.
         standing_height: what `SINK` is a share of [mm].
 
     Returns:
