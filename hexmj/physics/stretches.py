@@ -18,6 +18,9 @@ from hexmj.physics.settling import Settled
 from hexmj.physics.stepping import Shown, Stepper
 from hexmj.walks import Walk, joined
 
+PUSH_LASTS = 0.025
+"""How long a push lasts [s]."""
+
 SHOWN = ("qpos", "sensors", "standing", "targets", "force", "depth")
 """What is shown of every start, see `Stretch`."""
 
@@ -54,12 +57,12 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A push from the side at the root, for each start; it lasts one stretch."""
+    """A push from the side at the root, for each start; it lasts `PUSH_LASTS`, in whole steps of the network."""
 
     impulse: np.ndarray
     """(start,) to the left [g mm/s]."""
     time: np.ndarray
-    """(start,) when it begins, rounded down to the beginning of a stretch [time units]."""
+    """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
 
 
 class Insects:
@@ -92,7 +95,7 @@ class Insects:
         shown: list[Shown] = []
         for orders in ordered:
             if not done:
-                self._begin_push(orders, steps)
+                self._apply_push(orders, steps)
             shown.append(self._carry_out(orders))
             done.append(orders)
         whole: dict[str, Any] = {name: _joined([part[name] for part in shown]) for name in SHOWN}
@@ -117,14 +120,14 @@ class Insects:
         standing = _standing(touches, self._unloaded, orders.ids, self._longest_gap)
         return shown | {"standing": standing, "targets": orders.tips}
 
-    def _begin_push(self, orders: Orders, steps: int) -> None:
-        """Push those whose time has come for a stretch of `steps` steps that begins with the orders, no others."""
+    def _apply_push(self, orders: Orders, steps: int) -> None:
+        """Push with the part of the impulse that falls within the `steps` of the network that begin with the orders."""
         if self._push:
-            dt, push = self.settled.network.dt, self._push
-            time = orders.plan.time[0] - dt
-            now = (push.time >= time - 1e-9) & (push.time < time + steps * dt - 1e-9)
-            seconds = steps * self.settled.body.seconds(self.settled.network)
-            self._stepper.push[:] = np.where(now, push.impulse / seconds, 0.0)
+            network, seconds = self.settled.network, self.settled.body.seconds(self.settled.network)
+            first, lasts = orders.first // self.settled.body.substeps(network), max(1, round(PUSH_LASTS / seconds))
+            begin = np.floor(self._push.time / network.dt + 1e-9) // lasts * lasts
+            within = np.minimum(begin + lasts, first + steps) - np.maximum(begin, first)
+            self._stepper.push[:] = np.maximum(within, 0.0) / lasts * self._push.impulse / (steps * seconds)
 
 
 def _joined(values: list[np.ndarray]) -> np.ndarray:
