@@ -19,7 +19,10 @@ Shown = dict[str, np.ndarray]
 """What is shown of some starts by its name, each (n, substep, ...)."""
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
-"""What an insect goes on from."""
+"""What an insect goes on from, 25 + 24 + 24 numbers."""
+
+AFTER = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
+"""The same as MuJoCo records it, in one array."""
 
 
 class Stepper:
@@ -36,7 +39,9 @@ class Stepper:
         self._batch = Batch(self._model, len(settled.starts), thread_count(threads))
         self._timestep, self._contact = self._batch.expand("opt.timestep"), self._batch.expand("pair_solref")
         self._state = [self._batch.bind(name) for name in STATE]
-        self._put(np.arange(len(settled.starts)), [settled.qpos, settled.qvel, settled.warmstart])
+        self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]
+        rest = np.concatenate([settled.qpos, settled.qvel, settled.warmstart], axis=1)
+        self._put(np.arange(len(settled.starts)), rest)
         self.qpos = self._state[0]
         self.push = self._batch.bind("xfrc_applied")[:, self._model.body("mesothorax").id, 1]
         self._sensors, self._columns = self._batch.bind("sensordata"), insect.sensors(self._model)
@@ -49,11 +54,12 @@ class Stepper:
         Who strikes the ground is put back to where that step of the network began, takes it finely, and goes on.
         """
         m, end = self._substeps, orders.control.shape[1]
+        before = self._states(orders.ids)
         shown, struck = self._roll(orders, 0, end)
         for begin in range(0, end, m):
             if (again := np.flatnonzero(struck == begin)).size:
                 few, then = orders.only(again), min(begin + m, end)
-                self._put(few.ids, [shown[name][again, begin] for name in STATE])
+                self._put(few.ids, shown["after"][again, begin - 1] if begin else before[again])
                 _show(shown, again, begin, self._roll_finely(few, begin, then))
                 if then < end:
                     rest, struck[again] = self._roll(few, then, end)
@@ -64,21 +70,22 @@ class Stepper:
         """Every part of the substeps; and where the first step begins in which a foot strikes, (n,), `end` for none."""
         settled, ids, m = self._settled, orders.ids, self._substeps
         control, before = orders.control[:, begin:end].repeat(parts, axis=1), self._states(ids)
-        seen = self._batch.rollout(control.shape[1], control, record=(*STATE, "sensordata", "actuator_force"), ids=ids)
+        seen = self._batch.rollout(control.shape[1], control, record=(AFTER, "sensordata", "actuator_force"), ids=ids)
         time = orders.plan.time[0] + (begin / m - 1) * settled.network.dt
-        saved = dict(zip(STATE, before, strict=True)) | {"ctrl": control}
+        saved = dict(zip(STATE, np.split(before, self._ends, axis=1), strict=True)) | {"ctrl": control}
         raise_if_diverged(self._batch, ids, time, orders.plan.velocity[0], saved)
         self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end
         feet = [sensors[:, :, self._columns.foot] for sensors in (seen["sensordata"], self._sensors[ids, None])]
         depth = depth_in_ground(settled.body, np.concatenate(feet, axis=1).reshape(len(ids), -1, 6, 3), self._foot)
         strike = strikes(depth, parts * m, settled.body.standing_height)
+        width = self.qpos.shape[1]
         shown = {
+            "qpos": np.concatenate([before[:, None, :width], seen[AFTER][:, :-1, :width]], axis=1),
             "sensors": seen["sensordata"],
             "force": seen["actuator_force"][:, :, : insect.JOINT_ACTUATORS],
             "depth": depth[:, 1:].max(axis=2),
+            "after": seen[AFTER],
         }
-        for name, values in zip(STATE, before, strict=True):
-            shown[name] = np.concatenate([values[:, None], seen[name][:, :-1]], axis=1)
         return shown, np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
 
     def _roll_finely(self, orders: Orders, begin: int, end: int, parts: int = FINER) -> Shown:
@@ -91,19 +98,20 @@ class Stepper:
         shown = {name: values[:, ::parts] for name, values in every.items()} | {
             "sensors": in_whole_steps(every["sensors"], parts, self._columns.touch),
             "depth": every["depth"].reshape(len(ids), -1, parts).max(axis=2),
+            "after": every["after"][:, parts - 1 :: parts],
         }
         if parts < FINEST and (again := np.flatnonzero(struck < end)).size:
-            self._put(ids[again], [values[again] for values in before])
+            self._put(ids[again], before[again])
             _show(shown, again, 0, self._roll_finely(orders.only(again), begin, end, FINER * parts))
         return shown
 
-    def _states(self, ids: np.ndarray) -> list[np.ndarray]:
-        """Where some starts go on from, each (n, ...)."""
-        return [values[ids] for values in self._state]
+    def _states(self, ids: np.ndarray) -> np.ndarray:
+        """What some starts go on from, (n, 73)."""
+        return np.concatenate([values[ids] for values in self._state], axis=1)
 
-    def _put(self, ids: np.ndarray, state: list[np.ndarray]) -> None:
+    def _put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """Put some starts where they shall go on from."""
-        for values, now in zip(state, self._state, strict=True):
+        for values, now in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
             now[ids] = values
 
 
