@@ -16,7 +16,7 @@ from hexmj.legs import CENTRED, FIG1, LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun
 from hexmj.parameters import HWS, LDVS, Network
-from hexmj.physics import insect, strikes
+from hexmj.physics import insect
 from hexmj.physics.body import Body
 from hexmj.physics.drive import drive
 from hexmj.physics.kinematics import joints_to_tips
@@ -117,49 +117,6 @@ def test_other_conditions_are_those_of_the_physical_walk(body: Body, network: Ne
         qpos.append(walking.physics.position())
     np.testing.assert_array_equal(qpos, walked.qpos[:, 0])
     assert np.isfinite(qpos).all()
-
-
-def thrown() -> environment.InsectPhysics:
-    """An insect thrown at the ground at 1 m/s, so that its next steps have to be fine."""
-    walking = environment.load(actions="joints")
-    walking.reset()
-    walking.physics.data.qvel[2] = -1000.0
-    walking.physics.forward()
-    return walking.physics
-
-
-def test_a_copy_of_the_physics_goes_on_the_same_way(monkeypatch):
-    """As planners need it, in fine steps too."""
-    physics = thrown()
-    copies = physics.copy(), physics.copy()
-    physics.step(2)
-    copies[0].step(2)
-    np.testing.assert_array_equal(copies[0].position(), physics.position())
-    monkeypatch.setattr(strikes, "SINK", np.inf)
-    copies[1].step(2)
-    assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
-
-
-def test_fine_steps_last_no_longer():
-    physics = thrown()
-    physics.step(2)
-    assert physics.time() == pytest.approx(2 * physics.timestep(), rel=1e-12)
-
-
-def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
-    physics, advance = thrown(), environment.InsectPhysics._advance
-    usual = physics.timestep(), physics.model.pair_solref.copy()
-
-    def diverge(self, rows):
-        if len(rows) > 2:
-            raise control.PhysicsError("diverged")
-        return advance(self, rows)
-
-    monkeypatch.setattr(environment.InsectPhysics, "_advance", diverge)
-    with pytest.raises(control.PhysicsError):
-        physics.step(2)
-    assert physics.timestep() == usual[0]
-    np.testing.assert_array_equal(physics.model.pair_solref, usual[1])
 
 
 def test_rows_of_control_are_taken_one_after_the_other():

@@ -3,8 +3,11 @@
 import mujoco
 import numpy as np
 import pytest
+from dm_control.rl import control
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hexmj import environment
+from hexmj.environment import InsectPhysics
 from hexmj.legs import LEGS
 from hexmj.loss_frequency import draw_starts
 from hexmj.network import NetworkRun
@@ -167,3 +170,46 @@ def test_a_step_is_fine_if_a_foot_is_too_deep_or_will_be_right_after_it(moves, s
 def test_forces_of_a_fine_step_are_means():
     sensors = np.arange(24.0).reshape(8, 3)  # (part, column)
     assert_array_equal(strikes.in_whole_steps(sensors, 4, slice(1, 2)), [[0.0, 5.5, 2.0], [12.0, 17.5, 14.0]])
+
+
+def thrown() -> InsectPhysics:
+    """An insect thrown at the ground at 1 m/s, so that its next steps have to be fine."""
+    walking = environment.load(actions="joints")
+    walking.reset()
+    walking.physics.data.qvel[2] = -1000.0
+    walking.physics.forward()
+    return walking.physics
+
+
+def test_a_copy_of_the_environments_physics_goes_on_the_same_way(monkeypatch):
+    """As planners need it, in fine steps too."""
+    physics = thrown()
+    copies = physics.copy(), physics.copy()
+    physics.step(2)
+    copies[0].step(2)
+    assert_array_equal(copies[0].position(), physics.position())
+    monkeypatch.setattr(strikes, "SINK", np.inf)
+    copies[1].step(2)
+    assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
+
+
+def test_fine_steps_of_the_environment_last_no_longer():
+    physics = thrown()
+    physics.step(2)
+    assert physics.time() == pytest.approx(2 * physics.timestep(), rel=1e-12)
+
+
+def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
+    physics, advance = thrown(), InsectPhysics._advance
+    usual = physics.timestep(), physics.model.pair_solref.copy()
+
+    def diverge(self, rows):
+        if len(rows) > 2:
+            raise control.PhysicsError("diverged")
+        return advance(self, rows)
+
+    monkeypatch.setattr(InsectPhysics, "_advance", diverge)
+    with pytest.raises(control.PhysicsError):
+        physics.step(2)
+    assert physics.timestep() == usual[0]
+    assert_array_equal(physics.model.pair_solref, usual[1])

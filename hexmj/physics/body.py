@@ -36,7 +36,8 @@ class Body:
     friction: float = 1.0
     """Coefficient of sliding friction between the ground and feet or trunk."""
     longest_substep: float = 0.625
-    """Longest physics step [ms]; the network's step is divided into the fewest whole substeps within it."""
+    """Longest physics step [ms]; the network's step is divided into the fewest whole substeps within it, and these
+    further while a foot strikes the ground."""
     contact_gap: float = 10.0
     """A foot that leaves the ground for no longer still stands in the measured polygon [ms]; 0 counts every bounce."""
     settling_time: float = 200.0
