@@ -10,31 +10,32 @@ import pytest
 import plain_network
 from benchmarks.peers import numba_first_loss, numpy_first_loss
 from benchmarks.table import ONE_CORE
-from hexmj import HWS, LDVS, Acceleration, Network, draw_starts, first_loss
-from hexmj.loss_frequency import observation_time
-from hexmj.network import steps_within
-from hexmj.parameters import weights
+from hexmj import HWS, LDVS, Acceleration, Stride, draw_starts, first_loss
+from hexmj.controllers.cruse1998.weights import general
+from hexmj.timing import observation_time, steps_within
 
 STARTS = draw_starts(70_000, 0)
-NETWORK = Network()
+STRIDE = Stride()
 SLOWER = {"plain Numba loop": 2000, "vectorised NumPy": 8000, "readable Python": 2}
 """Peers, and starts that they do in reasonable time; NumPy and the readable network run on one thread."""
 
 
 def start_steps(lost: np.ndarray, duration: float) -> float:
     """Steps taken up to the losses [million]."""
-    return np.minimum(np.round(lost / NETWORK.dt), int(steps_within(duration, NETWORK))).sum() / 1e6
+    return np.minimum(np.round(lost / STRIDE.dt), int(steps_within(duration, STRIDE))).sum() / 1e6
 
 
 def plain(starts: np.ndarray, velocity: float, duration: float) -> None:
     for start in starts:
-        plain_network.first_loss(list(start), weights(LDVS), velocity, int(steps_within(duration, NETWORK)), NETWORK)
+        plain_network.first_loss(
+            list(start), general(LDVS.weights), velocity, int(steps_within(duration, STRIDE)), STRIDE
+        )
 
 
 @pytest.mark.parametrize("velocity", [0.1, 0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize("who", ["hexmj", *SLOWER])
 def test_constant_velocity(measure, velocity, who):
-    duration = float(observation_time("walk", np.array(velocity), NETWORK))
+    duration = float(observation_time("walk", np.array(velocity), STRIDE))
     most = {"hexmj": 70_000} | SLOWER
     starts = STARTS[: most[who] if velocity > 0.3 or who == "readable Python" else most[who] // 8]
     work = {
@@ -49,14 +50,14 @@ def test_constant_velocity(measure, velocity, who):
 
 
 @pytest.mark.parametrize("who", ["hexmj", "plain Numba loop"])
-@pytest.mark.parametrize("model", [LDVS, HWS], ids=["LDVS", "HWS"])
-def test_acceleration(measure, model, who):
+@pytest.mark.parametrize("controller", [LDVS, HWS], ids=["LDVS", "HWS"])
+def test_acceleration(measure, controller, who):
     loss = {"hexmj": first_loss, "plain Numba loop": numba_first_loss}[who]
     starts, acceleration = STARTS[: SLOWER.get(who, 7000)], Acceleration()
-    duration = float(observation_time("start", np.array(0.9), NETWORK, acceleration))
-    amount = start_steps(first_loss(starts, model, 0.9, duration, acceleration=acceleration), duration)
-    work = partial(loss, starts, model, 0.9, duration, acceleration=acceleration, threads=2)
-    what = f"FLSS, {'LDVS' if model is LDVS else 'HWS'}, accelerating to V = 0.9"
+    duration = float(observation_time("start", np.array(0.9), STRIDE, acceleration))
+    amount = start_steps(first_loss(starts, controller, 0.9, duration, acceleration=acceleration), duration)
+    work = partial(loss, starts, controller, 0.9, duration, acceleration=acceleration, threads=2)
+    what = f"FLSS, {controller.name.upper()}, accelerating to V = 0.9"
     measure(work, what, who, amount=amount, unit="million start-steps/s", bar=100.0)
 
 
@@ -72,7 +73,7 @@ def test_one_core(measure):
 def test_memory(measure, benchmark, who):
     """Ten million starts in a process of their own."""
     program = {
-        "hexmj": "from hexmj import *; flss(LDVS, [0.5], starts=10_000_000, window='start')",
+        "hexmj": "from hexmj import *; flss(LDVS, [0.5], n_starts=10_000_000, window='start')",
         "all starts in memory": "from hexmj import *; first_loss(draw_starts(10_000_000, 0), LDVS, 0.5, 40.0)",
     }[who] + "; print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"
     command = [sys.executable, "-c", program]

@@ -2,21 +2,19 @@
 
 import json
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from hexmj import LDVS, compare, draw_starts
-from hexmj.network import NetworkRun
-from hexmj.physics import insect
+from hexmj import LDVS, ReadsLegs, compare, draw_starts
+from hexmj.controllers.losses import begin
+from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.backend import STATE
 from hexmj.physics.clock import stopped_clock
-from hexmj.physics.kinematics import tips_to_joints
-from hexmj.physics.physical_walks import physical_outcomes
+from hexmj.physics.foot_path import TipTargets
 from hexmj.physics.settling import Settled, settle
-from hexmj.physics.targets import TipTargets
 
 FLYGYM = Path(__file__).parents[1] / ".venv-flygym" / "bin" / "python"
 VELOCITY, DURATION = 0.1, 20.0  # nobody falls, so both loops take the same steps
@@ -29,9 +27,9 @@ def settled() -> Settled:
 
 def controls(settled: Settled) -> np.ndarray:
     """The joint targets of the whole walk, (substep, start, actuator) [rad]."""
-    plan = NetworkRun(settled.starts, LDVS, VELOCITY).advance(round(DURATION / settled.network.dt))
-    tips = TipTargets(settled.starts, settled.body, settled.network).follow(plan, np.arange(len(settled.starts)))
-    joints, _ = tips_to_joints(tips, insect.dimensions(settled.mujoco_model))
+    plan = begin(LDVS, settled.starts, VELOCITY, settled.stride).advance(round(DURATION / settled.stride.dt))
+    tips = TipTargets(settled.starts, settled.conditions, settled.stride).follow(plan, np.arange(len(settled.starts)))
+    joints, _ = settled.compiled.inverse(tips)
     return np.ascontiguousarray(joints.reshape(*tips.shape[:2], -1).swapaxes(0, 1))
 
 
@@ -41,9 +39,11 @@ def test_steps(measure, settled, who):
     steps = controls(settled)
 
     def bare() -> None:
-        batch = Batch(settled.mujoco_model, len(settled.starts), 2)
-        batch.bind("qpos")[:], batch.bind("qvel")[:] = settled.qpos, settled.qvel
-        batch.bind("qacc_warmstart")[:] = settled.warmstart
+        model = settled.compiled.model
+        batch = Batch(model, len(settled.starts), 2)
+        parts = np.split(settled.state, np.cumsum([model.nq, model.nv]), axis=1)
+        for name, values in zip(STATE, parts, strict=True):
+            batch.bind(name)[:] = values
         ctrl = batch.bind("ctrl")
         for now in steps:
             ctrl[:] = now
@@ -64,12 +64,13 @@ def test_steps(measure, settled, who):
 @pytest.mark.parametrize("who", ["hexmj", "the open loop"])
 def test_closed_loop(measure, settled, who):
     """The network reads the legs before each of its steps, so these come one by one."""
-    some = replace(settled, body=replace(settled.body, feedback=who == "hexmj"))
+    controller = ReadsLegs(LDVS) if who == "hexmj" else LDVS
+    substeps = settled.conditions.substeps(settled.stride)
     measure(
-        lambda: physical_outcomes(some, LDVS, VELOCITY, DURATION, threads=2),
+        lambda: physical_outcomes(settled, controller, VELOCITY, DURATION, threads=2),
         "physical walks, closed loop",
         who,
-        amount=len(some.starts) * DURATION / some.network.dt * some.body.substeps(some.network) / 1e3,
+        amount=len(settled.starts) * DURATION / settled.stride.dt * substeps / 1e3,
         unit="thousand physics steps/s",
         ratio=0.5,
     )
@@ -78,7 +79,7 @@ def test_closed_loop(measure, settled, who):
 @pytest.mark.parametrize(("window", "bar"), [("start", 50.0), ("walk", 240.0)])
 def test_curve(measure, window, bar):
     measure(
-        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], starts=1000, window=window, threads=2),
+        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], n_starts=1000, window=window, threads=2),
         f"physical FLSS, 1000 starts, V = 0.1 to 0.9, window {window}",
         bar=bar,
         rounds=1,
@@ -86,13 +87,13 @@ def test_curve(measure, window, bar):
     )
 
 
-@pytest.mark.parametrize("starts", [1, 1000])
-def test_real_time(measure, settled, starts):
+@pytest.mark.parametrize("n_starts", [1, 1000])
+def test_real_time(measure, settled, n_starts):
     """Simulated over real time, of one insect or the sum over all."""
-    some = settled if starts > 1 else settle(settled.starts[:1])
-    duration = DURATION if starts > 1 else 50 * DURATION
-    amount = starts * duration / some.network.dt * some.body.seconds(some.network)
-    what = f"walking, {starts} insect{'s' if starts > 1 else ''}"
+    some = settled if n_starts > 1 else settle(settled.starts[:1])
+    duration = DURATION if n_starts > 1 else 50 * DURATION
+    amount = n_starts * duration / some.stride.dt * some.conditions.time.seconds(some.stride)
+    what = f"walking, {n_starts} insect{'s' if n_starts > 1 else ''}"
     measure(lambda: physical_outcomes(some, LDVS, VELOCITY, duration), what, amount=amount, unit="times real time")
 
 

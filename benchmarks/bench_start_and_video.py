@@ -9,8 +9,9 @@ import mujoco
 import pytest
 
 from hexmj import LDVS, Film, draw_starts, physical_walk, record, render
-from hexmj.film.take import Take
-from hexmj.physics import insect
+from hexmj.bodies.loading import compile_body
+from hexmj.replay.film import gl
+from hexmj.replay.take import Take
 
 FLSS = "-m", "hexmj", "flss", "--velocities", "0.5"
 IMPORTS = "-c", "import numba, xarray"
@@ -48,11 +49,12 @@ def test_video(measure, tmp_path: Path, who):
     frames = render([walk], tmp_path / "gait.mp4", film)
 
     def bare() -> None:
-        take, model = Take.of(walk), insect.load()
+        take = Take.of(walk)
+        model = compile_body(take.conditions).model
         model.light_castshadow[:] = False
         model.vis.quality.offsamples = 0
         data = mujoco.MjData(model)
-        with mujoco.Renderer(model, film.height, film.width) as renderer:
+        with gl.renderer(model, film.height, film.width) as renderer:
             for frame in range(frames):
                 data.qpos[:] = take.qpos[take.row(frame / (film.fps * film.slow_motion))]
                 mujoco.mj_forward(model, data)

@@ -1,6 +1,6 @@
 """What others would write first: the same network in plain Numba and in vectorised NumPy.
 
-Both give the answers of `hexmj.network.first_loss` (tests/test_benchmarks.py) with the constants of `hexmj.Network()`.
+Both give the answers of `hexmj.first_loss` (tests/test_benchmarks.py) with the usual stride and the printed order.
 """
 
 from math import inf
@@ -8,14 +8,15 @@ from math import inf
 import numpy as np
 from numba import njit
 
-from hexmj import Acceleration, Network
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.legs import MIRROR, N2, N4
-from hexmj.parameters import Model, weights
 from hexmj.threads import run_blocks
+from hexmj.timing import Acceleration, Stride, steps_within
 
-NETWORK = Network()
-AEP0, PEP0, PEP_MIN, DT = NETWORK.aep0, NETWORK.pep0, NETWORK.pep_min, NETWORK.dt
-ORIGIN, PER_Y = NETWORK.geometry.origin, tuple(1 / abs(y) for y in NETWORK.geometry.y)
+STRIDE = Stride()
+AEP0, PEP0, PEP_MIN, DT = STRIDE.aep0, STRIDE.pep0, STRIDE.pep_min, STRIDE.dt
+ORIGIN, PER_Y = STRIDE.geometry.origin, tuple(1 / abs(y) for y in STRIDE.geometry.y)
 REAR = tuple(n[0] if n else d for d, n in enumerate(N2))
 FRONT = tuple(n[0] if n else d for d, n in enumerate(N4))
 CONTRA = MIRROR
@@ -23,20 +24,20 @@ CONTRA = MIRROR
 
 def numba_first_loss(
     starts: np.ndarray,
-    model: Model,
+    controller: Cruse1998,
     velocity: float,
     duration: float,
     acceleration: Acceleration | None = None,
     threads: int = 2,
 ) -> np.ndarray:
     """Start after start, leg after leg, on two threads: (start,) [time units], inf where there is no loss."""
-    w = weights(model)
+    w, steps = general(controller.weights), int(steps_within(duration, STRIDE))
     tables = np.stack([w.p1, w.p2, w.p31, w.p32, w.p33, w.p34, w.p4])
     v_start, rate = (acceleration.start, acceleration.rate) if acceleration else (velocity, 0.0)
     lost = np.empty(len(starts))
 
     def work(begin: int, end: int) -> None:
-        _loop(starts[begin:end], tables, v_start, velocity, rate, int(duration / DT + 1e-6), lost[begin:end])
+        _loop(starts[begin:end], tables, v_start, velocity, rate, steps, lost[begin:end])
 
     run_blocks(work, len(starts), 64, threads)
     return lost
@@ -86,9 +87,9 @@ def _loop(starts, tables, v_start, v_final, rate, steps, lost):
             v = v_start + rate * (n * DT) if v < v_final else v_final
 
 
-def numpy_first_loss(starts: np.ndarray, model: Model, velocity: float, duration: float) -> np.ndarray:
+def numpy_first_loss(starts: np.ndarray, controller: Cruse1998, velocity: float, duration: float) -> np.ndarray:
     """All starts at once, (leg, start), without the ones that have lost: (start,) [time units], inf for no loss."""
-    w, d = weights(model), np.arange(6)
+    w, d = general(controller.weights), np.arange(6)
     rear, contra, front = np.array(REAR), np.array(CONTRA), np.array(FRONT)
     origin, per_y = np.array(ORIGIN)[:, None], np.array(PER_Y)[:, None]
 
@@ -99,7 +100,7 @@ def numpy_first_loss(starts: np.ndarray, model: Model, velocity: float, duration
     x = starts.T.copy()
     s, s_old, aep = np.ones_like(x), np.ones_like(x), np.full_like(x, AEP0)
     pep_shift, aep_shift = np.zeros_like(x), np.zeros_like(x)
-    for n in range(1, int(duration / DT + 1e-6) + 1):
+    for n in range(1, int(steps_within(duration, STRIDE)) + 1):
         pep_next = (s[rear] - 1) * of(w.p1, rear) + (s[contra] - 1) * of(w.p1, contra)
         pep_next += (AEP0 - PEP_MIN) * of(w.p2, rear) * (s[rear] * (1 - s_old[rear]))
         for e in (front, contra):

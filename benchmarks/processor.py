@@ -1,6 +1,5 @@
 """The processor's side of the network's speed: its name, its clock, and the operations that a step takes."""
 
-import os
 import platform
 import re
 from collections import Counter
@@ -10,7 +9,8 @@ from time import perf_counter
 import numpy as np
 from numba import njit
 
-from hexmj import lanes
+from hexmj.controllers.cruse1998 import kernel
+from hexmj.threads import cores
 
 ARITHMETIC = r"v(add|sub|mul|div|min|max|cmp\w*|blendm|and|or|xor|andn)p[ds]"
 WIDTHS = {"zmm": 8, "ymm": 4, "xmm": 2}
@@ -23,7 +23,7 @@ def description() -> str:
     name = re.search(r"model name\s*: (.+)", text)
     family = re.search(r"cpu family\s*: (\d+)", text)
     cpu = (name[1] if name else platform.processor()) + (f" (family {family[1]})" if family else "")
-    return f"{cpu}, {len(os.sched_getaffinity(0))} cores, {platform.system()}, Python {platform.python_version()}"
+    return f"{cpu}, {cores()} cores, {platform.system()}, Python {platform.python_version()}"
 
 
 def clock(turns: int = 20_000_000) -> float:
@@ -39,8 +39,8 @@ def clock(turns: int = 20_000_000) -> float:
 
 def operations() -> tuple[int, int]:
     """Arithmetic operations of the compiled kernel for each start and step (0 without AVX), and how many at a time."""
-    block, p, k = np.zeros(lanes.ROWS * lanes.LANES), (0.0,) * 72, (1.0,) * 18
-    step = lanes._step_printed
+    block, p, k = np.zeros(kernel.ROWS * kernel.LANES), (0.0,) * 72, (1.0,) * 18
+    step = kernel._step_printed
     step(block, p, k)
     code = step.inspect_asm(step.signatures[0])
     lines = [line for line in code.splitlines() if re.match(rf"\s+{ARITHMETIC}\s", line)]

@@ -19,8 +19,8 @@ from rich.table import Table
 from scipy.optimize import nnls
 
 from benchmarks.processor import description
-from hexmj import LDVS, Body, Network, draw_starts, first_loss, flss, physical_flss
-from hexmj.figures import MEASURE_COLOURS
+from hexmj import LDVS, Conditions, Stride, draw_starts, first_loss, flss, physical_flss
+from hexmj.measures.figures import MEASURE_COLOURS
 from hexmj.results import json_text, results_folder, write_whole
 from hexmj.threads import thread_count
 
@@ -144,7 +144,7 @@ def timed(measure: str, work: Work) -> tuple[float, float]:
     seconds = []
     while True:
         begin = perf_counter()
-        result = FLSS[measure](LDVS, work.each_velocity(), starts=work.starts, window=work.t, threads=work.threads)
+        result = FLSS[measure](LDVS, work.each_velocity(), n_starts=work.starts, window=work.t, threads=work.threads)
         seconds.append(perf_counter() - begin)
         if len(seconds) == 3 or seconds[0] > CHEAP:
             return median(seconds), kinematic_steps(work) if measure == "kinematic" else physical_steps(work, result)
@@ -154,15 +154,15 @@ def kinematic_steps(work: Work) -> float:
     """Start-steps of the network up to the losses or the end, from the mean over some of the starts."""
     some = draw_starts(min(work.starts, SOME), 0)
     walked = [np.minimum(first_loss(some, LDVS, v, work.t), work.t).mean() for v in work.each_velocity()]
-    return work.starts * float(np.sum(walked)) / Network().dt
+    return work.starts * float(np.sum(walked)) / Stride().dt
 
 
 def physical_steps(work: Work, result: "xr.Dataset") -> float:
     """Physics steps while the starts settle, and up to the falls or the end."""
-    body, network = Body(), Network()
-    step = body.seconds(network) / body.substeps(network)
-    walked = np.minimum(result.fall, work.t).values.sum() / network.dt * body.substeps(network)
-    return float(walked + work.starts * round(body.settling_time / 1000.0 / step))
+    conditions, stride = Conditions(), Stride()
+    walked = np.minimum(result.fall, work.t).values.sum() / stride.dt * conditions.substeps(stride)
+    settling = conditions.numerics.settling_time / 1000.0
+    return float(walked + work.starts * round(settling / conditions.timestep(stride)))
 
 
 def table(all_curves: Sequence[Curve]) -> Table:
@@ -246,7 +246,7 @@ def draw(curve: Curve, axes: "Axes") -> None:
 def warm_up() -> None:
     """Compile, load and start all that is not to be measured."""
     for measure in FLSS.values():
-        measure(LDVS, [0.5], starts=600, window=1.0)
+        measure(LDVS, [0.5], n_starts=600, window=1.0)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -267,7 +267,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         all_curves.append(curve)
     console.print(table(all_curves))
     points = [asdict(curve) | curve.summary() for curve in all_curves]
-    text = json_text({"machine": description(), "share": options.share, "model": "LDVS", "curves": points})
+    text = json_text({"machine": description(), "share": options.share, "controller": LDVS.name, "curves": points})
     write_whole(folder / DATA, lambda part: part.write_text(text + "\n", encoding="utf-8"))
     write_whole(folder / FIGURE, lambda part: figure(all_curves).savefig(part, dpi=200))
     console.print(f"{folder / FIGURE}, {folder / DATA}")

@@ -21,10 +21,10 @@ import mujoco
 import numpy as np
 
 from benchmarks.table import print_table
-from hexmj import LDVS, Body, Network, SimulationError, draw_starts
+from hexmj import LDVS, Conditions, SimulationError, Stride, draw_starts
+from hexmj.bodies.loading import compile_body
 from hexmj.intervals import wilson_interval
-from hexmj.physics import insect
-from hexmj.physics.physical_walks import physical_outcomes
+from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import Settled, settle
 from hexmj.results import json_text, write_whole
 
@@ -52,39 +52,39 @@ def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
     for name, options in OPTIONS.items():
         yield name, with_model(settled, **options)
     yield "pairs searched for", with_model(settled, searched=True)
-    coarse = with_model(settled, timestep=settled.body.seconds(settled.network))
-    yield "time step x 2", replace(coarse, body=_CoarseBody())
-    yield "time step / 2", settle(starts, Body(longest_substep=0.3125))
-    yield FINEST, settle(starts, Body(longest_substep=0.15625))
+    coarse = with_model(settled, timestep=settled.conditions.time.seconds(settled.stride))
+    yield "time step x 2", replace(coarse, conditions=_Coarse())
+    yield "time step / 2", settle(starts, Conditions.of(longest_substep=0.3125))
+    yield FINEST, settle(starts, Conditions.of(longest_substep=0.15625))
 
 
 @dataclass(frozen=True)
-class _CoarseBody(Body):
-    """One physics step for each step of the network, 1.25 ms, which `Body` refuses."""
+class _Coarse(Conditions):
+    """One physics step for each step of the plan, 1.25 ms, which `Conditions` refuse."""
 
-    def substeps(self, network: Network) -> int:
+    def substeps(self, stride: Stride) -> int:
         return 1
 
 
 def with_model(settled: Settled, searched: bool = False, **options: Any) -> Settled:
     """The same starts with other values in `mjOption`, or with pairs of geoms that MuJoCo must search for."""
-    model = insect.load(settled.mujoco_model.opt.timestep, settled.body, looks=False)
+    conditions = settled.conditions
+    body, model = conditions.body, compile_body(conditions, settled.compiled.model.opt.timestep, looks=False).model
     if searched:
-        spec = mujoco.MjSpec.from_string(insect.mjcf())
+        spec = mujoco.MjSpec.from_file(str(body.mjcf))
         spec.compiler.discardvisual = True
         for pair in list(spec.pairs):
             geom = spec.geom(pair.geomname2)
             geom.conaffinity, geom.condim, geom.friction = 1, pair.condim, pair.friction[[0, 2, 3]]
             geom.solref, geom.solimp = pair.solref, pair.solimp
             spec.delete(pair)
-        ground = spec.geom("ground")
-        ground.contype, ground.solref, ground.solimp = 1, spec.geom("head").solref, spec.geom("head").solimp
-        ground.friction = spec.geom("head").friction
+        ground, like = spec.geom(body.ground), spec.geom(body.trunk[0])
+        ground.contype, ground.solref, ground.solimp, ground.friction = 1, like.solref, like.solimp, like.friction
         spec.option.timestep = model.opt.timestep
         model = spec.compile()
     for name, value in options.items():
         setattr(model.opt, name, value)
-    return replace(settled, mujoco_model=model)
+    return replace(settled, compiled=replace(settled.compiled, model=model))
 
 
 def measure(settled: Settled) -> dict[str, float]:
@@ -94,7 +94,7 @@ def measure(settled: Settled) -> dict[str, float]:
     seconds = perf_counter() - begin
     fell = np.isfinite(outcomes.fall)
     low, high = wilson_interval(int(fell.sum()), len(fell))
-    walked = np.minimum(outcomes.fall, DURATION) / settled.network.dt * settled.body.substeps(settled.network)
+    walked = np.minimum(outcomes.fall, DURATION) / settled.stride.dt * settled.conditions.substeps(settled.stride)
     return {
         "flss": float(fell.mean()),
         "low": low,
@@ -143,7 +143,7 @@ def rows(results: dict[str, dict[str, float] | None]) -> list[list[str]]:
 def main(folder: str = "results/bench", starts: str = "400") -> None:
     """Measure, print and write the table."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    with chdir(folder):  # where the states of what diverges are written
+    with chdir(folder):  # where MuJoCo writes its log of what diverges
         results = table(draw_starts(int(starts), 0))
     columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
     print_table(columns, rows(results))

@@ -6,11 +6,11 @@ import hexmj
 
 for load in (0.0, 2.0):
     by_itself, reading = (
-        hexmj.compare(hexmj.LDVS, [0.5], starts=16, window=100.0, body=hexmj.Body(load=load, feedback=feedback))
-        for feedback in (False, True)
+        hexmj.compare(controller, [0.5], n_starts=16, window=100.0, conditions=hexmj.Conditions.of(load=load))
+        for controller in (hexmj.LDVS, hexmj.ReadsLegs(hexmj.LDVS))
     )
-    other = np.isfinite(by_itself.fall) != np.isfinite(reading.fall)
+    other = np.isfinite(by_itself.fall.values) != np.isfinite(reading.fall.values)
     print(
         f"load {load:g}: physical FLSS {by_itself.physical.item():.2f} by itself, {reading.physical.item():.2f}"
-        f" reading the legs; another end for {other.sum().item()} of 16 starts"
+        f" reading the legs; another end for {other.sum()} of 16 starts"
     )

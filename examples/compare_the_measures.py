@@ -3,8 +3,8 @@
 import hexmj
 
 for vp in (20.0, 400.0):
-    result = hexmj.compare(hexmj.LDVS, velocities=[0.5], starts=50, seed=0, body=hexmj.Body(vp=vp))
-    one = result.isel(model=0, velocity=0)
+    result = hexmj.compare(hexmj.LDVS, velocities=[0.5], n_starts=50, conditions=hexmj.Conditions.of(vp=vp))
+    one = result.isel(controller=0, velocity=0)
     print(
         f"V_p = {vp:g} mm/s: kinematic FLSS {one.kinematic.item():.2f}, measured {one.measured.item():.2f},"
         f" physical {one.physical.item():.2f}, agreement {one.agreement.item():.2f}"

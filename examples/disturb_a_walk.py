@@ -3,24 +3,24 @@
 import numpy as np
 
 import hexmj
-from hexmj.experiments.disturbance import disturbance, draw_walkers
-from hexmj.experiments.disturbed_plan import DisturbedPlan
-from hexmj.experiments.disturbed_walks import planned_losses
-from hexmj.experiments.strategies import collect_postures
-from hexmj.physics.physical_walks import outcomes_of_plan
+from hexmj.controllers.losses import planned_losses
+from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.settling import settle
+from hexmj.studies.disturbance.disturbances import disturbance_of, find_stable_starts
+from hexmj.studies.disturbance.plan import Disturbed
+from hexmj.studies.disturbance.strategies import collect_postures
 
 V, STARTS = 0.6, 12
-network = hexmj.Network()
-walkers = draw_walkers(hexmj.LDVS, V, STARTS, seed=0, network=network, grid=1)
-halt = disturbance("halt", walkers, hexmj.LDVS, V, network)
-settled = settle(walkers.starts)
-duration = 0.1 * halt.step.max() + 150.0  # time units
-for name, postures in {"as they stand": None, "reorganised": collect_postures(hexmj.LDVS, V, 0, network)}.items():
-    plans = [DisturbedPlan(walkers.starts, hexmj.LDVS, V, halt, postures=postures) for _ in range(2)]
-    lost = planned_losses(plans[0], round(duration / network.dt))
-    fell = outcomes_of_plan(settled, plans[1], duration, lost).fall
-    print(
-        f"legs {name}: rest {network.dt * np.mean(plans[0].resumed - halt.step):.0f} time units,"
-        f" {np.isfinite(lost).sum()} of {STARTS} lose stability on paper, {np.isfinite(fell).sum()} fall"
-    )
+stride = hexmj.Stride()
+stable = find_stable_starts(hexmj.LDVS, V, STARTS, seed=0, stride=stride, grid=1)
+halt = disturbance_of(stable, "halt", hexmj.LDVS, V, stride)
+settled = settle(stable.starts)
+steps = int(halt.step.max()) + 1500
+for name, postures in {"as they stand": None, "reorganised": collect_postures(hexmj.LDVS, V, 0, stride)}.items():
+    halted = Disturbed(hexmj.LDVS, halt, postures)
+    on_paper, in_physics = (halted.begin(stable.starts, np.full(STARTS, V), stride) for _ in range(2))
+    lost = planned_losses(on_paper, np.array(steps))
+    fell = outcomes_of_plan(settled, in_physics, steps * stride.dt, np.where(lost, lost * stride.dt, np.inf)).fall
+    rest = stride.dt * np.mean(on_paper.resumed - halt.step)
+    lose, fall = np.count_nonzero(lost), np.count_nonzero(np.isfinite(fell))
+    print(f"legs {name}: rest {rest:.0f} time units, {lose} of {STARTS} lose stability on paper, {fall} fall")

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import hexmj
-from hexmj.experiments.stability_map import stability_map
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.sweeps import conduct
 
 folder = Path("results/map_example")  # what is finished is kept here
-result = stability_map(hexmj.LDVS, "vp", folder, values=[20.0, 320.0], velocities=[0.5], starts=30)
+study = StabilityMap(hexmj.LDVS, "vp", values=[20.0, 320.0], velocities=[0.5], n_starts=30)
+result = conduct(study, folder)
 for vp in result.value.values:
     one = result.sel(value=vp, velocity=0.5)
     print(f"V_p = {vp:g} mm/s, Froude number {one.froude.item():.2g}:", end=" ")

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hexmj import environment
+from hexmj.environments import dm
 
 
 def main() -> None:
-    walking = environment.load(velocity=0.3, actions="tips")
+    walking = dm.load(velocity=0.3, actions="tips")
     spec = walking.action_spec()
     step = walking.reset()
     rewards, speeds = [], []

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 
 import hexmj
+from hexmj.controllers.cruse1998.presets import weights_toml
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS
 from hexmj.legs import MIRROR
-from hexmj.parameters import NEIGHBOURS
-from hexmj.presets import model_toml
 
 V = 0.1
-AEP, PEP = hexmj.Network().aep0, hexmj.Network().pep0
+AEP, PEP = hexmj.Stride().aep0, hexmj.Stride().pep0
 CAP = 4.0  # the greatest shift of mechanism 3, Eq. 4 [mm]
 BEFORE = 0.08  # so far before a neighbour's PEP the own one begins to recede [mm]
 SLOPE = 4.0  # of a receding PEP
@@ -61,13 +61,13 @@ def coupled() -> hexmj.Weights:
 
 def main() -> None:
     """The FLSS of the set and of the hard-wired system, and the set as a parameter file."""
-    model = coupled()
-    for name, one in (("the paper's HWS", hexmj.HWS), ("PEPs that give way", model)):
-        result = hexmj.flss(one, [V], starts=20000, seed=1998).isel(velocity=0)
-        print(f"{name}: FLSS {result.flss:.5f} ({result.low:.5f}-{result.high:.5f}) at V = {V}")
+    giving_way = hexmj.Cruse1998(coupled(), name="PEPs that give way")
+    for one in (hexmj.HWS, giving_way):
+        result = hexmj.flss(one, [V], n_starts=20000, seed=1998).isel(velocity=0)
+        print(f"{one.name}: FLSS {result.flss:.5f} ({result.low:.5f}-{result.high:.5f}) at V = {V}")
     path = Path("results/examples/receding_pep.toml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(model_toml(model), encoding="utf-8")
+    path.write_text(weights_toml(giving_way.weights), encoding="utf-8")
     print(path)
 
 

@@ -6,12 +6,12 @@ import hexmj
 from hexmj.paper.found_sets import found_set
 
 V = 0.6
-period = 20 * (1 + 1 / V)  # of a single leg, time units
+period = hexmj.Stride().periods(V)  # of a single leg, time units
 starts = hexmj.draw_starts(1000, seed=1998)
 ideal = found_set("walk", V)
 assert ideal, "the ideal sets are shipped"
-for name, model in {"HWS": hexmj.HWS, "LDVS": hexmj.LDVS, "ideal": ideal}.items():
-    plan = hexmj.walk(starts, model, V, 3 * period)
+for name, controller in {"HWS": hexmj.HWS, "LDVS": hexmj.LDVS, "ideal": ideal}.items():
+    plan = hexmj.walk(starts, controller, V, 3 * period)
     lost = hexmj.walk_margin(plan) <= 0  # (step, start)
     losers = np.flatnonzero(lost.any(axis=0))
     first = lost[:, losers].argmax(axis=0)

@@ -1,5 +1,5 @@
 """`python -m hexmj` is the command `hexmj`."""
 
-from hexmj.cli import main
+from hexmj.cli.main import main
 
 main()

@@ -1,6 +1,7 @@
 """What can go wrong, each with one clear sentence."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
 class InputError(Exception):
@@ -9,6 +10,14 @@ class InputError(Exception):
 
 class SimulationError(RuntimeError):
     """A physical simulation that did not settle or diverged; it is never counted as an outcome."""
+
+    def __init__(self, sentence: str, state: Mapping[str, Any] | None = None, file_name: str = "") -> None:
+        """What happened, and the last good state, if it is known, with a name for its file."""
+        super().__init__(sentence, state, file_name)
+        self.sentence, self.state, self.file_name = sentence, dict(state or {}), file_name
+
+    def __str__(self) -> str:
+        return self.sentence
 
 
 class RenderingError(RuntimeError):

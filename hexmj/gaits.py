@@ -11,13 +11,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.controllers.losses import begin
+from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import NetworkRun, steps_within
-from hexmj.parameters import Acceleration, Model, Network
 from hexmj.stability import walk_margin
-from hexmj.walks import Walk
+from hexmj.starts import draw_starts
+from hexmj.timing import Acceleration, Stride, steps_within
+from hexmj.walks import Walk, part_of
 
 PAIRS: dict[str, tuple[int, int]] = {
     f"{j + 1}-{k + 1}": (j, k)
@@ -46,8 +47,8 @@ TRIPOD_PHASE = 0.5
 NEAR = 0.05
 """Phases that differ by no more than this count as equal where a gait is named."""
 
-FINE = Network(dt=0.01)
-"""The network with the time step of Figs. 5 and 6."""
+FINE = Stride(dt=0.01)
+"""The stride with the time step of Figs. 5 and 6."""
 
 PART = 4096
 """Steps of a walk held in memory at a time."""
@@ -88,26 +89,26 @@ def gait(walk: Walk) -> Gait:
 
 
 def limit_gait(
-    model: Model,
+    controller: Controller,
     velocity: float,
     *,
-    starts: int = 100,
+    n_starts: int = 100,
     seed: int = 0,
-    network: Network = FINE,
+    stride: Stride = FINE,
     acceleration: Acceleration | None = None,
     periods: int = 80,
     threads: int | None = None,
 ) -> Gait:
-    """The gaits that a model reaches from random starts, as in Figs. 5 and 6.
+    """The gaits that a controller reaches from random starts, as in Figs. 5 and 6.
 
     Of the walks only the changes of state and the stability of the last periods are kept.
 
     Args:
-        model: coupling weights.
+        controller: plans the walks.
         velocity: V_r, or its final value when accelerating, 0 < V < 1.
-        starts: N.
+        n_starts: N.
         seed: of the starts.
-        network: the constants that the paper leaves out.
+        stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11.
         periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
         threads: one per core unless given; the result does not depend on it.
@@ -116,31 +117,24 @@ def limit_gait(
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, since V = 0 has no period")
     if not periods >= CYCLES + 2:
         raise InputError(f"periods = {periods}; expected at least {CYCLES + 2}, the last of them incomplete")
-    run = NetworkRun(
-        draw_starts(starts, seed, network),
-        model,
-        velocity,
-        network=network,
-        acceleration=acceleration,
-        threads=threads,
-    )
-    longest = (network.aep0 - network.pep_min) * (1.0 + 1.0 / velocity)  # from AEP_0 to PEP_min and back
-    speeding = (velocity - acceleration.start) / acceleration.rate if acceleration else 0.0
-    steps = int(steps_within(speeding + periods * longest, network))
-    tail = steps - int(steps_within(2.0 * longest, network))
-    stance = np.ones((1, starts, 6), dtype=bool)
+    plan = begin(controller, draw_starts(n_starts, seed, stride), velocity, stride, acceleration, threads)
+    longest = (stride.aep0 - stride.pep_min) * (1.0 + 1.0 / velocity)  # from AEP_0 to PEP_min and back
+    speeding = acceleration.duration(velocity) if acceleration else 0.0
+    steps = int(steps_within(speeding + periods * longest, stride))
+    tail = steps - int(steps_within(2.0 * longest, stride))
+    stance = np.ones((1, n_starts, 6), dtype=bool)
     changes, upright = [], []
-    while run.done < steps:
-        done = run.done
-        part = run.advance(min(PART, (tail if done < tail else steps) - done))
+    while plan.done < steps:
+        done = plan.done
+        part = plan.advance(min(PART, (tail if done < tail else steps) - done))
         row, foot, down = _changes(np.concatenate([stance, part.stance]))
         changes.append((row + done, foot, down))
         stance = part.stance[-1:]
         if done >= tail:
             upright.append(_upright(part, len(part.time)))
-    time = np.arange(steps + 1) * network.dt
+    time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
-    return _with_stability(_regimes(row, foot, down, time, starts), np.concatenate(upright), time)
+    return _with_stability(_regimes(row, foot, down, time, n_starts), np.concatenate(upright), time)
 
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
@@ -199,12 +193,7 @@ def _upright(walk: Walk, steps: int) -> np.ndarray:
     """Whether each start is statically stable in each of the last steps, (step, start)."""
     size = len(walk.time)
     parts = [slice(first, min(first + PART, size)) for first in range(size - steps, size, PART)]
-    return np.concatenate(
-        [
-            walk_margin(Walk(walk.time[s], walk.velocity[s], walk.x[s], walk.y[s], walk.stance[s], walk.geometry)) > 0
-            for s in parts
-        ]
-    )
+    return np.concatenate([walk_margin(part_of(walk, part)) > 0 for part in parts])
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -218,15 +207,15 @@ def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _regimes(
-    row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, starts: int
+    row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, n_starts: int
 ) -> dict[str, np.ndarray]:
     """The fields of `Gait` but `stable`."""
-    raised = _by_foot(row[~down], foot[~down], 6 * starts)
-    lowered = _by_foot(row[down], foot[down], 6 * starts)
-    periods, duty_factor = np.full((starts, 6), np.nan), np.full((starts, 6), np.nan)
-    phase, reached = np.full((starts, len(PAIRS)), np.nan), np.full(starts, np.inf)
+    raised = _by_foot(row[~down], foot[~down], 6 * n_starts)
+    lowered = _by_foot(row[down], foot[down], 6 * n_starts)
+    periods, duty_factor = np.full((n_starts, 6), np.nan), np.full((n_starts, 6), np.nan)
+    phase, reached = np.full((n_starts, len(PAIRS)), np.nan), np.full(n_starts, np.inf)
     j, k = np.transpose(list(PAIRS.values()))
-    for n in range(starts):
+    for n in range(n_starts):
         legs = slice(6 * n, 6 * n + 6)
         begin, touch, end = time[_cycles(raised[legs], lowered[legs])]
         settled = _settled(begin, end, _resolution(time))

@@ -5,7 +5,6 @@ import math
 import os
 import platform
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +63,8 @@ def save_dataset(data: "xr.Dataset", path: Path) -> Path:
 
 def save_manifest(settings: dict[str, Any], path: Path) -> Path:
     """Write what is needed to run the same again: settings (the seed among them) and versions."""
+    from importlib.metadata import version
+
     versions = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
     text = json_text({"settings": settings, "versions": versions, "machine": platform.machine()})
     return write_whole(path, lambda part: part.write_text(text + "\n", encoding="utf-8"))

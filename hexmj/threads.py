@@ -1,16 +1,26 @@
 """Work on all cores: contiguous blocks of starts on a pool of threads that release the GIL."""
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from hexmj.errors import InputError
 
 
-def thread_count(threads: int | None = None) -> int:
-    """The number of threads asked for, by default one per core that this process may use."""
-    if threads is None:
+def cores() -> int:
+    """Cores that this process may use, as far as the operating system tells."""
+    if sys.version_info >= (3, 13):
+        return os.process_cpu_count() or 1
+    if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def thread_count(threads: int | None = None) -> int:
+    """The number of threads asked for, by default one per core."""
+    if threads is None:
+        return cores()
     if threads < 1:
         raise InputError(f"threads = {threads}; expected at least 1, or nothing for one per core")
     return threads

@@ -1,10 +1,12 @@
-"""The one type of walk that both measures of stability read."""
+"""The one type of walk that both measures of stability read, and what a plan adds to it for the body."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
+from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
 
 
@@ -12,12 +14,12 @@ from hexmj.legs import FIG1, Geometry
 class Walk:
     """Where the tips are, seen from the centre of mass, and which of them stand.
 
-    A planned walk has the paper's centre of mass (fixed at O) and the network's tips; a measured
+    A planned walk has the paper's centre of mass (fixed at O) and the tips as planned; a measured
     walk has the body's own centre of mass, the physical tips and the feet that touch the ground.
     """
 
     time: np.ndarray
-    """(step,) time at the end of each step [time units of the network]."""
+    """(step,) time at the end of each step [time units]."""
     velocity: np.ndarray
     """(step, start) commanded velocity V_r during each step, as a fraction of V_p."""
     x: np.ndarray
@@ -35,9 +37,42 @@ class Walk:
         return np.stack([self.x + np.array(self.geometry.origin), self.y], axis=-1)
 
 
-def joined(walks: Sequence[Walk]) -> Walk:
+@dataclass(frozen=True, eq=False)
+class PlannedWalk(Walk):
+    """A walk as planned, with what a body needs to lift and lower the feet."""
+
+    aep: np.ndarray = field(kw_only=True)
+    """(step, start, leg) where the swing that a leg is in will end, on its own axis [mm], so that the body can lower
+    the foot in time; NaN where nothing tells: then it is lowered once the leg stands."""
+    height: np.ndarray = field(kw_only=True)
+    """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
+
+
+AnyWalk = TypeVar("AnyWalk", bound=Walk)
+
+
+def joined(walks: Sequence[AnyWalk]) -> AnyWalk:
     """One walk of the same starts out of those that follow each other."""
     if len(walks) == 1:
         return walks[0]
-    names = ("time", "velocity", "x", "y", "stance")
+    names = [one.name for one in fields(walks[0]) if one.name != "geometry"]
     return replace(walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in names})
+
+
+def one_start(walk: AnyWalk, start: int) -> AnyWalk:
+    """The walk of one start, its axis kept.
+
+    Raises:
+        InputError: there is no such start.
+    """
+    count = walk.stance.shape[1]
+    if not 0 <= start < count:
+        raise InputError(f"start = {start}; expected 0 to {count - 1}")
+    names = [one.name for one in fields(walk) if one.name not in ("time", "geometry")]
+    return replace(walk, **{name: getattr(walk, name)[:, start : start + 1] for name in names})
+
+
+def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
+    """Some steps of a walk."""
+    names = [one.name for one in fields(walk) if one.name != "geometry"]
+    return replace(walk, **{name: getattr(walk, name)[steps] for name in names})

@@ -1,5 +1,22 @@
-"""hexmj chooses how MuJoCo renders, which must happen before any test imports MuJoCo."""
+"""What all tests share: the command, run in this process."""
 
-import hexmj
+import sys
 
-__all__ = ["hexmj"]
+import pytest
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command in this process: its exit code, standard output and standard error."""
+    from hexmj.cli.main import main
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["hexmj", *map(str, words)])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, *capsys.readouterr()
+
+    return call

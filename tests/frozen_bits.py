@@ -9,8 +9,7 @@ import hashlib
 import json
 import platform
 import sys
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,38 +20,38 @@ import hexmj
 
 KEPT = Path(__file__).with_suffix(".json")
 SEEDS = (0, 7)
-Arrays = Mapping[str, Any]
+Arrays = dict[str, Any]
 
 
 def kinematic_flss(seed: int) -> Arrays:
-    from hexmj.parameters import Acceleration, Network
+    from hexmj import Acceleration, Cruse1998, Stride
 
     starts = hexmj.draw_starts(300, seed)
     out = {}
     for name in ("hws", "ldvs", "own", "own-0.1"):
         for order in ("printed", "undelayed", "sequential"):
-            loss = hexmj.first_loss(starts, hexmj.PRESETS[name], 0.4, 210.0, network=Network(order=order))
-            out[f"{name} {order}"] = loss
+            controller = Cruse1998(hexmj.PRESETS[name].weights, order)
+            out[f"{name} {order}"] = hexmj.first_loss(starts, controller, 0.4, 210.0)
     out["accelerated"] = hexmj.first_loss(
         starts, hexmj.LDVS, 0.5, 6000.0, acceleration=Acceleration(rate=0.0005, start=0.1)
     )
-    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], starts=2500, seed=seed, network=Network(geometry=hexmj.CENTRED))
+    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], n_starts=2500, seed=seed, stride=Stride(geometry=hexmj.CENTRED))
     walked = hexmj.walk(starts[:9], hexmj.HWS, 0.3, 90.0)
-    out |= {"range": hexmj.flss_over_range(hexmj.LDVS, 0.1, 0.5, starts=2000, seed=seed)[0]}
+    out |= {"range": hexmj.flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=2000, seed=seed)[0]}
     return out | _table(table) | {"x": walked.x, "stance": walked.stance, "margin": hexmj.walk_margin(walked)}
 
 
 def gaits(seed: int) -> Arrays:
     from hexmj.gaits import limit_gait
-    from hexmj.parameters import Network
 
-    return vars(limit_gait(hexmj.HWS, 0.6, starts=5, seed=seed, network=Network(dt=0.05), periods=30))
+    return vars(limit_gait(hexmj.HWS, 0.6, n_starts=5, seed=seed, stride=hexmj.Stride(dt=0.05), periods=30))
 
 
 def compared(seed: int, feedback: bool = False) -> Arrays:
-    body = hexmj.Body(feedback=feedback)
-    models = {"ldvs": hexmj.LDVS, "uncoordinated": hexmj.UNCOORDINATED}
-    return _table(hexmj.compare(models, [0.3, 0.6], starts=8, window=60.0, seed=seed, body=body))
+    controllers = {"ldvs": hexmj.LDVS, "uncoordinated": hexmj.UNCOORDINATED}
+    if feedback:
+        controllers = {name: hexmj.ReadsLegs(one) for name, one in controllers.items()}
+    return _table(hexmj.compare(controllers, [0.3, 0.6], n_starts=8, window=60.0, seed=seed))
 
 
 def compared_with_feedback(seed: int) -> Arrays:
@@ -60,75 +59,76 @@ def compared_with_feedback(seed: int) -> Arrays:
 
 
 def other_conditions(seed: int) -> Arrays:
-    body = hexmj.Body(
+    conditions = hexmj.Conditions.of(
         vp=200.0, friction=0.5, load=1.0, leg_mass=0.5, centre_of_mass=2.0, grasp=0.5, standing_height=11.0,
         step_height=9.0, lift_time=10.0, landing_time=15.0, contact_gap=5.0, longest_substep=0.3,
     )  # fmt: skip
-    network = hexmj.Network(geometry=hexmj.CENTRED, dt=0.2)
-    return _table(hexmj.compare(hexmj.HWS, [0.4], starts=6, window=60.0, seed=seed, body=body, network=network))
+    stride = hexmj.Stride(geometry=hexmj.CENTRED, dt=0.2)
+    return _table(
+        hexmj.compare(hexmj.HWS, [0.4], n_starts=6, window=60.0, seed=seed, conditions=conditions, stride=stride)
+    )
 
 
 def disturbed(seed: int) -> Arrays:
-    from hexmj.experiments.disturbed_walks import cases, disturb
+    from hexmj.studies.disturbance.study import DisturbedWalks
+    from hexmj.sweeps import conduct
 
-    walked = cases(("halt", "leg", "push"), (40.0,), ("reorganise", "slow_down", "grasp"), True)
-    with tempfile.TemporaryDirectory() as folder:
-        return _table(disturb(hexmj.LDVS, Path(folder), walked, velocities=[0.6], starts=4, window=30.0, seed=seed))
+    few: Any = {"velocities": [0.6], "n_starts": 4, "window": 30.0, "seed": seed}
+    return _table(conduct(DisturbedWalks(hexmj.LDVS, impulses=[40.0], **few)))
 
 
 def disturbed_with_feedback(seed: int) -> Arrays:
-    from hexmj.experiments.disturbed_walks import cases, disturb
+    from hexmj.studies.disturbance.study import DisturbedWalks
+    from hexmj.sweeps import conduct
 
-    walked, body = cases(("halt",), (), ("reorganise",), True), hexmj.Body(feedback=True)
-    with tempfile.TemporaryDirectory() as folder:
-        return _table(
-            disturb(hexmj.LDVS, Path(folder), walked, velocities=[0.6], starts=3, window=30.0, seed=seed, body=body)
-        )
+    few: Any = {"velocities": [0.6], "n_starts": 3, "window": 30.0, "seed": seed}
+    halted = DisturbedWalks(hexmj.ReadsLegs(hexmj.LDVS), disturbances=["halt"], strategies=["reorganise"], **few)
+    return _table(conduct(halted))
 
 
 def terrain(seed: int) -> Arrays:
-    from hexmj.experiments.terrain import terrain
+    from hexmj.studies.terrain.study import Terrain
+    from hexmj.sweeps import conduct
 
-    with tempfile.TemporaryDirectory() as folder:
-        return _table(
-            terrain(hexmj.LDVS, Path(folder), velocities=[0.6], heights=[3.0], lengths=[5.0], starts=4, seed=seed)
-        )
+    few: Any = {"velocities": [0.6], "heights": [3.0], "lengths": [5.0], "n_starts": 4, "seed": seed}
+    return _table(conduct(Terrain(hexmj.LDVS, **few)))
 
 
 def mapped(seed: int) -> Arrays:
-    from hexmj.experiments.stability_map import stability_map
+    from hexmj.studies.stability_map.study import StabilityMap
+    from hexmj.sweeps import conduct
 
-    chosen = {"vp": [40.0, 160.0], "centre_of_mass": [-5.0, 0.0]}
+    chosen: Any = {"vp": [40.0, 160.0], "centre_of_mass": [-5.0, 0.0]}
+    few: Any = {"velocities": [0.5], "n_starts": 6, "window": 60.0, "seed": seed}
     out = {}
     for over, values in chosen.items():
-        with tempfile.TemporaryDirectory() as folder:
-            data = stability_map(
-                hexmj.LDVS, over, Path(folder), values=values, velocities=[0.5], starts=6, window=60.0, seed=seed
-            )
-        out |= {f"{over} {name}": values for name, values in _table(data).items()}
+        data = conduct(StabilityMap(hexmj.LDVS, over, values, **few))
+        out |= {f"{over} {name}": numbers for name, numbers in _table(data).items()}
     return out
 
 
 def converged(seed: int) -> Arrays:
-    from hexmj.trust.static_limit import converge
+    from hexmj.studies.static_limit.study import StaticLimit
+    from hexmj.sweeps import conduct
 
-    with tempfile.TemporaryDirectory() as folder:
-        data = converge(hexmj.LDVS, Path(folder), vps=[200.0, 80.0], starts=6, window="start", seed=seed)
-    return _table(data)
+    return _table(conduct(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, window="start", seed=seed)))
 
 
 def searched(seed: int) -> Arrays:
+    from hexmj.search.network_forms import NetworkForm
     from hexmj.search.stages import search
 
     out: dict[str, Any] = {}
-    for algorithm, form, body in (("evolution", "hws", None), ("cmaes", "mirrored", None), ("cmaes", "ldvs", "body")):
-        problem = hexmj.Problem(form, 0.4, 0.5, window=30.0, body=hexmj.Body() if body else None)
+    ways: Any = (("evolution", "hws", None), ("cmaes", "mirrored", None), ("cmaes", "ldvs", "body"))
+    for algorithm, form, body in ways:
+        conditions = hexmj.Conditions() if body else None
+        problem = hexmj.Problem(NetworkForm(form), 0.4, 0.5, window=30.0, conditions=conditions)
         few = 4 if body else 60
-        plan = hexmj.Plan(
+        effort = hexmj.Effort(
             algorithm=algorithm, population=4, starts=few, budget=12, refine_starts=few, refine_budget=6,
             begin=hexmj.LDVS if body else None, seed=seed,
         )  # fmt: skip
-        found = search(problem, plan)
+        found = search(problem, effort)
         out |= {
             f"{algorithm} {form} {key}": value for key, value in {"vector": found.vector, "cost": found.cost}.items()
         }
@@ -140,17 +140,17 @@ def recorded(seed: int) -> Arrays:
     starts = hexmj.draw_starts(2, seed)
     walked = hexmj.physical_walk(starts, hexmj.LDVS, 0.5, 60.0)
     planned = hexmj.walk(starts, hexmj.LDVS, 0.5, 60.0)
-    puppet = hexmj.record_plan(planned, walked.body, walked.network, start=1)
+    puppet = hexmj.record_plan(planned, walked.conditions, walked.stride, start=1)
     both = {"walk": hexmj.record(walked, 1), "puppet": puppet}
     return {f"{name} {key}": values for name, one in both.items() for key, values in _table(one).items()}
 
 
 def environment(seed: int) -> Arrays:
-    from hexmj import environment
+    from hexmj.environments import dm
 
     out: dict[str, list[Any]] = {}
     for actions in ("tips", "joints"):
-        walking = environment.load(0.5, actions=actions, duration=15.0, seed=seed)
+        walking = dm.load(0.5, actions=actions, duration=15.0, seed=seed)
         spec, rng = walking.action_spec(), np.random.default_rng(seed)
         step = walking.reset()
         for _ in range(200):
@@ -172,7 +172,9 @@ def reproduced(seed: int) -> Arrays:
     small = Protocol(samples=1, sample=50, velocities=(0.85,), gait_starts=3, gait_velocities=(0.8,), seed=seed)
     out = {}
     for name in ("hws", "ideal", "ldvs late", "hws regimes", "ldvs footfall"):
-        out |= {f"{name} {key}": value for key, value in _table(MEASUREMENTS[name].at(0.85, small)).items()}
+        one = MEASUREMENTS[name]
+        measured = one.function(0.85, **one.settings(0.85, small))
+        out |= {f"{name} {key}": value for key, value in _table(measured).items()}
     return out
 
 

@@ -7,8 +7,9 @@ and knows nothing of lanes and blocks; the compiled network must agree with it t
 from dataclasses import dataclass
 from math import inf
 
+from hexmj.controllers.cruse1998 import Order, Weights
 from hexmj.legs import N1, N2, N3, N4
-from hexmj.parameters import Acceleration, Network, Weights
+from hexmj.timing import Acceleration, Stride
 
 LEGS = range(6)
 
@@ -26,17 +27,17 @@ class State:
     v: float
 
 
-def begin(start: list[float], velocity: float, network: Network, acceleration: Acceleration | None) -> State:
+def begin(start: list[float], velocity: float, stride: Stride, acceleration: Acceleration | None) -> State:
     v = acceleration.start if acceleration else velocity
-    return State(list(start), [1] * 6, [1] * 6, [network.aep0] * 6, [0.0] * 6, [0.0] * 6, v)
+    return State(list(start), [1] * 6, [1] * 6, [stride.aep0] * 6, [0.0] * 6, [0.0] * 6, v)
 
 
 def mechanism_1(d: int, e: int, state: State, p: Weights) -> float:
     return (state.s[e] - 1) * p.p1[d, e]
 
 
-def mechanism_2(d: int, e: int, state: State, p: Weights, network: Network) -> float:
-    return (network.aep0 - network.pep_min) * p.p2[d, e] if state.s[e] == 1 and state.s_old[e] == 0 else 0.0
+def mechanism_2(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
+    return (stride.aep0 - stride.pep_min) * p.p2[d, e] if state.s[e] == 1 and state.s_old[e] == 0 else 0.0
 
 
 def mechanism_3(d: int, e: int, state: State, p: Weights) -> float:
@@ -45,30 +46,30 @@ def mechanism_3(d: int, e: int, state: State, p: Weights) -> float:
     return min(weight * state.s[e] * (neutral - state.x[e]), 4.0)
 
 
-def mechanism_4(d: int, e: int, state: State, p: Weights, network: Network) -> float:
-    origin = network.geometry.origin
+def mechanism_4(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
+    origin = stride.geometry.origin
     crossed = origin[d] + state.x[d] >= origin[e] + state.x[e]
-    return (network.pep_min - state.aep[d]) * p.p4[d, e] if crossed else 0.0
+    return (stride.pep_min - state.aep[d]) * p.p4[d, e] if crossed else 0.0
 
 
-def influences(d: int, state: State, p: Weights, network: Network) -> tuple[float, float]:
+def influences(d: int, state: State, p: Weights, stride: Stride) -> tuple[float, float]:
     """The shifts of PEP and AEP of leg d, from the states of its neighbours."""
     pep = 0.0
     for e in N1[d]:
         pep += mechanism_1(d, e, state, p)
     for e in N2[d]:
-        pep += mechanism_2(d, e, state, p, network)
+        pep += mechanism_2(d, e, state, p, stride)
     for e in N3[d]:
         pep += mechanism_3(d, e, state, p)
-    return pep, sum(mechanism_4(d, e, state, p, network) for e in N4[d])
+    return pep, sum(mechanism_4(d, e, state, p, stride) for e in N4[d])
 
 
-def move(d: int, state: State, pep_shift: float, aep_shift: float, network: Network) -> None:
+def move(d: int, state: State, pep_shift: float, aep_shift: float, stride: Stride) -> None:
     """Eq. 6 for leg d."""
-    dt, s = network.dt, state.s[d]
+    dt, s = stride.dt, state.s[d]
     state.x[d] = state.x[d] - state.v * dt * s + dt * (1 - s)
-    state.aep[d] = network.aep0 + aep_shift
-    pep = max(network.pep_min, network.pep0 + pep_shift)
+    state.aep[d] = stride.aep0 + aep_shift
+    pep = max(stride.pep_min, stride.pep0 + pep_shift)
     state.s_old[d] = s
     if s == 0 and state.x[d] > state.aep[d]:
         state.s[d] = 1
@@ -76,16 +77,16 @@ def move(d: int, state: State, pep_shift: float, aep_shift: float, network: Netw
         state.s[d] = 0
 
 
-def step(state: State, p: Weights, network: Network) -> None:
-    """One step of all six legs in the order of updates that the network asks for."""
-    if network.order == "sequential":
+def step(state: State, p: Weights, order: Order, stride: Stride) -> None:
+    """One step of all six legs in the order of updates that is asked for."""
+    if order == "sequential":
         for d in LEGS:
-            move(d, state, *influences(d, state, p, network), network)
+            move(d, state, *influences(d, state, p, stride), stride)
         return
-    following = [influences(d, state, p, network) for d in LEGS]
-    used = following if network.order == "undelayed" else list(zip(state.pep_shift, state.aep_shift, strict=True))
+    following = [influences(d, state, p, stride) for d in LEGS]
+    used = following if order == "undelayed" else list(zip(state.pep_shift, state.aep_shift, strict=True))
     for d in LEGS:
-        move(d, state, *used[d], network)
+        move(d, state, *used[d], stride)
     state.pep_shift, state.aep_shift = ([f[i] for f in following] for i in (0, 1))
 
 
@@ -94,37 +95,38 @@ def walk(
     p: Weights,
     velocity: float,
     steps: int,
-    network: Network,
+    stride: Stride,
+    order: Order = "printed",
     acceleration: Acceleration | None = None,
 ) -> tuple[list[list[float]], list[list[int]], list[float]]:
     """Tips and states after each step, (step, leg), and V_r during it, (step,)."""
-    state = begin(start, velocity, network, acceleration)
+    state = begin(start, velocity, stride, acceleration)
     tips, states, velocities = [], [], []
     for n in range(1, steps + 1):
         velocities.append(state.v)
-        step(state, p, network)
+        step(state, p, order, stride)
         tips.append(list(state.x))
         states.append(list(state.s))
         if acceleration:  # Eq. 11
-            accelerated = acceleration.start + acceleration.rate * (n * network.dt)
+            accelerated = acceleration.start + acceleration.rate * (n * stride.dt)
             state.v = accelerated if state.v < velocity else velocity
     return tips, states, velocities
 
 
-def stable(x: list[float], s: list[int], network: Network) -> bool:
+def stable(x: list[float], s: list[int], stride: Stride) -> bool:
     """Strict static stability in closed form, by u = x / |y| of the standing feet on either side."""
-    geometry = network.geometry
+    geometry = stride.geometry
     u = [(o + x_d) * (1 / abs(y)) for o, x_d, y in zip(geometry.origin, x, geometry.y, strict=True)]
     left = [u[d] for d in LEGS if s[d] and geometry.y[d] > 0]
     right = [u[d] for d in LEGS if s[d] and geometry.y[d] < 0]
     return bool(left and right) and max(left) + max(right) > 0 and min(left) + min(right) < 0
 
 
-def first_loss(start: list[float], p: Weights, velocity: float, steps: int, network: Network) -> float:
+def first_loss(start: list[float], p: Weights, velocity: float, steps: int, stride: Stride) -> float:
     """Time of the first loss of static stability at constant velocity, inf where there is none."""
-    state = begin(start, velocity, network, None)
+    state = begin(start, velocity, stride, None)
     for n in range(1, steps + 1):
-        step(state, p, network)
-        if not stable(state.x, state.s, network):
-            return n * network.dt
+        step(state, p, "printed", stride)
+        if not stable(state.x, state.s, stride):
+            return n * stride.dt
     return inf

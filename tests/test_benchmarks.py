@@ -14,8 +14,8 @@ import plain_network
 from benchmarks import solver_settings
 from benchmarks.peers import numba_first_loss, numpy_first_loss
 from benchmarks.table import ONE_CORE, rows
-from hexmj import LDVS, Acceleration, Network, draw_starts, first_loss
-from hexmj.parameters import weights
+from hexmj import LDVS, Acceleration, Stride, draw_starts, first_loss
+from hexmj.controllers.cruse1998.weights import general
 
 ROOT = Path(__file__).parents[1]
 
@@ -31,7 +31,9 @@ def test_the_peers_give_our_answers(velocity):
         numba_first_loss(starts, LDVS, velocity, 80.0, acceleration=fast),
         first_loss(starts, LDVS, velocity, 80.0, acceleration=fast),
     )
-    readable = [plain_network.first_loss(list(start), weights(LDVS), velocity, 800, Network()) for start in starts[:5]]
+    readable = [
+        plain_network.first_loss(list(start), general(LDVS.weights), velocity, 800, Stride()) for start in starts[:5]
+    ]
     np.testing.assert_array_equal(readable, ours[:5])
 
 

@@ -12,35 +12,20 @@ import xarray as xr
 
 import hexmj
 from film_reader import read_film
-from hexmj.cli import main
+from hexmj.cli.main import COMMANDS
+from hexmj.errors import SimulationError
 
 PNG = b"\x89PNG"
 
 
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command in this process: its exit code, standard output and standard error."""
-
-    def call(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["hexmj", *map(str, words)])
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        return code, *capsys.readouterr()
-
-    return call
-
-
 def test_help_names_every_command_and_imports_nothing_slow():
-    script = "import sys; from hexmj.cli import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
+    script = "import sys; from hexmj.cli.main import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
-    assert all(name in done.stdout for name in ("compare", "flss", "walk", "render", "search", "reproduce"))
+    assert all(name in done.stdout for name in COMMANDS)
     assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
 
 
-@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search"])
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search", "disturb"])
 def test_every_command_has_help_with_units_and_defaults(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0
@@ -51,7 +36,7 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
 def test_kinematic_side_never_imports_mujoco():
     script = (
         "import sys, numpy as np, hexmj\n"
-        "hexmj.flss(hexmj.LDVS, [0.5], starts=10); hexmj.walk(np.zeros((1, 6)), hexmj.LDVS, 0.5, 10.0)\n"
+        "hexmj.flss(hexmj.LDVS, [0.5], n_starts=10); hexmj.walk(np.zeros((1, 6)), hexmj.LDVS, 0.5, 10.0)\n"
         "assert 'mujoco' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
@@ -61,7 +46,7 @@ def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):
     words = ["flss", "--velocities", "0.1", "0.5", "--starts", "500", "--window", "start", "--json"]
     done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, check=True)
     answer = json.loads(done.stdout)
-    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], starts=500, window="start")
+    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], n_starts=500, window="start")
     for key in ("velocity", "flss", "low", "high"):
         assert answer[key] == table[key].values.tolist()
     assert answer["settings"]["window"] == "start"
@@ -86,10 +71,10 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
         assert {"kinematic", "measured", "physical", "agreement"} <= set(answers[0][model])
     data = datasets[0]
     assert data.fall.attrs["units"] == "time unit"
-    assert data.sizes == {"model": 2, "velocity": 2, "start": 12, "leg": 6}
+    assert data.sizes == {"controller": 2, "velocity": 2, "start": 12, "leg": 6}
     manifest = json.loads((tmp_path / "1" / "manifest.json").read_text())
     assert manifest["settings"]["seed"] == 0
-    assert manifest["settings"]["body"]["vp"] == 80.0
+    assert manifest["settings"]["conditions"]["vp"] == 80.0
     assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
 
 
@@ -132,10 +117,10 @@ def test_physical_flss(run, tmp_path):
     code, text, _ = run(*words, "--json", "--out", tmp_path)
     answer = json.loads(text)
     assert code == 0
-    body = hexmj.Body(vp=200.0)
-    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], starts=10, window="start", body=body)
+    conditions = hexmj.Conditions.of(vp=200.0)
+    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=10, window="start", conditions=conditions)
     assert answer["flss"] == expected.flss.values.tolist()
-    assert answer["settings"]["body"]["vp"] == 200.0
+    assert answer["settings"]["conditions"]["vp"] == 200.0
     assert xr.load_dataset(tmp_path / "flss.nc").flss.values.tolist() == answer["flss"]
     code, text, _ = run(*words)
     assert "vp 200" in text
@@ -185,39 +170,48 @@ SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "star
 
 
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
-def test_search_writes_a_model_that_can_be_used_and_reports_it_again(run, tmp_path, algorithm):
+def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, tmp_path, algorithm):
     words = [*SEARCH, "--algorithm", algorithm, "--out", tmp_path]
     code, text, _ = run(*words, "--json")
     assert code == 0
     answer = json.loads(text)
     assert answer["replayed"] == 0
-    found = hexmj.load_model(str(tmp_path / "found.toml"))
-    assert found == hexmj.Symmetric(**answer["found"])
+    found = hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert found == hexmj.Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
     assert history.best.values[-1] == answer["cost"]
-    assert history.attrs["settings"]
-    for name, model in (("found", found), ("hws", hexmj.HWS), ("ldvs", hexmj.LDVS)):
-        flss, interval = hexmj.flss_over_range(model, 0.3, 0.6, starts=500, window="start", seed=1998)
+    assert json.loads(history.attrs["settings"])["effort"]["algorithm"] == algorithm
+    for name, one in (("found", found), ("hws", hexmj.HWS), ("ldvs", hexmj.LDVS)):
+        flss, interval = hexmj.flss_over_range(one, 0.3, 0.6, n_starts=500, window="start", seed=1998)
         assert answer["verdict"][name]["start"] == {"flss": flss, "flss_low": interval[0], "flss_high": interval[1]}
         assert "walk" in answer["verdict"][name]
     assert (tmp_path / "convergence.png").read_bytes().startswith(PNG)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert manifest["settings"]["plan"]["algorithm"] == algorithm
-    files = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert manifest["settings"]["effort"]["algorithm"] == algorithm
+    files = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
     code, text, _ = run(*words)
     assert code == 0
-    assert f"{answer['evaluations']} evaluations, {answer['evaluations']} of them from an earlier run" in text
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == files
-    code, out, error = run(*words, "--seed", 1)
-    assert (code, out) == (2, "")
-    assert "history.nc is of another search: plan.seed is 0 there and 1 here" in error
-    (tmp_path / "history.nc").write_bytes(files[tmp_path / "history.nc"][:-100])
-    code, out, error = run(*words)
-    assert (code, out) == (2, "")
-    assert "history.nc is damaged" in error
-    assert (tmp_path / "history.nc").read_bytes() == files[tmp_path / "history.nc"][:-100]
-    assert (tmp_path / "found.toml").read_bytes() == files[tmp_path / "found.toml"]
+    different = len(np.unique(history.candidate.values[history.stage == 0], axis=0))
+    different += len(np.unique(history.candidate.values[history.stage == 1], axis=0))
+    assert f"{answer['evaluations']} evaluations, {different} candidates known from an earlier run" in text
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == files
+
+
+def test_the_order_of_updates_reaches_the_network(run, tmp_path):
+    words = ["search", "--form", "hws", "--begin", "hws", "--velocity", 0.4, "--window", "start", "--starts", 300,
+             "--budget", 10, "--refine-budget", 0, "--verdict-starts", 200, "--json"]  # fmt: skip
+    starts = hexmj.draw_starts(300, 0)
+    for order in ("printed", "sequential"):
+        code, text, _ = run(*words, "--order", order, "--out", tmp_path / order)
+        assert code == 0
+        assert json.loads(text)["settings"]["problem"]["form"]["order"] == order
+        lost = hexmj.first_loss(starts, hexmj.Cruse1998(hexmj.HWS.weights, order), 0.4, 40.0)
+        history = xr.load_dataset(tmp_path / order / "history.nc")
+        assert history.cost.values[0] == np.isfinite(lost).mean()
+    code, _, error = run(*words, "--order", "sideways", "--out", tmp_path)
+    assert code == 2
+    assert "valid names: printed, undelayed, sequential" in error
 
 
 def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
@@ -227,11 +221,13 @@ def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    while not (tmp_path / "killed" / "history.nc").exists() and running.poll() is None:
+    kept = tmp_path / "killed" / "evaluations"
+    while sum(len(path.read_text().splitlines()) - 1 for path in kept.glob("*.jsonl")) < 20:
+        assert running.poll() is None
         time.sleep(0.01)
     running.kill()
     assert running.wait() == -9
-    assert [path.name for path in (tmp_path / "killed").iterdir() if path.name[0] != "."] == ["history.nc"]
+    assert [path.name for path in (tmp_path / "killed").iterdir()] == ["evaluations"]
     answers = [json.loads(run(*words, tmp_path / name)[1]) for name in ("killed", "unbroken")]
     assert 0 < answers[0]["replayed"] < answers[0]["evaluations"]
     for key in ("found", "cost", "verdict", "evaluations", "settings"):
@@ -240,7 +236,7 @@ def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
     assert datasets[0].identical(datasets[1])
 
 
-def test_a_search_that_is_stopped_by_hand_keeps_its_history(run, tmp_path, monkeypatch):
+def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, monkeypatch):
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -248,7 +244,8 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_history(run, tmp_path, monke
     code, out, error = run(*SEARCH, "--out", tmp_path)
     assert (code, out) == (130, "")
     assert error.endswith("hexmj: stopped\n")
-    assert xr.load_dataset(tmp_path / "history.nc").sizes["evaluation"] == 37
+    (kept,) = (tmp_path / "evaluations").glob("population-*.jsonl")
+    assert len(kept.read_text().splitlines()) == 1 + 37
 
 
 def test_physical_search(run, tmp_path):
@@ -258,11 +255,73 @@ def test_physical_search(run, tmp_path):
     assert code == 0
     answer = json.loads(text)
     fell = hexmj.physical_flss(
-        hexmj.load_model(str(tmp_path / "found.toml")), [0.6], starts=4, window="start", seed=1998,
-        body=hexmj.Body(vp=200.0),
+        hexmj.load_controller(str(tmp_path / "found.toml")), [0.6], n_starts=4, window="start", seed=1998,
+        conditions=hexmj.Conditions.of(vp=200.0),
     )  # fmt: skip
     assert answer["verdict"]["found"]["start"]["flss"] == fell.flss.item()
-    assert answer["settings"]["problem"]["body"]["vp"] == 200.0
+    assert answer["settings"]["problem"]["conditions"]["vp"] == 200.0
+
+
+OWN = """
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexmj.controllers import Step, stepwise
+
+
+@dataclass(frozen=True)
+class Waits:
+    \"""The legs of a side swing one after the other, and both sides alike or not.\"""
+
+    share: float = 0.5
+    shift: float = 0.1
+    name: str = "waits"
+    legs: int = 6
+
+    def __post_init__(self):
+        if self.share > 5:
+            raise ValueError("share")
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        time, x = 0.0, starts.copy()
+        offsets = np.tile([0.0, self.share, 2 * self.share], 2) + np.repeat([0.0, self.shift], 3)
+
+        def step(v):
+            nonlocal time, x
+            time += stride.dt
+            period = (stride.aep0 - stride.pep0) * (1 + 1 / v[:, None])
+            stands = (time / period + offsets) % 1 < 1 / (1 + v[:, None])
+            x = np.clip(np.where(stands, x - v[:, None] * stride.dt, x + stride.dt), stride.pep_min, stride.aep0)
+            return Step(x, stands)
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+"""
+
+
+def test_a_controller_of_ones_own_is_searched(run, tmp_path):
+    """Its float fields, from their usual values; the found one can be named like any other."""
+    (tmp_path / "mine.py").write_text(OWN)
+    form = f"{tmp_path / 'mine.py'}:Waits"
+    words = ["search", "--form", form, "--velocity", 0.4, "--window", "start", "--starts", 40, "--budget", 28]
+    words += ["--refine-starts", 60, "--refine-budget", 8, "--verdict-starts", 50, "--json", "--out", tmp_path]
+    code, text, error = run(*words)
+    assert code == 0, error
+    answer = json.loads(text)
+    assert set(answer["found"]) == {"share", "shift"}
+    usual, found = hexmj.load_controller(form), hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert {name: getattr(found, name) for name in ("share", "shift")} == answer["found"]
+    assert found.name == usual.name == "waits"
+    for name, one in (("usual", usual), ("found", found)):
+        flss = hexmj.flss(one, [0.4], n_starts=50, window="start", seed=1998).flss.item()
+        assert answer["verdict"][name]["start"]["flss"] == flss
+    history = xr.load_dataset(tmp_path / "history.nc")
+    assert history.candidate.values[0].tolist() == [0.5, 0.1]
+    refused = history.candidate.values[:, 0] > 5
+    assert (history.cost.values[refused] == 1.0).all()
+    code, text, _ = run(*[word for word in words if word != "--json"])
+    assert code == 0
+    assert "share" in text and "usual" in text
 
 
 NONSENSE = [
@@ -280,7 +339,9 @@ NONSENSE = [
     (["search", "--verdict-starts", "0"], "starts = 0; expected"),
     (["search", "--verdict-seed", "0"], "expected another, for fresh starts"),
     (["search", "--domain", "nan"], "domain = nan; expected"),
-    (["search", "--form", "lvds"], "hws"),
+    (["search", "--form", "lvds"], "forms of the 1998 network: hws, ldvs, mirrored, general"),
+    (["search", "--form", "own"], "no field of the type float"),
+    (["search", "--refine-starts", "9", "--refine-budget", "0"], "expected evaluations that walk them"),
     (["search", "--window", "long"], "valid names: walk, start"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
@@ -300,7 +361,7 @@ NONSENSE = [
     (["flss", "--starts", "100000000000000"], "at most 100000000"),
     (["flss", "--physical", "--contact-gap", "-1"], "contact_gap = -1.0; expected 0 to 1000 ms"),
     (["flss", "--pep-min", "5"], "hexmj: pep_min = 5.0, pep0 = -10.0, aep0 = 10.0 mm; expected"),
-    (["flss", "--model", "x" * 400], "neither a preset"),
+    (["flss", "--model", "x" * 400], "neither one of hws, ldvs"),
     (["flss", "--out", "results/flss/manifest.json"], "is a file; expected a folder"),
     (["render", "a.nc", "b.nc", "c.nc"], "expected one, or two"),
     (["render", "a.nc", "--beside", "planned"], "--beside was given with recordings"),
@@ -309,6 +370,20 @@ NONSENSE = [
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
     (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),
+    (["render", "a.nc", "--seed", "1"], "--seed was given with recordings"),
+    (["flss", "--friction", "0.5"], "--friction without --physical; expected it only where"),
+    (["flss", "--feedback"], "--feedback without --physical"),
+    (["search", "--load", "1"], "--load without --physical"),
+    (["walk", "--ground", "step"], "--ground without --physical"),
+    (
+        ["walk", "--initial-velocity", "0.2"],
+        "--initial-velocity = 0.2 without --acceleration; expected both or neither",
+    ),
+    (["flss", "--physical", "--load", "-1"], "load = -1.0; expected 0 to 10"),
+    (["flss", "--order", "x"], "valid names: printed, undelayed, sequential"),
+    (["walk", "--physical", "--order", "printed", "--model", "nowhere.py:Tripod"], "nowhere.py is no file"),
+    (["map", "--processes", "0"], "--processes = 0; expected at least 1"),
+    (["check-controller", "nothing"], "nor module:object or file.py:object"),
     (["dance"], "compare, flss, walk, render, search"),
 ]
 
@@ -347,11 +422,52 @@ def test_bad_input_makes_no_folder(run, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
+    words = ["walk", "--velocity", 0.5, "--window", 16, "--step-height", 6, "--vp", 40, "--out", tmp_path]
+    assert run(*words)[0] == 0
+    recording = xr.load_dataset(tmp_path / "recording.nc")
+    lift = np.ptp(recording.planned_tip.sel(coordinate="z").values)
+    assert lift == pytest.approx(6.0, abs=0.5)
+    assert recording.seconds.values[-1] == pytest.approx(16 / 40)
+
+
 def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):
     code, _, error = run("walk", "--physical", "--settling-time", 1, "--out", tmp_path)
     assert code == 1
     assert "did not settle" in error
     assert not Path(tmp_path / "recording.nc").exists()
+
+
+@pytest.mark.parametrize("out", [True, False])
+def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, tmp_path, monkeypatch, out):
+    def diverge(*_: object, **how: object) -> None:
+        raise SimulationError("start 3 diverged", {"qpos": np.arange(3.0)}, "diverged-start-3.npz")
+
+    monkeypatch.setattr("hexmj.measures.compare.physical_flss", diverge)
+    monkeypatch.chdir(tmp_path)
+    code, _, error = run("flss", "--physical", *(["--out", tmp_path / "results"] if out else []))
+    assert code == 1
+    path = tmp_path / "results" / "diverged-start-3.npz"
+    if out:
+        assert f"start 3 diverged; its last good state is in {path}" in error
+        assert np.load(path)["qpos"].tolist() == [0.0, 1.0, 2.0]
+        assert list(tmp_path.iterdir()) == [path.parent]
+    else:
+        assert "start 3 diverged; give --out to keep its last good state there" in error
+        assert not list(tmp_path.iterdir())
+
+
+def test_check_controller_says_what_is_wrong(run, tmp_path):
+    code, out, _ = run("check-controller", "ldvs")
+    assert code == 0
+    assert all(line.startswith("well   ") for line in out.splitlines())
+    wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
+    (tmp_path / "mine.py").write_text(wrong)
+    code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")
+    assert code == 1
+    answer = json.loads(out)
+    assert not answer["well"]
+    assert [one["found"] for one in answer["checks"] if not one["well"]]
 
 
 def test_reproduce_judges_chosen_claims(run, tmp_path):

@@ -1,31 +1,22 @@
 """Every check of `hexmj doctor` passes here and, where its failure is simulated, reports it and names a remedy."""
 
 import json
-import sys
 from importlib import metadata
 
 import pytest
 
-from hexmj.cli import main
+from hexmj import machine, threads
 from hexmj.errors import SimulationError
-from hexmj.physics import physical_walks
-from hexmj.trust import machine
-from hexmj.trust.machine import CHECKS, Unfit, examine
+from hexmj.machine import CHECKS, Unfit, examine
+from hexmj.measures import physical
 
 
 def only(monkeypatch, name: str) -> None:
     monkeypatch.setattr(machine, "CHECKS", {name: CHECKS[name]})
 
 
-def doctor(monkeypatch, capsys, *words: str) -> tuple[int, str]:
-    monkeypatch.setattr(sys, "argv", ["hexmj", "doctor", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    return int(stop.value.code or 0), capsys.readouterr().out
-
-
-def test_this_machine_is_fit(monkeypatch, capsys):
-    code, out = doctor(monkeypatch, capsys)
+def test_this_machine_is_fit(run):
+    code, out, _ = run("doctor")
     lines = out.splitlines()
     assert code == 0, out
     assert len(lines) == len(CHECKS)
@@ -68,7 +59,7 @@ def no_walk(monkeypatch, tmp_path):
     def diverge(*arguments: object, **options: object) -> None:
         raise SimulationError("start 0 diverged")
 
-    monkeypatch.setattr(physical_walks, "physical_walk", diverge)
+    monkeypatch.setattr(physical, "physical_walk", diverge)
 
 
 @pytest.mark.parametrize(
@@ -84,10 +75,10 @@ def no_walk(monkeypatch, tmp_path):
         ("walking", no_walk, "start 0 diverged"),
     ],
 )
-def test_a_failure_is_reported_with_its_remedy(monkeypatch, capsys, tmp_path, name, failure, found):
+def test_a_failure_is_reported_with_its_remedy(run, monkeypatch, tmp_path, name, failure, found):
     only(monkeypatch, name)
     failure(monkeypatch, tmp_path)
-    code, out = doctor(monkeypatch, capsys, "--json")
+    code, out, _ = run("doctor", "--json")
     answer = json.loads(out)
     (check,) = answer["checks"]
     assert code == 1
@@ -115,3 +106,12 @@ def test_quotas_are_read_where_there_are_any(monkeypatch, tmp_path):
     (tmp_path / "cpu.max").write_text("1000 100000\n")
     with pytest.raises(Unfit, match=r"share 0\.01 cores"):
         machine.threads()
+
+
+def test_elsewhere_there_is_no_quota_and_all_cores_are_counted(monkeypatch, tmp_path):
+    """Linux alone tells which cores a process may use, and what a container is granted."""
+    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(threads.sys, "platform", "darwin")
+    monkeypatch.delattr(threads.os, "sched_getaffinity", raising=False)
+    assert threads.cores() >= 1
+    assert machine.threads().startswith(str(threads.cores()))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from hexmj.parameters import LDVS
-from hexmj.presets import load_model
+from hexmj.controllers.cruse1998 import LDVS, Cruse1998
+from hexmj.controllers.named import load_controller
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -16,15 +16,16 @@ COMMANDS = re.findall(r"^    hexmj (.+)$", README, flags=re.MULTILINE)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
-def block(language: str) -> str:
-    (text,) = re.findall(rf"```{language}\n(.+?)```", README, flags=re.DOTALL)
-    return text
+SNIPPET, CONTROLLER = re.findall(r"```python\n(.+?)```", README, flags=re.DOTALL)
+(WEIGHTS,) = re.findall(r"```toml\n(.+?)```", README, flags=re.DOTALL)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """One working folder for all commands: some read what an earlier one wrote."""
-    return tmp_path_factory.mktemp("readme")
+    folder = tmp_path_factory.mktemp("readme")
+    (folder / "mine.py").write_text(CONTROLLER)
+    return folder
 
 
 def test_there_is_something_to_run():
@@ -41,7 +42,7 @@ def test_command(command, folder):
 
 def test_snippet(folder):
     done = subprocess.run(
-        [sys.executable, "-c", block("python")], cwd=folder, check=True, capture_output=True, text=True
+        [sys.executable, "-c", SNIPPET], cwd=folder, check=True, capture_output=True, text=True
     )
     kinematic, physical = map(float, done.stdout.splitlines()[:2])
     assert 0 < physical < kinematic < 1
@@ -49,8 +50,10 @@ def test_snippet(folder):
 
 def test_parameter_file(tmp_path):
     path = tmp_path / "model.toml"
-    path.write_text(block("toml"))
-    assert load_model(str(path)) == LDVS
+    path.write_text(WEIGHTS)
+    read = load_controller(str(path))
+    assert isinstance(read, Cruse1998)
+    assert read.weights == LDVS.weights
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

@@ -9,20 +9,22 @@ from dm_control.viewer.runtime import Runtime, State
 from dm_env import TimeStep, specs
 from dm_env.test_utils import EnvironmentTestMixin
 
-from hexmj import environment
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import HWS, LDVS
+from hexmj.controllers.losses import begin
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.environments import dm
 from hexmj.errors import InputError
-from hexmj.film import gl
 from hexmj.legs import CENTRED, FIG1, LEGS
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import NetworkRun
-from hexmj.parameters import HWS, LDVS, Network
-from hexmj.physics import insect
-from hexmj.physics.body import Body
+from hexmj.measures.physical import physical_walk
 from hexmj.physics.drive import drive
-from hexmj.physics.kinematics import joints_to_tips
-from hexmj.physics.physical_walks import physical_walk
 from hexmj.physics.settling import settle
+from hexmj.replay.film import gl
 from hexmj.stability import walk_margin
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
 
 ZEROS = np.zeros(18)
 KINDS = pytest.mark.parametrize("actions", ["joints", "tips"])
@@ -38,12 +40,12 @@ class _Contract(EnvironmentTestMixin):
 
 class TestJointsContract(_Contract, unittest.TestCase):
     def make_object_under_test(self):
-        return environment.load(actions="joints", duration=2.0)
+        return dm.load(actions="joints", duration=2.0)
 
 
 class TestTipsContract(_Contract, unittest.TestCase):
     def make_object_under_test(self):
-        return environment.load(actions="tips", duration=2.0)
+        return dm.load(actions="tips", duration=2.0)
 
 
 def run(walking: control.Environment, action: np.ndarray) -> list[TimeStep]:
@@ -65,14 +67,14 @@ def folded(walking: control.Environment) -> np.ndarray:
 @pytest.mark.parametrize("velocity", [0.3, 0.5])
 def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
     """Until the end or the fall, which is seen at the end of its step."""
-    starts, duration, body = draw_starts(2, 0), 100.0, Body()
+    starts, duration = draw_starts(2, 0), 100.0
     walked = physical_walk(starts, LDVS, velocity, duration)
-    settled, m = settle(starts), body.substeps(Network())
+    settled, m = settle(starts), Conditions().substeps(Stride())
     standing = np.zeros((2, 1000 * m + 1, 6), dtype=bool)
-    for stretch in drive(settled, NetworkRun(settled.starts, LDVS, velocity, network=settled.network), duration):
-        standing[stretch.ids, stretch.first : stretch.first + stretch.standing.shape[1]] = stretch.standing
+    for chunk in drive(settled, begin(LDVS, settled.starts, velocity, settled.stride), duration):
+        standing[chunk.ids, chunk.first : chunk.first + chunk.standing.shape[1]] = chunk.standing
     margins = walk_margin(walked.measured)
-    walking = environment.load(velocity, actions="tips", duration=duration)
+    walking = dm.load(velocity, actions="tips", duration=duration)
     physics = walking.physics
     for start in range(2):
         qpos, seen = [], []
@@ -96,32 +98,50 @@ def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
         assert sum(o["out_of_reach"].sum() for o in seen) == walked.outcomes.unreachable[start]
         fall = walked.outcomes.fall[start]
         assert step.discount == float(np.isinf(fall))
-        assert len(qpos) == (1000 if np.isinf(fall) else np.ceil(fall / Network().dt - 1e-6))
+        assert len(qpos) == (1000 if np.isinf(fall) else np.ceil(fall / Stride().dt - 1e-6))
     assert np.isinf(walked.outcomes.fall).all() == (velocity == 0.3)
 
 
 @pytest.mark.parametrize(
-    ("body", "network"),
+    ("controller", "conditions", "stride"),
     [
-        (Body(vp=200.0, friction=0.5), Network()),
-        (Body(vp=40.0, standing_height=12.0), Network(dt=0.5, geometry=CENTRED)),
+        (HWS, Conditions.of(vp=200.0, friction=0.5), Stride()),
+        (HWS, Conditions.of(vp=40.0, standing_height=12.0), Stride(dt=0.5, geometry=CENTRED)),
+        (ReadsLegs(LDVS), Conditions(), Stride()),
+        (ReadsLegs(HWS), Conditions.of(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
     ],
+    ids=["slippery", "slow and centred", "reads the legs", "reads the legs, loaded"],
 )
-def test_other_conditions_are_those_of_the_physical_walk(body: Body, network: Network):
-    walked = physical_walk(draw_starts(1, 7, network), HWS, 0.2, 20.0, body=body, network=network)
-    walking = environment.load(0.2, actions="tips", model=HWS, body=body, network=network, duration=20.0, seed=7)
-    walking.reset()
-    qpos = []
-    for _ in range(len(walked.qpos)):
-        walking.step(ZEROS)
+def test_other_controllers_and_conditions_are_those_of_the_physical_walk(
+    controller: Controller, conditions: Conditions, stride: Stride
+):
+    """To the last bit, and until the fall; a controller that reads the legs is told the same."""
+    walked = physical_walk(draw_starts(1, 7, stride), controller, 0.3, 40.0, conditions=conditions, stride=stride)
+    walking = dm.load(
+        0.3, actions="tips", controller=controller, conditions=conditions, stride=stride, duration=40.0, seed=7
+    )
+    step, qpos = walking.reset(), []
+    while not step.last():
+        step = walking.step(ZEROS)
         qpos.append(walking.physics.position())
+    assert np.isinf(walked.outcomes.fall[0])
     np.testing.assert_array_equal(qpos, walked.qpos[:, 0])
-    assert np.isfinite(qpos).all()
+    assert len(qpos) == round(40.0 / stride.dt)
+
+
+def test_what_is_read_from_the_legs_is_felt():
+    """Or the test above would notice nothing."""
+    seen = []
+    for controller in (LDVS, ReadsLegs(LDVS)):
+        walking = dm.load(0.3, actions="tips", controller=controller, duration=40.0, seed=7)
+        run_steps(walking, 300)
+        seen.append(walking.physics.position())
+    assert (seen[0] != seen[1]).all()
 
 
 def test_rows_of_control_are_taken_one_after_the_other():
     """However many substeps are taken at once; the last row stays."""
-    walking = environment.load(actions="joints", duration=5.0)
+    walking = dm.load(actions="joints", duration=5.0)
     walking.reset()
     one, rows = walking.physics, np.linspace(0.0, 0.3, 3)[:, None] + walking.physics.control()
     other = one.copy()
@@ -137,7 +157,7 @@ def test_rows_of_control_are_taken_one_after_the_other():
 @KINDS
 def test_same_seed_same_bits(actions):
     def episodes(seed: int) -> list[np.ndarray]:
-        walking = environment.load(actions=actions, duration=3.0, seed=seed)
+        walking = dm.load(actions=actions, duration=3.0, seed=seed)
         bits = []
         for _ in range(2):
             action = ZEROS if actions == "tips" else walking.reset().observation["joint_angles"]
@@ -150,14 +170,14 @@ def test_same_seed_same_bits(actions):
 
 
 def test_episodes_take_the_drawn_starts_one_after_the_other():
-    walking = environment.load(seed=5)
+    walking = dm.load(seed=5)
     tips = np.array([walking.reset().observation["planned_tips"] for _ in range(18)])
     np.testing.assert_allclose(tips[..., 0] - FIG1.origin, draw_starts(18, 5), atol=1e-12)
 
 
 @KINDS
 def test_specs_are_named_and_bounded(actions):
-    walking = environment.load(actions=actions)
+    walking = dm.load(actions=actions)
     action = walking.action_spec()
     assert isinstance(action, specs.BoundedArray)
     assert len(set(action.name.split("\t"))) == 18
@@ -172,7 +192,7 @@ def test_specs_are_named_and_bounded(actions):
 
 
 def test_joint_actions_are_the_actuators_targets_in_their_order():
-    walking = environment.load(actions="joints")
+    walking = dm.load(actions="joints")
     model = walking.physics.model
     spec = walking.action_spec()
     assert spec.name.split("\t") == [model.id2name(i, "actuator") for i in range(18)]
@@ -184,12 +204,12 @@ def test_joint_actions_are_the_actuators_targets_in_their_order():
 
 
 def test_physics_is_reached_by_names():
-    walking = environment.load()
+    walking = dm.load()
     step = walking.reset()
     named = walking.physics.named.data
     assert named.qpos["L1_thorax_coxa"] == step.observation["joint_angles"][0]
     assert named.qpos["R3_femur_tibia"] == step.observation["joint_angles"][17]
-    assert walking.control_timestep() == pytest.approx(Network().dt / Body().vp)
+    assert walking.control_timestep() == pytest.approx(Stride().dt / Conditions().time.vp)
     for _ in range(200):
         walking.step(step.observation["joint_angles"])
     weight = 9810 * walking.physics.model.body_mass.sum()
@@ -197,9 +217,9 @@ def test_physics_is_reached_by_names():
 
 
 def test_observed_tips_are_those_of_the_joints():
-    walking = environment.load(actions="tips")
+    walking = dm.load(actions="tips")
     seen = run_steps(walking, 100).observation
-    tips = joints_to_tips(seen["joint_angles"].reshape(6, 3), insect.dimensions(walking.physics.model.ptr))
+    tips = walking.physics.compiled.forward(seen["joint_angles"].reshape(6, 3))
     np.testing.assert_allclose(seen["tips"], tips, rtol=0, atol=1e-9)
 
 
@@ -210,7 +230,7 @@ def run_steps(walking: control.Environment, count: int) -> TimeStep:
 
 
 def test_velocity_is_seen_from_the_heading():
-    walking = environment.load()
+    walking = dm.load()
     walking.reset()
     with walking.physics.reset_context():
         data = walking.physics.data
@@ -220,28 +240,29 @@ def test_velocity_is_seen_from_the_heading():
 
 
 def test_clearance_at_home_is_that_of_the_metathorax():
-    walking = environment.load()
+    walking = dm.load()
     walking.physics.reset(walking.physics.model.name2id("home", "key"))
     assert walking.physics.clearance() == pytest.approx(10.4 - 2.0 - 1.6)
 
 
 def test_no_foot_in_contact_has_a_margin_of_its_own():
     """It lies below every margin that one foot in contact can have, at any reach of the legs."""
-    walking = environment.load()
+    walking = dm.load()
     walking.reset()
     physics = walking.physics
     one = [float(physics.margin(row)) for row in np.eye(6, dtype=bool)]
-    assert physics.margin(np.zeros(6, dtype=bool)) == environment.NO_FOOT < min(one) < 0
-    legs = insect.dimensions(physics.model.ptr)
+    assert physics.margin(np.zeros(6, dtype=bool)) == STICK_INSECT.lengths.no_foot_margin < min(one) < 0
+    legs = physics.compiled.kinematics
     reach = np.linalg.norm(legs.coxa_position[:, :2], axis=1) + legs.coxa + legs.femur + legs.tibia
-    assert reach.max() + 10.0 < -environment.NO_FOOT  # 10 mm for the shift of the centre of mass
+    farthest = STICK_INSECT.lengths.farthest_centre_of_mass
+    assert reach.max() + farthest < -STICK_INSECT.lengths.no_foot_margin
 
 
 def test_reward_is_its_formula():
-    walking = environment.load(0.25)
+    walking = dm.load(0.25)
     walking.reset()
     task, physics = walking.task, walking.physics
-    command = 0.25 * Body().vp
+    command = 0.25 * Conditions().time.vp
     with physics.reset_context():
         physics.data.qpos[2:7] = 20.0, 1.0, 0.0, 0.0, 0.0
     for speed, reward in ((1, 1), (0, 0), (0.5, 0.5), (1.5, 0.5), (2, 0), (3, 0), (-1, 0)):
@@ -255,7 +276,7 @@ def test_reward_is_its_formula():
 
 
 def test_a_fall_ends_the_episode_with_discount_zero():
-    walking = environment.load(actions="joints")
+    walking = dm.load(actions="joints")
     steps = run(walking, folded(walking))
     assert len(steps) < 200
     assert steps[-1].discount == 0.0
@@ -263,20 +284,20 @@ def test_a_fall_ends_the_episode_with_discount_zero():
     assert steps[-1].observation["clearance"] == pytest.approx(0.0, abs=0.5)
     assert all(step.discount == 1.0 for step in steps[1:-1])
     assert steps[-2].observation["contact"].sum() == 0
-    assert steps[-2].observation["margin"] == environment.NO_FOOT
+    assert steps[-2].observation["margin"] == STICK_INSECT.lengths.no_foot_margin
     assert walking.step(ZEROS).first()
 
 
 def test_the_end_of_the_time_keeps_the_discount():
-    steps = run(environment.load(actions="tips", duration=2.0), ZEROS)
+    steps = run(dm.load(actions="tips", duration=2.0), ZEROS)
     assert len(steps) - 1 == 20
     assert steps[-1].discount == 1.0
     assert all(0.0 <= step.reward <= 1.0 for step in steps[1:])
 
 
 def test_a_leg_out_of_reach_keeps_its_angles_and_is_counted():
-    walking = environment.load(actions="tips")
-    substeps = Body().substeps(Network())
+    walking = dm.load(actions="tips")
+    substeps = Conditions().substeps(Stride())
     walking.reset()
     before = walking.physics.control().reshape(6, 3).copy()
     offsets = np.zeros((6, 3))
@@ -293,7 +314,7 @@ def test_offsets_move_the_feet():
     """Feet pushed down lift the body."""
     height = []
     for up in (0.0, -1.0):
-        walking = environment.load(actions="tips")
+        walking = dm.load(actions="tips")
         step = walking.reset()
         for _ in range(60):
             step = walking.step(np.tile([0.0, 0.0, up], 6))
@@ -302,7 +323,7 @@ def test_offsets_move_the_feet():
 
 
 def test_divergence_raises():
-    walking = environment.load(actions="tips")
+    walking = dm.load(actions="tips")
     walking.reset()
     walking.physics.data.qvel[0] = np.nan
     with pytest.raises(control.PhysicsError):
@@ -325,12 +346,12 @@ def test_divergence_raises():
 )
 def test_nonsense_is_refused(nonsense: dict):
     with pytest.raises(InputError):
-        environment.load(**nonsense)
+        dm.load(**nonsense)
 
 
 @pytest.mark.parametrize("action", [np.zeros(3), np.full(18, np.nan), np.full(18, 5.1)])
 def test_nonsensical_actions_are_refused(action: np.ndarray):
-    walking = environment.load(actions="tips")
+    walking = dm.load(actions="tips")
     walking.reset()
     with pytest.raises(InputError, match="action"):
         walking.step(action)
@@ -339,7 +360,7 @@ def test_nonsensical_actions_are_refused(action: np.ndarray):
 @pytest.mark.parametrize("policy", [None, lambda step: ZEROS])
 def test_the_viewers_runtime_runs_it(policy):
     """The viewer without its window: ticks, a pause, single steps, the end of an episode and a restart."""
-    walking = environment.load(actions="tips", duration=5.0)
+    walking = dm.load(actions="tips", duration=5.0)
     runtime, errors = Runtime(walking, policy), []
     runtime.on_error += errors.append
     runtime.tick(0.02, paused=False)
@@ -362,7 +383,7 @@ def test_the_viewers_runtime_runs_it(policy):
 
 @pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
 def test_it_is_rendered():
-    walking = environment.load()
+    walking = dm.load()
     walking.reset()
     for camera in (-1, "side"):
         frame = walking.physics.render(48, 64, camera_id=camera)

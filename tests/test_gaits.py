@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import circmean, circstd
 
 import hexmj.gaits
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.gaits import (
     CONTRALATERAL,
@@ -27,9 +28,9 @@ from hexmj.gaits import (
     wilson_phase,
 )
 from hexmj.legs import FIG1, MIRROR
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import walk
-from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
+from hexmj.measures.kinematic import walk
+from hexmj.starts import draw_starts
+from hexmj.timing import Acceleration, Stride
 from hexmj.walks import Walk
 
 TRIPOD = np.array([0.0, 0.5, 0.0, 0.5, 0.0, 0.5])
@@ -119,10 +120,10 @@ def mirrored(phase: np.ndarray) -> np.ndarray:
     return np.concatenate([phase[:, [2, 3, 0, 1]], -phase[:, CONTRALATERAL]], axis=1) % 1.0
 
 
-@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
-def test_mirrored_starts_have_mirrored_phases(model):
+@pytest.mark.parametrize("controller", [HWS, LDVS, UNCOORDINATED])
+def test_mirrored_starts_have_mirrored_phases(controller):
     starts = draw_starts(20, seed=1)
-    one, other = (gait(walk(x, model, 0.5, 4000.0)) for x in (starts, starts[:, MIRROR]))
+    one, other = (gait(walk(x, controller, 0.5, 4000.0)) for x in (starts, starts[:, MIRROR]))
     both = one.periodic & other.periodic
     assert both.mean() > 0.8
     assert circle(other.phase, mirrored(one.phase))[both].max() < 0.005
@@ -211,7 +212,7 @@ def test_early_falls_do_not_count_against_the_limit_regime():
 def test_uncoordinated_legs_keep_the_phases_of_their_start():
     """Alone, a leg at x is raised after (x - PEP_0) / V, and its period is (AEP_0 - PEP_0)(1 + 1 / V)."""
     v, starts = 0.4, draw_starts(30, seed=2)
-    found = gait(walk(starts, UNCOORDINATED, v, 1200.0, network=Network(dt=0.01)))
+    found = gait(walk(starts, UNCOORDINATED, v, 1200.0, stride=Stride(dt=0.01)))
     period = 20.0 * (1.0 + 1.0 / v)
     assert found.periodic.all()
     assert found.period == pytest.approx(np.full(30, period), abs=0.05)
@@ -222,11 +223,11 @@ def test_uncoordinated_legs_keep_the_phases_of_their_start():
 @pytest.mark.parametrize("acceleration", [None, Acceleration(rate=0.001)])
 def test_limit_gait_is_the_gait_of_the_whole_walk(acceleration, monkeypatch):
     monkeypatch.setattr(hexmj.gaits, "PART", 700)
-    network, periods, v = Network(), CYCLES + 15, 0.4
-    found = limit_gait(HWS, v, starts=12, seed=3, network=network, acceleration=acceleration, periods=periods)
+    stride, periods, v = Stride(), CYCLES + 15, 0.4
+    found = limit_gait(HWS, v, n_starts=12, seed=3, stride=stride, acceleration=acceleration, periods=periods)
     time = periods * 30.0 * (1.0 + 1.0 / v) + (300.0 if acceleration else 0.0)
     starts = draw_starts(12, 3)
-    assert_same_gait(found, gait(walk(starts, HWS, v, time, network=network, acceleration=acceleration)))
+    assert_same_gait(found, gait(walk(starts, HWS, v, time, stride=stride, acceleration=acceleration)))
     assert found.periodic.any()
     assert np.array_equal(found.stable, found.periodic)
 
@@ -234,7 +235,7 @@ def test_limit_gait_is_the_gait_of_the_whole_walk(acceleration, monkeypatch):
 @pytest.mark.parametrize(("v", "phase", "printed"), [(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)])
 def test_hard_wired_phases(v, phase, printed):
     """An independent simulation gave 0.655 and 0.714 with the default constants; the paper prints 0.65 and 0.7."""
-    found = limit_gait(HWS, v, starts=10, acceleration=Acceleration(rate=0.0004), periods=45)
+    found = limit_gait(HWS, v, n_starts=10, acceleration=Acceleration(rate=0.0004), periods=45)
     assert found.periodic.all()
     assert found.stable.all()
     mean = circular_mean(found.phase, axis=0)

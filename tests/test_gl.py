@@ -1,18 +1,54 @@
-"""Which way MuJoCo renders is settled before it is imported, and never stands in the way of numbers."""
+"""Nothing is settled about rendering until something is drawn, and what the user has chosen stands."""
 
 import ctypes
 import os
+import subprocess
+import sys
 
 import pytest
 
-from hexmj.film import gl
+from hexmj.replay.film import gl
 
-SCREENS = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+KEPT = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
+
+FRAME = """
+import os
+import mujoco
+before = dict(os.environ)
+from hexmj.bodies.loading import compile_body
+from hexmj.conditions import Conditions
+import hexmj.measures.compare, hexmj.replay.recording, hexmj.replay.film.video
+from hexmj.replay.film import gl
+assert dict(os.environ) == before, "changed by importing"
+usual = mujoco.GLContext
+assert usual.__module__ == "mujoco.glfw"
+assert gl.missing() is None
+model = compile_body(Conditions()).model
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+for _ in range(2):
+    with gl.renderer(model, 48, 64) as renderer:
+        renderer.update_scene(data, "side")
+        assert renderer.render().std() > 5
+assert mujoco.GLContext is usual is mujoco.rendering.classic.gl_context.GLContext
+assert {name for name in os.environ if before.get(name) != os.environ[name]} <= {"PYOPENGL_PLATFORM"}
+"""
+
+ENVIRONMENT = """
+import os
+before = dict(os.environ)
+from hexmj.environments import dm
+assert {name for name in os.environ if before.get(name) != os.environ[name]} <= {"PYOPENGL_PLATFORM"}
+walking = dm.load()
+walking.reset()
+assert walking.physics.render(48, 64, camera_id="side").std() > 5
+walking.physics.free()
+"""
 
 
 @pytest.fixture
 def environment(monkeypatch):
-    for name in SCREENS:
+    for name in gl.WISHES:
         monkeypatch.delenv(name, raising=False)
     return monkeypatch
 
@@ -21,23 +57,54 @@ def without_libraries(name: str) -> None:
     raise OSError(f"{name}: cannot open shared object file")
 
 
-def test_egl_is_taken_where_there_is_no_screen(environment):
-    gl.prefer_egl()
-    assert os.environ["MUJOCO_GL"] == "egl"
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@pytest.mark.parametrize("script", [FRAME, ENVIRONMENT], ids=["film", "environment"])
+def test_without_a_screen_frames_are_rendered_though_nobody_asked_for_egl(script):
+    path = {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=KEPT | path, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "X11" not in done.stderr
 
 
-@pytest.mark.parametrize(("name", "value"), [("MUJOCO_GL", "osmesa"), ("DISPLAY", ":0")])
+@pytest.mark.parametrize(("name", "value"), [("MUJOCO_GL", "osmesa"), ("DISPLAY", ":0"), ("WAYLAND_DISPLAY", "w")])
 def test_other_wishes_stand(environment, name, value):
+    """MuJoCo was imported with them, or with none."""
+    import mujoco
+
+    environment.setattr(mujoco, "GLContext", wish := object())
     environment.setenv(name, value)
-    gl.prefer_egl()
-    assert {key: os.environ[key] for key in SCREENS if key in os.environ} == {name: value}
+    assert gl.context_type() is wish
+    environment.delenv(name)
+    assert gl.context_type() is not wish
 
 
-@pytest.mark.parametrize("wish", [None, "egl"])
-def test_without_the_libraries_nothing_is_asked_of_mujoco(environment, wish):
-    """MuJoCo cannot be imported where EGL is asked for and missing."""
+def test_elsewhere_mujoco_knows_best(environment):
+    import mujoco
+
+    environment.setattr(mujoco, "GLContext", usual := object())
+    environment.setattr(gl.sys, "platform", "darwin")
+    assert gl.context_type() is usual
+
+
+def test_without_the_libraries_it_is_said_what_brings_them(environment):
+    environment.setattr(ctypes, "CDLL", without_libraries)
+    assert "libEGL.so.1: cannot open shared object file); on Debian and Ubuntu" in str(gl.missing())
+
+
+@pytest.mark.parametrize(("wish", "left"), [(None, None), ("egl", None), ("osmesa", "osmesa")])
+def test_a_command_drops_the_wish_for_egl_where_it_would_keep_mujoco_from_being_imported(environment, wish, left):
     if wish:
         environment.setenv("MUJOCO_GL", wish)
     environment.setattr(ctypes, "CDLL", without_libraries)
-    gl.prefer_egl()
-    assert "MUJOCO_GL" not in os.environ
+    gl.drop_vain_wish()
+    assert os.environ.get("MUJOCO_GL") == left
+
+
+def test_with_the_libraries_the_wish_for_egl_stands(environment):
+    environment.setenv("MUJOCO_GL", "egl")
+    environment.setattr(ctypes, "CDLL", lambda name: None)
+    gl.drop_vain_wish()
+    assert os.environ["MUJOCO_GL"] == "egl"

@@ -1,20 +1,18 @@
-"""The compiled insect: masses, symmetry, postures, ranges, names and the physics of standing."""
-
-from dataclasses import replace
+"""The stick insect's anatomy: masses, symmetry, posture, joint ranges, names, and how it stands."""
 
 import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj.errors import InputError
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.description import ROOT_QPOS
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import JOINTS, PARTS, STICK_INSECT
+from hexmj.conditions import Conditions
 from hexmj.legs import FIG1, LEGS, MIRROR
-from hexmj.physics import insect
-from hexmj.physics.body import Body, Ground
-from hexmj.physics.insect import JOINTS, ROOT_QPOS, TRUNK
-from hexmj.physics.kinematics import tips_to_joints
 
-STANDING_HEIGHT = 10.0  # mm
+TRUNK = STICK_INSECT.trunk
 LIFT = 12.0  # mm
 MEASURED_RANGES = np.array(  # (segment, joint, 2) degrees, 2 to 98 % of the motion-captured animal
     [
@@ -26,8 +24,13 @@ MEASURED_RANGES = np.array(  # (segment, joint, 2) degrees, 2 to 98 % of the mot
 
 
 @pytest.fixture(scope="module")
-def model() -> mujoco.MjModel:
-    return insect.load()
+def insect() -> CompiledBody:
+    return compile_body(Conditions())
+
+
+@pytest.fixture(scope="module")
+def model(insect: CompiledBody) -> mujoco.MjModel:
+    return insect.model
 
 
 @pytest.fixture
@@ -46,8 +49,7 @@ def at_home(model: mujoco.MjModel) -> mujoco.MjData:
 def standing(model: mujoco.MjModel) -> mujoco.MjData:
     """One second after it was put down in the home posture."""
     data = at_home(model)
-    for _ in range(round(1 / model.opt.timestep)):
-        mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data, nstep=round(1 / model.opt.timestep))
     mujoco.mj_forward(model, data)
     return data
 
@@ -73,7 +75,7 @@ def test_only_the_abdomen_is_lighter_than_published(model: mujoco.MjModel):
     """Published split: mesothorax 20, metathorax 15, prothorax 3, head 3, all legs 10, abdomen 49."""
     mass = {name: model.body(name).mass[0] for name in TRUNK}
     unit = mass["mesothorax"] / 20
-    legs = sum(model.body(f"{leg}_{part}").mass[0] for leg in LEGS for part in ("coxa", "femur", "tibia"))
+    legs = sum(model.body(f"{leg}_{part}").mass[0] for leg in LEGS for part in PARTS)
     assert mass["metathorax"] / unit == pytest.approx(15, rel=1e-3)
     assert mass["prothorax"] / unit == pytest.approx(3, rel=1e-3)
     assert mass["head"] / unit == pytest.approx(3, rel=1e-3)
@@ -86,32 +88,29 @@ def test_centre_of_mass_is_the_papers(home: mujoco.MjData):
     assert np.abs(offset[:2]).max() < 0.01
 
 
-def test_home_puts_the_tips_on_the_origins_of_the_legs_axes(model: mujoco.MjModel, home: mujoco.MjData):
-    tips = np.array([home.site(f"{leg}_foot").xpos for leg in LEGS])
-    radius = insect.dimensions(model).foot
-    np.testing.assert_allclose(tips[:, 0], FIG1.origin, atol=1e-6)
-    np.testing.assert_allclose(tips[:, 1], FIG1.y, atol=1e-6)
-    np.testing.assert_allclose(tips[:, 2], radius, atol=1e-6)
-    assert home.qpos[2] == pytest.approx(STANDING_HEIGHT + radius)
+def test_home_puts_the_tips_on_the_lines_of_fig_1(home: mujoco.MjData):
+    tips = np.array([home.site(foot).xpos for foot in STICK_INSECT.feet])
+    assert_allclose(tips, np.stack([FIG1.origin, FIG1.y, 6 * [0.4]], axis=-1), atol=1e-6)
+    assert home.qpos[2] == pytest.approx(STICK_INSECT.standing_height + 0.4)
 
 
 def test_home_keeps_its_posture_and_is_symmetric(model: mujoco.MjModel):
     key = model.key("home")
     joints = key.qpos[ROOT_QPOS:].reshape(6, 3)
-    np.testing.assert_array_equal(key.ctrl.reshape(6, 3), joints)
-    np.testing.assert_array_equal(joints[list(MIRROR)], joints)
+    assert_array_equal(key.ctrl.reshape(6, 3), joints)
+    assert_array_equal(joints[list(MIRROR)], joints)
 
 
 def test_left_and_right_are_mirror_images(model: mujoco.MjModel):
     for left, right in zip(LEGS[:3], LEGS[3:], strict=True):
-        for part in ("coxa", "femur", "tibia"):
+        for part in PARTS:
             a, b = model.body(f"{left}_{part}"), model.body(f"{right}_{part}")
-            np.testing.assert_array_equal(a.mass, b.mass)
-            np.testing.assert_array_equal(a.inertia, b.inertia)
-            np.testing.assert_array_equal(a.ipos, b.ipos)
+            assert_array_equal(a.mass, b.mass)
+            assert_array_equal(a.inertia, b.inertia)
+            assert_array_equal(a.ipos, b.ipos)
         for joint in JOINTS:
             a, b = model.joint(f"{left}_{joint}"), model.joint(f"{right}_{joint}")
-            np.testing.assert_array_equal(a.range, b.range)
+            assert_array_equal(a.range, b.range)
     for name in TRUNK:
         assert model.body(name).ipos[1] == pytest.approx(0, abs=1e-12)
 
@@ -125,7 +124,7 @@ def test_mirrored_postures_have_a_mirrored_centre_of_mass(model: mujoco.MjModel)
         data.qpos[ROOT_QPOS:] = posture
         mujoco.mj_forward(model, data)
         centres.append(data.body("mesothorax").subtree_com.copy())
-    np.testing.assert_allclose(centres[0], centres[1] * [1, -1, 1], atol=1e-12)
+    assert_allclose(centres[0], centres[1] * [1, -1, 1], atol=1e-12)
 
 
 def test_every_element_is_named(model: mujoco.MjModel):
@@ -160,19 +159,10 @@ def test_joints_actuators_and_sensors_come_in_the_stated_order(model: mujoco.MjM
     ]
 
 
-def test_sensors_measure_what_their_names_say(model: mujoco.MjModel, standing: mujoco.MjData):
-    sensors, read = insect.sensors(model), standing.sensordata
-    feet = [standing.site(f"{leg}_foot").xpos for leg in LEGS]
-    np.testing.assert_array_equal(read[sensors.foot].reshape(6, 3), feet)
-    assert read[sensors.touch].shape == (6,)
-    np.testing.assert_array_equal(read[sensors.trunk], np.zeros(len(TRUNK)))
-    np.testing.assert_array_equal(read[sensors.centre_of_mass], standing.body("mesothorax").subtree_com)
-
-
-def test_the_part_of_the_trunk_that_touches_the_ground_is_known(model: mujoco.MjModel, home: mujoco.MjData):
+def test_the_part_of_the_trunk_that_touches_the_ground_is_known(insect: CompiledBody, home: mujoco.MjData):
     home.qpos[2] = 3.0  # abdomen and the metathorax's rear end: axes 1 mm above the ground
-    mujoco.mj_forward(model, home)
-    touching = home.sensordata[insect.sensors(model).trunk] > 0
+    mujoco.mj_forward(insect.model, home)
+    touching = home.sensordata[insect.columns.trunk] > 0
     assert dict(zip(TRUNK, touching, strict=True)) == {
         "head": False,
         "prothorax": False,
@@ -188,31 +178,31 @@ def test_only_the_ground_is_touched(model: mujoco.MjModel):
     assert sorted(model.geom(i).name for i in model.pair_geom2) == sorted([*TRUNK, *(f"{leg}_foot" for leg in LEGS)])
 
 
-def test_every_target_of_the_step_range_is_reachable(model: mujoco.MjModel):
-    _, reachable = tips_to_joints(step_range_targets(), insect.dimensions(model))
+def test_every_target_of_the_step_range_is_reachable(insect: CompiledBody):
+    _, reachable = insect.inverse(step_range_targets())
     assert reachable.all()
 
 
-def test_joint_ranges_are_the_measured_ones_widened_only_as_needed(model: mujoco.MjModel):
+def test_joint_ranges_are_the_measured_ones_widened_only_as_needed(insect: CompiledBody):
     """By less than one degree more than the targets need; the MJCF has the table."""
-    dimensions = insect.dimensions(model)
-    joints, _ = tips_to_joints(step_range_targets(), dimensions)
+    joints, _ = insect.inverse(step_range_targets())
     needed = np.degrees(np.stack([joints.min(axis=0), joints.max(axis=0)], axis=-1))  # (leg, joint, 2)
     measured = np.concatenate([MEASURED_RANGES, MEASURED_RANGES])
     low = np.minimum(measured[..., 0], np.floor(needed[..., 0]))
     high = np.maximum(measured[..., 1], np.ceil(needed[..., 1]))
-    np.testing.assert_allclose(np.degrees(dimensions.joint_range), np.stack([low, high], axis=-1), atol=1e-9)
+    found = np.degrees(insect.model.jnt_range[1:]).reshape(6, 3, 2)
+    assert_allclose(found, np.stack([low, high], axis=-1), atol=1e-9)
 
 
 def test_targets_are_limited_to_the_joint_ranges(model: mujoco.MjModel):
-    np.testing.assert_allclose(model.actuator_ctrlrange, model.jnt_range[1:], rtol=1e-12)
+    assert_allclose(model.actuator_ctrlrange, model.jnt_range[1:], rtol=1e-12)
     assert model.actuator_ctrllimited.all()
     assert model.jnt_limited[1:].all()
 
 
 def test_lengths_in_the_solvers_settings_are_in_mm(model: mujoco.MjModel):
     assert (model.pair_solimp[:, 2] == 0.1).all()
-    assert (model.pair_solref[:, 0] >= 2 * insect.LONGEST_STEP).all()
+    assert (model.pair_solref[:, 0] >= 2 * STICK_INSECT.longest_step).all()
     assert model.opt.gravity.tolist() == [0, 0, -9810]
     assert model.opt.tolerance == 1e-5
     assert model.opt.ccd_tolerance == 1e-3
@@ -223,12 +213,11 @@ def test_standing_raises_no_warning(standing: mujoco.MjData):
     assert np.abs(standing.qvel).max() < 1
 
 
-def test_the_feet_carry_the_weight(model: mujoco.MjModel, standing: mujoco.MjData):
-    forces = standing.sensordata[insect.sensors(model).touch]
-    weight = -model.body_mass.sum() * model.opt.gravity[2]
+def test_the_feet_carry_the_weight(insect: CompiledBody, standing: mujoco.MjData):
+    forces = standing.sensordata[insect.columns.touch]
     assert (forces > 0).all()
-    assert forces.sum() == pytest.approx(weight, rel=0.01)
-    np.testing.assert_allclose(forces, forces[list(MIRROR)], rtol=0.01)
+    assert forces.sum() == pytest.approx(insect.weight, rel=0.01)
+    assert_allclose(forces, forces[list(MIRROR)], rtol=0.01)
 
 
 def test_feet_do_not_sink_in_and_the_body_does_not_sag(standing: mujoco.MjData, home: mujoco.MjData):
@@ -237,30 +226,15 @@ def test_feet_do_not_sink_in_and_the_body_does_not_sag(standing: mujoco.MjData, 
     assert -1 < standing.qpos[2] - home.qpos[2] < 0
 
 
-def test_one_leg_can_carry_the_whole_weight(model: mujoco.MjModel):
-    """The force range holds the weight at the end of the longest straight femur and tibia."""
-    dimensions = insect.dimensions(model)
-    torque = 9810 * (dimensions.femur + dimensions.tibia).max()
-    np.testing.assert_allclose(model.actuator_forcerange[:, 1], torque, rtol=0.01)
-
-
 def test_standing_does_not_depend_on_the_time_step(standing: mujoco.MjData):
-    model = insect.load(timestep=0.00025)
+    model = compile_body(Conditions(), 0.00025).model
     data = at_home(model)
-    for _ in range(4000):
-        mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data, nstep=4000)
     assert data.qpos[2] == pytest.approx(standing.qpos[2], abs=0.001)
 
 
-def test_every_load_is_a_copy_of_its_own():
-    first, second = insect.load(0.0005, Body(friction=0.3)), insect.load()
-    assert (first.opt.timestep, second.opt.timestep) == (0.0005, insect.LONGEST_STEP)
-    assert set(first.pair_friction[:, :2].flat) == {0.3}
-    assert set(second.pair_friction[:, :2].flat) == {1.0}
-
-
 def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):
-    bare = insect.load(looks=False)
+    bare = compile_body(Conditions(), looks=False).model
     assert bare.ngeom == 1 + len(TRUNK) + len(LEGS)
     seen = []
     for one in (model, bare):
@@ -271,49 +245,7 @@ def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):
     assert np.array_equal(*seen)
 
 
-@pytest.mark.parametrize("timestep", [0.0, -0.001, 0.002, np.nan])
-def test_time_steps_without_sense_are_refused(timestep: float):
-    with pytest.raises(InputError, match="timestep"):
-        insect.load(timestep)
-
-
-def centre_of_mass(model: mujoco.MjModel) -> np.ndarray:
-    """At home, from the root [mm]."""
-    data = at_home(model)
-    mujoco.mj_forward(model, data)
-    return data.subtree_com[model.body("mesothorax").id] - data.qpos[:3]
-
-
-@pytest.mark.parametrize("x", [-9.4, 0.0, 5.0])
-@pytest.mark.parametrize("changed", [Body(), Body(leg_mass=0.01), Body(load=1.0)], ids=["own", "massless legs", "load"])
-def test_masses_are_where_they_are_asked_for(changed: Body, x: float):
-    model = insect.load(body=replace(changed, centre_of_mass=x))
-    assert_allclose(centre_of_mass(model)[:2], [x, 0.0], atol=0.03 if x == 0.0 else 1e-6)
-    assert_allclose(model.body_mass.sum(), 1.0 + changed.load, rtol=1e-5)
-    legs = [model.body(f"{leg}_{part}").id for leg in LEGS for part in ("coxa", "femur", "tibia")]
-    own = insect.load()
-    assert_allclose(model.body_mass[legs], changed.leg_mass * own.body_mass[legs])
-
-
-@pytest.mark.parametrize("ground", ["step", "gap", "hurdle", "rough"])
-def test_all_ground_is_touched_alike(ground: Ground):
-    """Every pair has the contact settings of the MJCF, feet and trunk each touch every piece."""
-    flat, model = insect.load(), insect.load(body=Body(ground=ground))
-    pieces = 2 + {"gap": 1, "rough": 134}.get(ground, 0)
-    assert model.npair == pieces * flat.npair == pieces * 11
-    for name in ("dim", "solref", "solreffriction", "solimp", "margin", "gap", "friction"):
-        values = getattr(model, f"pair_{name}")
-        assert_array_equal(values, np.broadcast_to(getattr(flat, f"pair_{name}")[0], values.shape))
-
-
 def test_feet_grasp_with_the_force_asked_for():
-    model = insect.load(body=Body(grasp=2.0))
-    assert model.nu == insect.JOINT_ACTUATORS + 6
-    assert_allclose(model.actuator_gainprm[insect.JOINT_ACTUATORS :, 0], 2.0 * insect.MASS * insect.GRAVITY)
-    assert_array_equal(insect.load(body=Body(grasp=0.0)).nu, insect.JOINT_ACTUATORS)
-
-
-def test_mass_and_gravity_are_those_of_the_model():
-    model = insect.load()
-    assert_allclose(model.body_mass.sum(), insect.MASS, rtol=1e-5)
-    assert model.opt.gravity[2] == -insect.GRAVITY
+    grasping = compile_body(Conditions.of(grasp=2.0))
+    assert grasping.model.nu == len(STICK_INSECT.joints) + 6
+    assert_allclose(grasping.model.actuator_gainprm[grasping.columns.grasp, 0], 2.0 * 9810.0)

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
-from hexmj.loss_frequency import SLAB, draw_starts, flss, flss_over_range, observation_time
-from hexmj.network import first_loss
-from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network
+from hexmj.measures.kinematic import first_loss, flss, flss_over_range
+from hexmj.starts import SLAB, draw_starts
+from hexmj.timing import Acceleration, Stride, observation_time
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]
 REFERENCE = {
@@ -21,28 +22,28 @@ REFERENCE = {
 }
 """From an independent simulation with the same inferred constants, 7000 random starts, as printed there."""
 
-MODELS = {"uncoordinated": UNCOORDINATED, "hws": HWS, "ldvs": LDVS}
+CONTROLLERS = {"uncoordinated": UNCOORDINATED, "hws": HWS, "ldvs": LDVS}
 
 
-@pytest.mark.parametrize(("model", "window"), REFERENCE)
-def test_reference_to_the_printed_digit(model, window):
+@pytest.mark.parametrize(("name", "window"), REFERENCE)
+def test_reference_to_the_printed_digit(name, window):
     """The starts of seed 1 give every number of the reference as it is printed there.
 
     With other seeds the sampling error is added: with seed 0 the largest of the 24 differences is 0.020
     (uncoordinated, `start`, V = 0.3: 0.650; 0.656 over 35,000 starts), the others are below 0.011.
     """
-    printed = np.array(REFERENCE[model, window])
+    printed = np.array(REFERENCE[name, window])
     digit = np.where((printed < 0.1) | (printed > 0.99), 0.001, 0.01)
-    if (model, window) == ("uncoordinated", "start"):
+    if (name, window) == ("uncoordinated", "start"):
         digit[0] = 0.01
-    ours = flss(MODELS[model], VELOCITIES, window=window, seed=1).flss.values
+    ours = flss(CONTROLLERS[name], VELOCITIES, window=window, seed=1).flss.values
     assert (np.abs(ours - printed) <= digit / 2 + 1e-9).all()
 
 
 def test_acceleration_nearly_keeps_stability():
     """The reference gives about 0.03 and 0.05 for a = 0.00008 up to V = 0.9; the paper below 0.05 and 0.1."""
-    for model, reference in ((LDVS, 0.03), (HWS, 0.05)):
-        table = flss(model, [0.9], starts=1000, window="start", acceleration=Acceleration())
+    for controller, reference in ((LDVS, 0.03), (HWS, 0.05)):
+        table = flss(controller, [0.9], n_starts=1000, window="start", acceleration=Acceleration())
         assert table.flss.item() == pytest.approx(reference, abs=0.02)
 
 
@@ -56,25 +57,25 @@ def test_starts_lie_in_s_and_do_not_depend_on_their_number():
 
 def test_windows():
     v = np.array([0.1, 0.5])
-    assert observation_time("walk", v, Network()) == pytest.approx([660.0, 180.0])
-    assert observation_time("start", v, Network()) == pytest.approx([40.0, 40.0])
-    assert observation_time(12.5, v, Network()) == pytest.approx([12.5, 12.5])
-    accelerated = observation_time("start", v, Network(), Acceleration(0.001, 0.1))
+    assert observation_time("walk", v, Stride()) == pytest.approx([660.0, 180.0])
+    assert observation_time("start", v, Stride()) == pytest.approx([40.0, 40.0])
+    assert observation_time(12.5, v, Stride()) == pytest.approx([12.5, 12.5])
+    accelerated = observation_time("start", v, Stride(), Acceleration(0.001, 0.1))
     assert accelerated == pytest.approx([40.0, 440.0])
 
 
 def test_threads_do_not_matter():
-    one, two = (flss(LDVS, [0.3, 0.7], starts=3000, threads=n) for n in (1, 2))
+    one, two = (flss(LDVS, [0.3, 0.7], n_starts=3000, threads=n) for n in (1, 2))
     assert one.equals(two)
 
 
 def test_samples_of_the_protocol():
-    table = flss(LDVS, [0.5], starts=3000, window="start")
+    table = flss(LDVS, [0.5], n_starts=3000, window="start")
     times = first_loss(draw_starts(3000, 0), LDVS, 0.5, 40.0)
     lost = np.isfinite(times).reshape(3, 1000).mean(axis=1)
     assert table.sample_sd.item() == pytest.approx(lost.std(ddof=1))
     assert table.flss.item() == pytest.approx(lost.mean())
-    assert np.isnan(flss(LDVS, [0.5], starts=100, window="start").sample_sd.item())
+    assert np.isnan(flss(LDVS, [0.5], n_starts=100, window="start").sample_sd.item())
 
 
 def test_slabs_are_one_stream():
@@ -82,10 +83,10 @@ def test_slabs_are_one_stream():
     size = SLAB + 1500
     starts = draw_starts(size, 2)
     assert np.array_equal(starts, np.random.default_rng(2).uniform(-10.0, 10.0, (size, 6)))
-    table = flss(LDVS, [0.7], starts=size, window="start", seed=2)
+    table = flss(LDVS, [0.7], n_starts=size, window="start", seed=2)
     assert table.flss.item() == np.isfinite(first_loss(starts, LDVS, 0.7, 40.0)).mean()
     v = np.random.default_rng([2, 1]).uniform(0.5, 0.9, size)
-    over_range, _ = flss_over_range(LDVS, 0.5, 0.9, starts=size, window="start", seed=2)
+    over_range, _ = flss_over_range(LDVS, 0.5, 0.9, n_starts=size, window="start", seed=2)
     assert over_range == np.isfinite(first_loss(starts, LDVS, v, 40.0)).mean()
 
 
@@ -98,10 +99,10 @@ def test_wilson_interval_is_the_one_of_scipy(lost, size):
 
 def test_generalised_flss_averages_over_velocities():
     """J_N over a range lies between I_N at its ends, and is I_N where the range is a point."""
-    ends = flss(LDVS, [0.2, 0.6], starts=2000, window="start").flss.values
-    inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, starts=2000, window="start")
+    ends = flss(LDVS, [0.2, 0.6], n_starts=2000, window="start").flss.values
+    inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, n_starts=2000, window="start")
     assert ends[0] < low < inside < high < ends[1]
-    assert flss_over_range(LDVS, 0.6, 0.6, starts=2000, window="start")[0] == ends[1]
+    assert flss_over_range(LDVS, 0.6, 0.6, n_starts=2000, window="start")[0] == ends[1]
 
 
 @pytest.mark.parametrize(
@@ -114,18 +115,18 @@ def test_generalised_flss_averages_over_velocities():
         ({"velocities": [0.0]}, "no period"),
         ({"window": "long"}, "valid names: walk, start"),
         ({"window": -1.0}, "at least one step"),
-        ({"starts": 0}, "at least 1"),
+        ({"n_starts": 0}, "at least 1"),
         ({"seed": -1}, "at least 0"),
         ({"threads": 0}, "at least 1"),
     ],
 )
 def test_nonsense_gets_a_clear_sentence(change, words):
-    arguments = {"velocities": [0.5], "starts": 10} | change
+    arguments = {"velocities": [0.5], "n_starts": 10} | change
     with pytest.raises(InputError, match=words):
         flss(LDVS, **arguments)
 
 
-@pytest.mark.parametrize(("change", "words"), [({"seed": -1}, "seed = -1"), ({"starts": 0}, "at least 1")])
+@pytest.mark.parametrize(("change", "words"), [({"seed": -1}, "seed = -1"), ({"n_starts": 0}, "at least 1")])
 def test_nonsense_for_a_range_gets_a_clear_sentence(change, words):
     with pytest.raises(InputError, match=words):
         flss_over_range(LDVS, 0.1, 0.5, **change)

@@ -1,25 +1,22 @@
 """Dynamic stability maps: cells are the package's own measures, differences are paired, what is done is not redone."""
 
 import json
-import sys
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexmj.cli import main
-from hexmj.comparison import compare
-from hexmj.errors import InputError
-from hexmj.experiments import stability_map as module
-from hexmj.experiments.mechanisms import MECHANISMS, SAVED
-from hexmj.experiments.stability_map import CONDITIONS, FLSS, froude, stability_map
+from hexmj import LDVS, Conditions, InputError, ReadsLegs, compare
 from hexmj.intervals import paired_difference
-from hexmj.parameters import LDVS
-from hexmj.physics.body import Body
+from hexmj.studies.stability_map import walks
+from hexmj.studies.stability_map.differences import FLSS, froude
+from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
+from hexmj.studies.stability_map.study import CONDITIONS, StabilityMap
+from hexmj.sweeps import Cell, conduct
 
-SMALL: dict[str, Any] = {"values": [80.0, 320.0], "velocities": [0.5, 0.7], "starts": 12, "window": 60.0}
+SMALL: dict[str, Any] = {"values": [80.0, 320.0], "velocities": [0.5, 0.7], "n_starts": 12, "window": 60.0}
 SHORTER: dict[str, Any] = {"values": [320.0]}
 OTHER_SEED: dict[str, Any] = {"seed": 1}
 
@@ -31,12 +28,12 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(folder):
-    return stability_map(LDVS, "vp", folder, **SMALL)
+    return conduct(StabilityMap(LDVS, "vp", **SMALL), folder)
 
 
 def test_cells_are_those_of_the_comparison(result):
     for vp in result.value.values:
-        alone = compare(LDVS, [0.5, 0.7], starts=12, window=60.0, body=Body(vp=vp)).isel(model=0)
+        alone = compare(LDVS, [0.5, 0.7], n_starts=12, window=60.0, conditions=Conditions.of(vp=vp)).isel(controller=0)
         for name in ("planned_loss", "measured_loss", "fall", "tilt", "kinematic", "physical", "physical_high"):
             assert np.array_equal(result[name].sel(value=vp).values, alone[name].values), name
 
@@ -64,39 +61,39 @@ def test_the_kinematic_row_knows_no_condition(result):
 
 
 def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
-    monkeypatch.setattr(module, "physical_walk", None)
-    again = stability_map(LDVS, "vp", folder, **SMALL)
-    assert again.equals(result)
-    part = stability_map(LDVS, "vp", folder, **(SMALL | SHORTER))
+    monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
+    assert conduct(StabilityMap(LDVS, "vp", **SMALL), folder).identical(result)
+    part = conduct(StabilityMap(LDVS, "vp", **(SMALL | SHORTER)), folder)
     assert np.array_equal(part.fall.values[0], result.fall.sel(value=320.0).values)
-    with pytest.raises(TypeError):
-        stability_map(LDVS, "vp", folder, **(SMALL | OTHER_SEED))
+    with pytest.raises(pytest.fail.Exception, match="walked again"):
+        conduct(StabilityMap(LDVS, "vp", **(SMALL | OTHER_SEED)), folder)
 
 
-def test_same_bits_in_any_blocks_and_threads(result, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "BLOCK", 5)
-    other = stability_map(LDVS, "vp", tmp_path, **SMALL, threads=1)
+def test_same_bits_in_any_blocks_and_threads(result, monkeypatch):
+    monkeypatch.setattr(walks, "BLOCK", 5)
+    other = conduct(StabilityMap(LDVS, "vp", **SMALL), threads=1)
     assert other.drop_vars("speed").equals(result.drop_vars("speed"))
     assert_allclose(other.speed, result.speed, rtol=1e-14)  # a mean, summed in another order
 
 
-def test_starts_that_cannot_stand_are_left_out_everywhere(tmp_path):
-    few: dict[str, Any] = {"velocities": [0.7], "starts": 8, "window": 20.0}
-    animal = stability_map(LDVS, "centre_of_mass", tmp_path, values=[-9.4, 0.0], **few)
-    paper = stability_map(LDVS, "centre_of_mass", tmp_path, values=[0.0], **few)
+def test_starts_that_cannot_stand_are_left_out_everywhere():
+    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "window": 20.0}
+    animal = conduct(StabilityMap(LDVS, "centre_of_mass", [-9.4, 0.0], **few))
+    paper = conduct(StabilityMap(LDVS, "centre_of_mass", [0.0], **few))
     assert paper.stand.item() == 8
     assert animal.stand.values.tolist() == [animal.sizes["start"], 8]
     assert 0 < animal.sizes["start"] < 8
     assert np.array_equal(animal.fall.sel(value=0.0), paper.fall.sel(start=animal.start, value=0.0))
     assert animal.static.sel(value=-9.4).item() > animal.kinematic.sel(value=-9.4).item()
-    with pytest.raises(InputError, match="stands on six feet"):
-        stability_map(LDVS, "load", tmp_path, values=[10.0], **few)
+    with pytest.raises(InputError, match="load = 10; none of 8 starts stands on six feet there"):
+        conduct(StabilityMap(LDVS, "load", [10.0], **few))
 
 
 def test_the_froude_number_is_one_where_weight_only_just_holds_the_arc():
-    height = 10.0
-    assert_allclose(froude(Body(vp=np.sqrt(9810.0 * height) / 0.5, standing_height=height), np.array([0.5])), 1.0)
-    assert_allclose(froude(Body(vp=160.0), np.array([0.3])), 4 * froude(Body(vp=80.0), np.array([0.3])))
+    vp = np.sqrt(9810.0 * 10.0) / 0.5
+    assert_allclose(froude(Conditions.of(vp=vp, standing_height=10.0), np.array([0.5])), 1.0)
+    slow, fast = (froude(Conditions.of(vp=vp), np.array([0.3])) for vp in (80.0, 160.0))
+    assert_allclose(fast, 4 * slow)
 
 
 def test_paired_differences():
@@ -115,10 +112,10 @@ def test_paired_differences():
 
 def test_the_values_of_every_condition_make_sense():
     for name, condition in CONDITIONS.items():
-        assert getattr(Body, name) in condition.values
+        assert Conditions().flat()[name] in condition.values
         assert sorted(condition.values) == list(condition.values)
         for value in condition.values:
-            assert getattr(replace(Body(), **{name: value}), name) == value
+            assert Conditions.of(**{name: value}).flat()[name] == value
     assert set(FLSS) == {"kinematic", "measured", "physical", "static"}
 
 
@@ -127,41 +124,35 @@ def test_the_values_of_every_condition_make_sense():
     [
         ("wind", {}, "valid names: vp, step_height"),
         ("friction", {"values": [1.0, 1.0]}, "none of them twice"),
-        ("friction", {"values": [-1.0]}, "expected a finite number of at least 0"),
+        ("friction", {"values": [-1.0]}, r"friction = -1.0; expected .*0"),
         ("step_height", {"values": [20.0]}, "at most 14 mm"),
         ("vp", {"velocities": [1.0]}, "0 <= V < 1"),
-        ("vp", {"starts": 0}, "at least 1"),
-        ("vp", {"body": Body(feedback=True)}, "expected False"),
+        ("vp", {"n_starts": 0}, "at least 1"),
+        ("vp", {"window": "long"}, "valid names: walk, start"),
+        ("vp", {"conditions": Conditions.of(vp=20.0)}, "vp = 20; expected values, which takes all of them"),
+        ("vp", {"controller": ReadsLegs(LDVS)}, "a controller that reads the legs; expected another"),
     ],
 )
-def test_bad_input_is_refused(tmp_path, over, changed, message):
-    given: dict[str, Any] = {"values": [], "velocities": [0.5], "starts": 2} | changed
+def test_bad_input_is_refused(over, changed, message):
+    given: dict[str, Any] = {"controller": LDVS, "over": over, "velocities": [0.5], "n_starts": 2} | changed
     with pytest.raises(InputError, match=message):
-        stability_map(LDVS, over, tmp_path, **given)
-    assert not list(tmp_path.iterdir())
+        StabilityMap(**given)
 
 
-def test_command(tmp_path, monkeypatch, capsys):
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["hexmj", "map", *map(str, words)])
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        return code, *capsys.readouterr()
-
-    words = ("--values", 80, "--velocities", 0.7, "--starts", 4, "--window", 20, "--out", tmp_path)
+def test_command(tmp_path, run):
+    words = ("map", "--values", 80, "--velocities", 0.7, "--starts", 4, "--window", 20, "--out", tmp_path)
     code, out, _ = run(*words, "--json")
     told = json.loads(out)
     assert code == 0
     assert sum(told["count"][0][0]) == told["starts"] == 4
     assert told["mechanism_name"] == list(MECHANISMS)
-    names = {path.rsplit("/")[-1] for path in told["files"]}
+    names = {Path(path).name for path in told["files"]}
     assert names == {"vp.nc", "vp.png", "vp-mechanisms.png", "vp-manifest.json"}
     assert all((tmp_path / name).stat().st_size for name in names)
     code, out, _ = run(*words)
     assert code == 0
     assert "landed in time" in out
-    assert run(*words, "--vp", 20)[0] == 2
-    assert run("--over", "wind")[0] == 2
+    code, _, error = run(*words, "--vp", 20)
+    assert code == 2 and "vp = 20; expected values" in error
+    assert run(*words, "--feedback")[0] == 2
+    assert run("map", "--over", "wind")[0] == 2

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexmj.experiments.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
-from hexmj.legs import FIG1, MIRROR, Geometry
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import first_loss, walk
-from hexmj.parameters import LDVS, Network
-from hexmj.physics.body import Body
-from hexmj.physics.measurement import Outcomes
-from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
-from hexmj.stability import loss_time
-from hexmj.walks import Walk
+from hexmj import LDVS, Conditions, Geometry, Stride, draw_starts, first_loss, loss_time, physical_walk, walk
+from hexmj.legs import FIG1, MIRROR
+from hexmj.measures.physical import PhysicalWalk
+from hexmj.physics.outcomes import Outcomes
+from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
+from hexmj.walks import AnyWalk, PlannedWalk, Walk
 
 NAMES = np.array(list(MECHANISMS))
 RIGHT_AND_FRONT = [0, 3, 4, 5]  # lifted, these leave two feet on the left
@@ -24,7 +20,7 @@ STEPS, LOST, LANDED, END = 300, 100, 140, 200  # of 1.25 ms; END is that of a fa
 
 @pytest.fixture(scope="module", params=[80.0, 320.0])
 def walked(request):
-    return physical_walk(draw_starts(24, 0), LDVS, 0.7, 80.0, vp=request.param)
+    return physical_walk(draw_starts(24, 0), LDVS, 0.7, 80.0, conditions=Conditions.of(vp=request.param))
 
 
 def staged(*, fall: bool = False, lean: dict[int, tuple[float, float]] | None = None, **stands: slice) -> PhysicalWalk:
@@ -54,15 +50,25 @@ def staged(*, fall: bool = False, lean: dict[int, tuple[float, float]] | None = 
     seen = np.where(np.isnan(qpos[..., :1]), np.nan, x)
     outcomes = Outcomes(**{name: np.full(1, np.inf) for name in Outcomes.__dataclass_fields__})
     outcomes = replace(outcomes, fall=np.array([END * 0.1 if fall else np.inf]))
-    walks = Walk(time, v, x, y, planned), Walk(time, v, seen, y, measured)
-    return PhysicalWalk(*walks, outcomes, qpos, np.zeros((STEPS, 1, 3)), Body(), Network())
+    aep, height = np.full(x.shape, Stride.aep0), np.full(x.shape, np.nan)
+    plan = PlannedWalk(time, v, x, y, planned, aep=aep, height=height)
+    return PhysicalWalk(
+        planned=plan,
+        ordered=plan,
+        measured=Walk(time, v, seen, y, measured),
+        outcomes=outcomes,
+        qpos=qpos,
+        centre_of_mass=np.zeros((STEPS, 1, 3)),
+        conditions=Conditions(),
+        stride=Stride(),
+    )
 
 
 def mirrored(walk: PhysicalWalk) -> PhysicalWalk:
     """The same walk in a mirror: left and right legs change places, rolling and turning their sign."""
     legs = list(MIRROR)
 
-    def reflect(one: Walk) -> Walk:
+    def reflect(one: AnyWalk) -> AnyWalk:
         return replace(one, x=one.x[..., legs], y=-one.y[..., legs], stance=one.stance[..., legs])
 
     qpos = walk.qpos.copy()
@@ -134,8 +140,8 @@ def test_the_static_criterion_sees_the_body_from_its_own_centre_of_mass():
     """To move the centre of mass ahead is to move all legs behind."""
     starts, behind = draw_starts(40, 1), -6.0
     front, middle, hind = FIG1.origins
-    moved = Network(geometry=Geometry(origins=(front - behind, middle - behind, hind - behind)))
-    seen = replace(staged(), planned=walk(starts, LDVS, 0.5, 60.0), body=Body(centre_of_mass=behind))
+    moved = Stride(geometry=Geometry(origins=(front - behind, middle - behind, hind - behind)))
+    seen = replace(staged(), planned=walk(starts, LDVS, 0.5, 60.0), conditions=Conditions.of(centre_of_mass=behind))
     losses = loss_time(static_plan(seen))
-    assert np.array_equal(losses, first_loss(starts, LDVS, 0.5, 60.0, network=moved))
+    assert np.array_equal(losses, first_loss(starts, LDVS, 0.5, 60.0, stride=moved))
     assert np.isfinite(losses).any()

@@ -1,6 +1,7 @@
 """Laws of the network: it equals its plain form to the last bit, whatever the number of starts and threads."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import hexmj.network as network_module
 import plain_network as plain
-from hexmj import lanes
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Weights, kernel
+from hexmj.controllers.cruse1998 import network as network_module
+from hexmj.controllers.cruse1998.kernel import LANES
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
-from hexmj.lanes import LANES
 from hexmj.legs import CENTRED, FIG1, MIRROR
-from hexmj.network import NetworkRun, first_loss, walk
-from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Acceleration, Network, Weights, weights
+from hexmj.measures.kinematic import first_loss, walk
+from hexmj.timing import Acceleration, Stride
+
+STRIDE = Stride()
 
 
 def random_weights(rng: np.random.Generator) -> Weights:
@@ -44,27 +48,27 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
 def test_equals_plain_network_to_the_last_bit(seed, size, threads, order, geometry, velocity, rate):
     rng = np.random.default_rng(seed)
     p, starts = random_weights(rng), random_starts(rng, size)
-    network = Network(order=order, geometry=geometry, dt=rng.choice([0.1, 0.25]))
+    controller, stride = Cruse1998(p, order), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
     acceleration = Acceleration(rate, start=velocity / 2) if rate else None
     steps = 250
-    options = {"network": network, "acceleration": acceleration, "threads": threads}
-    fast = walk(starts, p, velocity, steps * network.dt, **options)
-    lost = first_loss(starts, p, velocity, steps * network.dt, **options)
+    options = {"stride": stride, "acceleration": acceleration, "threads": threads}
+    fast = walk(starts, controller, velocity, steps * stride.dt, **options)
+    lost = first_loss(starts, controller, velocity, steps * stride.dt, **options)
     for i in rng.choice(size, min(size, 3), replace=False):
-        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, network, acceleration)
+        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, stride, order, acceleration)
         assert np.array_equal(fast.x[:, i], x)
         assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
         assert np.array_equal(fast.velocity[:, i], v)
-        unstable = [n for n in range(steps) if not plain.stable(x[n], s[n], network)]
-        assert lost[i] == ((unstable[0] + 1) * network.dt if unstable else np.inf)
+        unstable = [n for n in range(steps) if not plain.stable(x[n], s[n], stride)]
+        assert lost[i] == ((unstable[0] + 1) * stride.dt if unstable else np.inf)
 
 
-@pytest.mark.parametrize("model", [HWS, LDVS])
-def test_published_models_equal_plain_network(model):
+@pytest.mark.parametrize("controller", [HWS, LDVS])
+def test_published_sets_equal_plain_network(controller):
     starts = random_starts(np.random.default_rng(1), 2)
-    fast = walk(starts, model, 0.3, 200.0)
+    fast = walk(starts, controller, 0.3, 200.0)
     for i in range(2):
-        x, s, _ = plain.walk(list(starts[i]), weights(model), 0.3, 2000, Network())
+        x, s, _ = plain.walk(list(starts[i]), general(controller.weights), 0.3, 2000, STRIDE)
         assert np.array_equal(fast.x[:, i], x)
         assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
 
@@ -82,8 +86,8 @@ def test_does_not_depend_on_threads_batch_or_neighbours_in_the_batch():
 def test_does_not_depend_on_the_number_of_lanes(tmp_path, monkeypatch):
     """The same kernel compiled for blocks of another width; 203 starts leave remainders."""
     width = 5
-    source = Path(lanes.__file__).read_text(encoding="utf-8")
-    path = tmp_path / f"lanes_{width}.py"
+    source = Path(kernel.__file__).read_text(encoding="utf-8")
+    path = tmp_path / f"kernel_{width}.py"
     path.write_text(source.replace(f"LANES = {LANES}\n", f"LANES = {width}\n"), encoding="utf-8")
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec and spec.loader
@@ -93,7 +97,7 @@ def test_does_not_depend_on_the_number_of_lanes(tmp_path, monkeypatch):
     starts = random_starts(np.random.default_rng(7), 203)
     speeds = np.linspace(0.1, 0.9, 203)
     usual = first_loss(starts, LDVS, speeds, 60.0), walk(starts, LDVS, speeds, 20.0).x
-    monkeypatch.setattr(network_module, "lanes", other)
+    monkeypatch.setattr(network_module, "kernel", other)
     assert np.array_equal(first_loss(starts, LDVS, speeds, 60.0), usual[0])
     assert np.array_equal(walk(starts, LDVS, speeds, 20.0).x, usual[1])
 
@@ -112,8 +116,8 @@ def test_a_loss_does_not_depend_on_who_had_the_lane_before(size):
 def test_advancing_in_parts_is_one_walk():
     starts = random_starts(np.random.default_rng(3), 5)
     whole = walk(starts, LDVS, 0.4, 50.0, acceleration=Acceleration(0.002))
-    run = NetworkRun(starts, LDVS, 0.4, acceleration=Acceleration(0.002))
-    parts = [run.advance(n) for n in (1, 99, 400)]
+    plan = LDVS.begin(starts, np.full(5, 0.4), STRIDE, Acceleration(0.002))
+    parts = [plan.advance(n) for n in (1, 99, 400)]
     for name in ("time", "velocity", "x", "stance"):
         assert np.array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
 
@@ -122,10 +126,10 @@ def test_restarted_starts_begin_anew_and_leave_the_others_alone():
     rng = np.random.default_rng(31)
     starts, tips = random_starts(rng, 70), random_starts(rng, 70)
     which = rng.random(70) < 0.5
-    run = NetworkRun(starts, LDVS, 0.4)
-    run.advance(300)
-    run.restart(which, tips)
-    after, anew, on = run.advance(200), walk(tips, LDVS, 0.4, 20.0), walk(starts, LDVS, 0.4, 50.0)
+    plan = LDVS.begin(starts, np.full(70, 0.4), STRIDE)
+    plan.advance(300)
+    plan.restart(which, tips)
+    after, anew, on = plan.advance(200), walk(tips, LDVS, 0.4, 20.0), walk(starts, LDVS, 0.4, 50.0)
     assert np.array_equal(after.x[:, which], anew.x[:, which])
     assert np.array_equal(after.stance[:, which], anew.stance[:, which])
     assert np.array_equal(after.x[:, ~which], on.x[300:, ~which])
@@ -133,31 +137,30 @@ def test_restarted_starts_begin_anew_and_leave_the_others_alone():
 
 def test_only_restarted_starts_accelerate():
     starts, which = random_starts(np.random.default_rng(32), 3), np.array([True, False, True])
-    run = NetworkRun(starts, LDVS, 0.5, acceleration=Acceleration(0.01), at_speed=True)
-    assert np.array_equal(run.advance(100).x, walk(starts, LDVS, 0.5, 10.0).x)
-    run.restart(which, run.tips)
-    velocity = run.advance(60).velocity
+    plan = LDVS.begin_at_speed(starts, np.full(3, 0.5), STRIDE, Acceleration(0.01))
+    assert np.array_equal(plan.advance(100).x, walk(starts, LDVS, 0.5, 10.0).x)
+    plan.restart(which, plan.tips)
+    velocity = plan.advance(60).velocity
     assert np.array_equal(velocity[:, which], np.repeat(0.1 + 0.01 * (np.arange(60)[:, None] * 0.1), 2, axis=1))
     assert (velocity[:, 1] == 0.5).all()
 
 
 def test_seeing_what_was_planned_changes_nothing():
     starts = random_starts(np.random.default_rng(33), 65)
-    run, parts = NetworkRun(starts, LDVS, 0.4), []
+    plan, parts = LDVS.begin(starts, np.full(65, 0.4), STRIDE), []
     for _ in range(100):
-        parts.append(run.advance(1).x)
-        assert np.array_equal(parts[-1][0], run.tips)
-        run.see(run.tips, run.standing)
+        parts.append(plan.advance(1).x)
+        assert np.array_equal(parts[-1][0], plan.tips)
+        plan.see(plan.tips, plan.standing)
     assert np.array_equal(np.concatenate(parts), walk(starts, LDVS, 0.4, 10.0).x)
 
 
-@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
+@pytest.mark.parametrize("controller", [HWS, LDVS, UNCOORDINATED])
 @pytest.mark.parametrize("order", ["printed", "undelayed"])
-def test_mirrored_starts_give_mirrored_walks(model, order):
-    starts = random_starts(np.random.default_rng(4), 40)
-    network = Network(order=order)
-    walked = walk(starts, model, 0.35, 150.0, network=network)
-    mirrored = walk(starts[:, MIRROR], model, 0.35, 150.0, network=network)
+def test_mirrored_starts_give_mirrored_walks(controller, order):
+    starts, controller = random_starts(np.random.default_rng(4), 40), replace(controller, order=order)
+    walked = walk(starts, controller, 0.35, 150.0)
+    mirrored = walk(starts[:, MIRROR], controller, 0.35, 150.0)
     assert np.array_equal(walked.x[:, :, MIRROR], mirrored.x)
     assert np.array_equal(walked.stance[:, :, MIRROR], mirrored.stance)
 
@@ -199,7 +202,7 @@ def test_a_pep_that_recedes_and_comes_back_keeps_neighbours_apart():
         weights["p1"][0, [1, 3]] = 14.0
         weights["p31"][1, 0], weights["p32"][1, 0], weights["p33"][1, 0] = p31, p32, -4.0
         weights["p31"][1, 4], weights["p32"][1, 4] = 1000.0, -0.004
-        walked = walk(starts, Weights(**weights), 0.1, 110.0)
+        walked = walk(starts, Cruse1998(Weights(**weights)), 0.1, 110.0)
         return int((~walked.stance[:, :, 0] & ~walked.stance[:, :, 1]).any(axis=0).sum())
 
     ahead = {"p31": -30.0, "p32": 0.0}  # 4 mm all the time, the cap of Eq. 4
@@ -227,7 +230,7 @@ def test_a_pep_that_recedes_and_comes_back_keeps_neighbours_apart():
     ],
 )
 def test_nonsense_gets_a_clear_sentence(change, words):
-    arguments = {"starts": np.zeros((1, 6)), "model": LDVS, "velocity": 0.3, "duration": 10.0} | change
+    arguments = {"starts": np.zeros((1, 6)), "controller": LDVS, "velocity": 0.3, "duration": 10.0} | change
     measure = first_loss if np.ndim(arguments["duration"]) else walk
     with pytest.raises(InputError, match=words):
         measure(**arguments)

@@ -1,26 +1,28 @@
 """The paper's claims: rules on made-up measurements, the table, what is kept of a stopped run, found sets, figures."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from hexmj.controllers.cruse1998 import HWS, LDVS
 from hexmj.errors import InputError
-from hexmj.loss_frequency import WINDOWS, draw_starts, flss
-from hexmj.network import walk
+from hexmj.measures.kinematic import flss, walk
 from hexmj.paper import found_sets as found
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.late_losses import lost_after
-from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, WIDE, Protocol
+from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, WIDE, Protocol, cells
 from hexmj.paper.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
 from hexmj.paper.reproduce import measure, reproduce
 from hexmj.paper.rules import Answer, Band, Rule, Trend
 from hexmj.paper.table import NOT_SEARCHED, judge, summary
-from hexmj.parameters import HWS, LDVS, Acceleration
 from hexmj.stability import walk_margin
+from hexmj.starts import draw_starts
+from hexmj.timing import WINDOWS, Acceleration
 
 TINY = replace(
     QUICK,
@@ -113,8 +115,8 @@ def test_claims_have_unique_keys_and_name_measurements():
     assert len({claim.key for claim in CLAIMS}) == len(CLAIMS) >= 40
     assert all(set(claim.rule.quantity.needs) <= set(MEASUREMENTS) for claim in CLAIMS)
     assert all(set(needs) <= set(MEASUREMENTS) for needs, _ in FIGURES.values())
-    assert (FULL.samples, FULL.sample, FULL.gait_starts, FULL.gait_network.dt) == (7, 1000, 100, 0.01)
-    assert (FULL.network.dt, FULL.acceleration.rate) == (0.1, 0.00008)
+    assert (FULL.samples, FULL.sample, FULL.gait_starts, FULL.gait_stride.dt) == (7, 1000, 100, 0.01)
+    assert (FULL.stride.dt, FULL.acceleration.rate) == (0.1, 0.00008)
 
 
 def test_measured_losses_are_those_of_flss(tmp_path):
@@ -122,10 +124,15 @@ def test_measured_losses_are_those_of_flss(tmp_path):
     lost = measure("ldvs", protocol, tmp_path).lost
     fast = measure("hws accelerated", protocol, tmp_path).lost
     for window in ("walk", "start"):
-        table = flss(LDVS, protocol.velocities, starts=140, seed=protocol.seed, window=window)
+        table = flss(LDVS, protocol.velocities, n_starts=140, seed=protocol.seed, window=window)
         assert lost.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
         table = flss(
-            HWS, protocol.velocities, starts=140, seed=protocol.seed, window=window, acceleration=protocol.acceleration
+            HWS,
+            protocol.velocities,
+            n_starts=140,
+            seed=protocol.seed,
+            window=window,
+            acceleration=protocol.acceleration,
         )
         assert fast.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
 
@@ -187,7 +194,7 @@ def test_everything_is_written(tmp_path):
     assert str(tmp_path) not in text
     data = xr.load_dataset(tmp_path / "figures" / "figure-3-walk.nc", engine="h5netcdf")
     assert data.flss.sel(curve="hws", velocity=0.3) == pytest.approx(
-        flss(HWS, [0.3], starts=21, seed=TINY.seed).flss.item()
+        flss(HWS, [0.3], n_starts=21, seed=TINY.seed).flss.item()
     )
 
 
@@ -266,5 +273,27 @@ def test_the_shipped_sets_are_judged_on_fresh_starts():
     assert places == {(w, *at) for w in WINDOWS for at in (*((v, v) for v in FULL.velocities), WIDE)}
 
 
-def test_the_papers_protocol_is_the_default():
-    assert Protocol() == FULL
+def test_a_cell_holds_only_what_its_numbers_depend_on():
+    """Another number of gaits, or of velocities, makes no loss anew; other starts do."""
+
+    def records(name: str, protocol: Protocol) -> list[str]:
+        return [cell.record() for cell in cells(name, protocol)]
+
+    same = replace(TINY, gait_starts=9, gait_velocities=(0.9,), footfall_velocities=(0.9,))
+    assert records("ldvs", TINY) == records("ldvs", same)
+    assert records("ldvs", TINY) == records("ldvs", replace(TINY, acceleration=Acceleration(rate=0.002)))
+    assert records("ldvs", replace(TINY, velocities=(0.6,))) == records("ldvs", TINY)[1:]
+    for name, other in (
+        ("ldvs", replace(TINY, sample=4)),
+        ("ldvs accelerated", replace(TINY, acceleration=Acceleration(rate=0.002))),
+        ("ldvs gaits", replace(TINY, gait_starts=9)),
+        ("ldvs footfall", replace(TINY, seed=1)),
+    ):
+        assert not set(records(name, TINY)) & set(records(name, other))
+
+
+def test_the_numbers_do_not_depend_on_who_measures(tmp_path):
+    with ThreadPoolExecutor(2) as executor:
+        both = [measure(name, TINY, executor=executor) for name in ("hws", "ideal", "hws footfall")]
+    for name, one in zip(("hws", "ideal", "hws footfall"), both, strict=True):
+        assert one.identical(measure(name, TINY, tmp_path, threads=1))

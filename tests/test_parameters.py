@@ -3,16 +3,21 @@
 import runpy
 import shlex
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, Cruse1998, Symmetric, Weights
+from hexmj.controllers.cruse1998.presets import OWN, weights_toml
+from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
+from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4
-from hexmj.loss_frequency import flss
-from hexmj.network import walk
-from hexmj.parameters import HWS, LDVS, NEIGHBOURS, UNCOORDINATED, Network, Symmetric, Weights, weights
-from hexmj.presets import OWN, PRESETS, load_model, model_title, model_toml
+from hexmj.measures.kinematic import flss, walk
+from hexmj.timing import Stride
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_neighbours_are_the_paper_s():
@@ -32,53 +37,53 @@ def test_number_of_parameters():
     assert pairs["p2"] == pairs["p4"] == 4
     assert sum(pairs[kind] for kind in ("p31", "p32", "p33", "p34")) == 40
     assert sum(pairs.values()) == 58
-    assert len(weights(LDVS).to_vector()) == 58
-    assert len(weights(HWS).to_vector(48)) == 48
+    assert len(general(LDVS.weights).to_vector()) == 58
+    assert len(general(HWS.weights).to_vector(48)) == 48
 
 
-@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
-def test_vectors_of_symmetric_sets_go_back_and_forth(model):
-    assert Symmetric.from_vector(model.to_vector()) == model
+@pytest.mark.parametrize("weights", [HWS_WEIGHTS, LDVS_WEIGHTS, NO_WEIGHTS])
+def test_vectors_of_symmetric_sets_go_back_and_forth(weights):
+    assert Symmetric.from_vector(weights.to_vector()) == weights
 
 
-@pytest.mark.parametrize("model", PRESETS.values(), ids=PRESETS)
-def test_vectors_go_back_and_forth(model):
-    general = weights(model)
-    again = Weights.from_vector(general.to_vector())
-    assert all(np.array_equal(getattr(general, kind), getattr(again, kind)) for kind in NEIGHBOURS)
+@pytest.mark.parametrize("controller", PRESETS.values(), ids=PRESETS)
+def test_vectors_go_back_and_forth(controller):
+    weights = general(controller.weights)
+    again = Weights.from_vector(weights.to_vector())
+    assert all(np.array_equal(getattr(weights, kind), getattr(again, kind)) for kind in NEIGHBOURS)
 
 
 def test_short_forms_leave_out_the_velocity_dependence():
-    assert Symmetric.from_vector(HWS.to_vector(9)) == HWS
-    assert not Weights.from_vector(weights(LDVS).to_vector(48)).p34.any()
-    assert weights(LDVS).p34.any()
+    assert Symmetric.from_vector(HWS_WEIGHTS.to_vector(9)) == HWS_WEIGHTS
+    assert not Weights.from_vector(general(LDVS.weights).to_vector(48)).p34.any()
+    assert general(LDVS.weights).p34.any()
 
 
 def test_appendix_a():
-    p = weights(LDVS)
-    assert p.p1[0, 1] == p.p1[4, 5] == LDVS.p1_i
-    assert p.p1[0, 3] == p.p1[5, 2] == LDVS.p1_c
-    assert p.p31[1, 0] == p.p31[5, 4] == LDVS.p31_i
-    assert p.p32[3, 0] == p.p33[3, 0] == LDVS.p32_c
-    assert p.p34[2, 1] == LDVS.p34_i
+    p = general(LDVS.weights)
+    assert p.p1[0, 1] == p.p1[4, 5] == LDVS_WEIGHTS.p1_i
+    assert p.p1[0, 3] == p.p1[5, 2] == LDVS_WEIGHTS.p1_c
+    assert p.p31[1, 0] == p.p31[5, 4] == LDVS_WEIGHTS.p31_i
+    assert p.p32[3, 0] == p.p33[3, 0] == LDVS_WEIGHTS.p32_c
+    assert p.p34[2, 1] == LDVS_WEIGHTS.p34_i
     assert p.p34[2, 5] == 0.0
     assert p.p4[1, 0] == 1.0
 
 
 def test_files_give_the_same_walk_as_the_preset(tmp_path):
     symmetric = tmp_path / "symmetric.toml"
-    symmetric.write_text("[symmetric]\n" + "\n".join(f"{k} = {v}" for k, v in vars(HWS).items()))
-    general = tmp_path / "general.toml"
+    symmetric.write_text("[symmetric]\n" + "\n".join(f"{k} = {v}" for k, v in vars(HWS.weights).items()))
+    whole = tmp_path / "general.toml"
     tables = []
     for kind, neighbours in NEIGHBOURS.items():
-        matrix = getattr(weights(HWS), kind)
+        matrix = getattr(general(HWS.weights), kind)
         tables.append(f"[weights.{kind}]")
         tables += [f'"{d + 1},{e + 1}" = {matrix[d, e]}' for d, sources in enumerate(neighbours) for e in sources]
-    general.write_text("\n".join(tables))
+    whole.write_text("\n".join(tables))
     start = np.random.default_rng(0).uniform(-10, 10, (3, 6))
     expected = walk(start, HWS, 0.3, 80.0).x
-    for path in (symmetric, general):
-        assert np.array_equal(walk(start, load_model(str(path)), 0.3, 80.0).x, expected)
+    for path in (symmetric, whole):
+        assert np.array_equal(walk(start, load_controller(str(path)), 0.3, 80.0).x, expected)
 
 
 @pytest.mark.parametrize(
@@ -103,17 +108,20 @@ def test_files_that_make_no_sense(tmp_path, text, words):
     path = tmp_path / "model.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
-        load_model(str(path))
+        load_controller(str(path))
 
 
 def test_names_that_do_not_exist():
-    with pytest.raises(InputError, match=r"neither a preset .hws, ldvs, uncoordinated, own-0.1, .* nor a TOML file"):
-        load_model("lvds")
+    with pytest.raises(InputError, match=r"neither one of hws, ldvs, uncoordinated, own-0.1, .* nor a TOML file"):
+        load_controller("lvds")
 
 
-def test_titles_of_models():
-    names = ("hws", "own-0.1", "results/found-0.1.toml")
-    assert [model_title(name) for name in names] == ["hws", "own-0.1", "found-0.1"]
+def test_names_of_controllers(tmp_path):
+    """As in tables and titles: that of a preset, and of a file without its folder and ending."""
+    path = tmp_path / "found-0.1.toml"
+    path.write_text(weights_toml(HWS.weights))
+    names = ("hws", "own-0.1", str(path))
+    assert [load_controller(name).name for name in names] == ["hws", "own-0.1", "found-0.1"]
 
 
 def test_weights_off_the_neighbour_sets():
@@ -128,18 +136,32 @@ def test_weights_off_the_neighbour_sets():
 
 
 @pytest.mark.parametrize(
-    "change", [{"dt": 0.0}, {"aep0": -11.0}, {"pep_min": 0.0}, {"order": "random"}, {"pep0": float("nan")}]
+    ("change", "words"),
+    [
+        ({"dt": 0.0}, "dt = 0.0; expected a time step above 0"),
+        ({"aep0": -11.0}, "expected pep_min <= pep0 < aep0"),
+        ({"pep_min": 0.0}, "expected pep_min <= pep0 < aep0"),
+        ({"pep0": float("nan")}, "must be finite"),
+        ({"geometry": "fig1"}, "geometry = 'fig1'; expected a Geometry"),
+    ],
 )
-def test_network_constants_that_make_no_sense(change):
-    with pytest.raises(InputError):
-        Network(**change)
+def test_strides_that_make_no_sense(change, words):
+    with pytest.raises(InputError, match=words):
+        Stride(**change)
+
+
+def test_networks_that_make_no_sense():
+    with pytest.raises(InputError, match="order = 'random'; valid names: printed, undelayed, sequential"):
+        Cruse1998(HWS.weights, order="random")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="expected Symmetric or Weights"):
+        Cruse1998("hws")  # pyright: ignore[reportArgumentType]
 
 
 def test_weights_copy_their_input():
     matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    general = Weights(**matrices)
+    weights = Weights(**matrices)
     matrices["p1"][0, 1] = 3.0
-    assert not general.p1.any()
+    assert not weights.p1.any()
 
 
 @pytest.mark.parametrize(
@@ -166,18 +188,22 @@ def test_each_of_our_own_sets_names_the_command_that_found_it():
     for name, entry in table.items():
         program, what, *words = shlex.split(entry["command"])
         if program == "python":
-            built = runpy.run_path(str(OWN.parents[1] / what))["coupled"]()
-            assert np.array_equal(weights(PRESETS[name]).to_vector(), built.to_vector())
+            built = runpy.run_path(str(ROOT / what))["coupled"]()
+            assert np.array_equal(general(PRESETS[name].weights).to_vector(), built.to_vector())
             continue
         assert "--seed" in words
         single = name[-1].isdigit()
         at = words.index("--velocity" if single else "--velocities") + 1
         assert words[at : at + 2 - single] == ([name.removeprefix("own-")] if single else ["0.1", "0.5"])
-        assert weights(load_model(words[words.index("--begin") + 1])).p1.any()
+        begun = load_controller(words[words.index("--begin") + 1])
+        assert isinstance(begun, Cruse1998)
+        assert general(begun.weights).p1.any()
 
 
-@pytest.mark.parametrize("model", [LDVS, Weights.from_vector(np.random.default_rng(1).integers(0, 2, 58))])
-def test_a_written_model_is_read_to_the_same_bits(model, tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(model_toml(model))
-    assert np.array_equal(weights(load_model(str(path))).to_vector(), weights(model).to_vector())
+@pytest.mark.parametrize("weights", [LDVS.weights, Weights.from_vector(np.random.default_rng(1).integers(0, 2, 58))])
+def test_written_weights_are_read_to_the_same_bits(weights, tmp_path):
+    path = tmp_path / "weights.toml"
+    path.write_text(weights_toml(weights))
+    read = load_controller(str(path))
+    assert isinstance(read, Cruse1998)
+    assert np.array_equal(general(read.weights).to_vector(), general(weights).to_vector())

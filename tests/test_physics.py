@@ -1,27 +1,42 @@
 """Laws of the physical walks: they do not depend on threads or batch, and tend to the plan as V_p falls."""
 
+import re
+from collections.abc import Generator
+from contextlib import chdir
+from time import perf_counter, sleep
+from typing import cast
+
 import mujoco
 import numpy as np
 import pytest
-from mujoco.batch import Batch
 from numba import cfunc
 from numpy.testing import assert_allclose
 
-from hexmj.comparison import compare, physical_flss
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
+from hexmj.controllers.losses import begin
+from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import NetworkRun
-from hexmj.parameters import LDVS, UNCOORDINATED, Network
-from hexmj.physics import insect
-from hexmj.physics.body import Body
-from hexmj.physics.divergence import raise_if_diverged, replay
+from hexmj.measures.compare import compare, physical_flss
+from hexmj.measures.physical import physical_outcomes, physical_walk
+from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.clock import stopped_clock
+from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import Push, drive
-from hexmj.physics.measurement import Outcomes
-from hexmj.physics.physical_walks import physical_outcomes, physical_walk
-from hexmj.physics.settling import settle
+from hexmj.physics.outcomes import Outcomes
+from hexmj.physics.settling import Settled, settle
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
 
 OUTCOMES = tuple(Outcomes.__dataclass_fields__)
+
+
+def velocities(settled: Settled) -> np.ndarray:
+    """Of the starts as they settled, (start, velocity), to be written to."""
+    model = settled.compiled.model
+    return settled.state[:, model.nq : model.nq + model.nv]
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +50,9 @@ def walked():
 
 
 def test_settled_starts_stand_still_on_six_feet(settled):
-    assert np.linalg.norm(settled.qvel[:, :3], axis=1).max() < 5.0
+    assert np.linalg.norm(velocities(settled)[:, :3], axis=1).max() < 5.0
     assert (settled.qpos[:, 2] > 9.0).all()
-    first = next(iter(drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 10.0)))
+    first = next(iter(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 10.0)))
     assert first.standing[:, 0].all()
 
 
@@ -65,33 +80,55 @@ def test_measured_tips_follow_the_plan(walked):
     assert walked.outcomes.saturation.max() < 0.02
 
 
-def test_mujocos_clock_stops_only_while_insects_walk(settled):
+def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
     assert mujoco.get_mjcb_time() is None
-    for _ in drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 4.0):
+    with stopped_clock():
         assert mujoco.get_mjcb_time() is not None
     assert mujoco.get_mjcb_time() is None
+    list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
+    assert mujoco.get_mjcb_time() is None
+
+
+def test_a_clock_of_the_users_own_goes_on(settled):
     mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
     try:
-        list(drive(settled, NetworkRun(settled.starts, LDVS, 0.3), 4.0))
+        for _ in drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0):
+            assert mujoco.get_mjcb_time() is ours
         assert mujoco.get_mjcb_time() is ours
     finally:
         mujoco.set_mjcb_time(None)
 
 
-@pytest.mark.parametrize("body", [Body(friction=0.0), Body(friction=0.0, vp=400.0)])
-def test_a_push_gives_the_momentum_asked_for(body):
+@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
+@pytest.mark.parametrize("waits", [False, True], ids=["closes it", "keeps it"])
+def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller, waits):
+    """After the first chunk; the one that is being stepped meanwhile ends, and nothing goes on."""
+    walking = drive(settled, begin(controller, settled.starts, 0.3, settled.stride), 40.0)
+    next(walking)
+    if waits:
+        give_up, running = perf_counter() + 20.0, 0
+        while running < 100:  # a chunk is stepped in several batches, and the clock runs between them
+            running = 0 if mujoco.get_mjcb_time() else running + 1
+            assert perf_counter() < give_up
+            sleep(0.005)
+    cast(Generator, walking).close()
+    assert mujoco.get_mjcb_time() is None
+
+
+@pytest.mark.parametrize("vp", [80.0, 400.0])
+def test_a_push_gives_the_momentum_asked_for(vp):
     """Without friction the ground holds nothing back: the whole insect moves aside by impulse over mass."""
-    settled = settle(draw_starts(3, 0), body)
+    settled = settle(draw_starts(3, 0), Conditions.of(friction=0.0, vp=vp))
     speed = []
     for impulse in (0.0, 30.0):
         push = Push(np.array([impulse, -impulse, impulse]), np.array([2.0, 2.0, 1e9]))
-        plan = NetworkRun(settled.starts, UNCOORDINATED, 0.0)
-        centre = insect.sensors(settled.mujoco_model).centre_of_mass
+        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
+        centre = settled.compiled.columns.centre_of_mass
         y = np.concatenate(
-            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * body.vp, push=push)], axis=1
+            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * vp, push=push)], axis=1
         )
-        speed.append((y[:, -1] - y[:, -40]) / 39 / settled.mujoco_model.opt.timestep)  # mm/s
-    assert_allclose((speed[1] - speed[0])[:2] * insect.MASS, [30.0, -30.0], rtol=0.02)
+        speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
+    assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
     assert speed[1][2] == speed[0][2]
 
 
@@ -99,21 +136,23 @@ def test_a_push_lasts_as_long_whatever_the_physics_step():
     """So standing insects slide as far, by 30 mm; a quarter of the step changes that by 3 %, so by less than 5."""
     slid = []
     for longest in (0.625, 0.15625):
-        settled = settle(draw_starts(3, 0), Body(longest_substep=longest))
+        settled = settle(draw_starts(3, 0), Conditions.of(longest_substep=longest))
         push = Push(np.full(3, 800.0), np.full(3, 2.0))
-        y = [
-            one.qpos[:, -1, 1] for one in drive(settled, NetworkRun(settled.starts, UNCOORDINATED, 0.0), 8.0, push=push)
-        ]
-        slid.append(y[-1])
+        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
+        *_, last = drive(settled, plan, 8.0, push=push)
+        slid.append(last.qpos[:, -1, 1])
     assert_allclose(slid[1], slid[0], rtol=0.05)
 
 
 def test_every_bounce_counts_without_a_contact_gap():
     """Measured stability is stricter the shorter the gap; what the body does is the same."""
-    gaps = [physical_outcomes(settle(draw_starts(20, 0), Body(contact_gap=ms)), LDVS, 0.5, 40.0) for ms in (0.0, 10.0)]
-    assert np.array_equal(gaps[0].fall, gaps[1].fall)
-    assert (gaps[0].measured_loss <= gaps[1].measured_loss).all()
-    assert np.isfinite(gaps[0].measured_loss).sum() > np.isfinite(gaps[1].measured_loss).sum()
+    every, usual = (
+        physical_outcomes(settle(draw_starts(20, 0), Conditions.of(contact_gap=ms)), LDVS, 0.5, 40.0)
+        for ms in (0.0, 10.0)
+    )
+    assert np.array_equal(every.fall, usual.fall)
+    assert (every.measured_loss <= usual.measured_loss).all()
+    assert np.isfinite(every.measured_loss).sum() > np.isfinite(usual.measured_loss).sum()
 
 
 def test_nothing_is_measured_after_a_fall():
@@ -125,13 +164,13 @@ def test_nothing_is_measured_after_a_fall():
         assert np.isnan(walked.measured.x[over, start]).all()
         assert not walked.measured.stance[over, start].any()
         assert np.isfinite(walked.measured.x[~over, start]).all()
-        assert insect.TRUNK[walked.outcomes.fall_part[start]]
+        assert walked.outcomes.fall_part[start] in range(len(STICK_INSECT.trunk))
     assert (walked.outcomes.clearance < 0.01).all()
 
 
 def test_speed_keeps_to_the_command():
     """0.95 to 1.05 of the commanded speed over the window `walk` where the start did not fall."""
-    result = compare(LDVS, [0.3, 0.5], starts=40)
+    result = compare(LDVS, [0.3, 0.5], n_starts=40)
     speed = result.speed.where(np.isinf(result.fall)).values
     speed = speed[np.isfinite(speed)]
     assert len(speed) > 30
@@ -140,7 +179,7 @@ def test_speed_keeps_to_the_command():
 
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
-    result = compare(LDVS, [0.3, 0.5, 0.8], starts=100, body=Body(vp=20.0))
+    result = compare(LDVS, [0.3, 0.5, 0.8], n_starts=100, conditions=Conditions.of(vp=20.0))
     assert (abs(result.kinematic - result.physical) <= 0.06).all()
     assert (result.agreement >= 0.88).all()
 
@@ -156,58 +195,80 @@ def test_mirrored_starts_give_mirrored_outcomes():
 
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
     with pytest.raises(SimulationError, match="start 0 did not settle in 1 ms"):
-        settle(draw_starts(2, 0), Body(settling_time=1.0))
+        settle(draw_starts(2, 0), Conditions.of(settling_time=1.0))
 
 
-def test_a_diverged_simulation_is_an_error_with_a_state_to_replay(settled, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def diverged(tmp_path_factory) -> SimulationError:
+    """Of a walk whose start 1 is too fast from the beginning."""
     broken = settle(draw_starts(3, 0))
-    broken.qvel[1] = 1e12
-    with pytest.raises(
-        SimulationError, match=r"start 1 diverged while walking at V = 0.3, at 0 time units: mjWARN_\w+"
-    ) as error:
-        list(drive(broken, NetworkRun(broken.starts, LDVS, 0.3), 10.0))
-    path = tmp_path / "diverged-start-1.npz"
-    assert str(path) in str(error.value)
+    velocities(broken)[1] = 1e12
+    with chdir(tmp_path_factory.mktemp("log")), pytest.raises(SimulationError) as error:  # MuJoCo writes its own log
+        list(drive(broken, begin(LDVS, broken.starts, 0.3, broken.stride), 10.0))
+    return error.value
+
+
+def test_a_diverged_simulation_is_an_error_with_its_last_good_state(diverged, settled):
+    text = r"start 1 diverged while walking at V = 0.3, at 0 time units: mjWARN_\w+"
+    assert re.fullmatch(text, str(diverged))
+    assert diverged.file_name == "diverged-start-1.npz"
+    assert (diverged.state["qvel"] == 1e12).all()
+    assert np.array_equal(diverged.state["qpos"], settled.qpos[1])
+
+
+def test_its_state_is_written_into_the_folder_given_and_nowhere_else(diverged, settled, tmp_path, monkeypatch):
+    (here := tmp_path / "here").mkdir()
+    monkeypatch.chdir(here)
+    path = save_state(diverged, tmp_path / "results" / "states")
+    assert path == tmp_path / "results" / "states" / "diverged-start-1.npz"
+    assert not list(here.iterdir())
     model, data = replay(path)
     assert data.qvel[0] == 1e12
-    assert model.opt.timestep == broken.mujoco_model.opt.timestep
+    assert model.opt.timestep == settled.compiled.model.opt.timestep
     data.ctrl[:] = np.load(path)["ctrl"][0]
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
     mujoco.mj_step(model, data)
     assert data.warning.number.any()
 
 
-def test_a_state_to_replay_has_the_step_the_contacts_and_the_push_of_its_roll(settled, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    batch = Batch(settled.mujoco_model, 2, 1)
-    batch.expand("opt.timestep")[1], batch.expand("pair_solref")[1, :, 0] = 1e-4, 2e-4
-    batch.bind("xfrc_applied")[1, 1, 1] = 7.0
-    batch.bind("qpos")[1] = np.nan
-    state = {"qpos": settled.qpos, "qvel": settled.qvel, "qacc_warmstart": settled.warmstart}
-    with pytest.raises(SimulationError, match=r"start 1 diverged while walking at V = 0.3, at 4 time units: .* finite"):
-        raise_if_diverged(batch, np.arange(2), 4.0, np.full(2, 0.3), state)
-    model, data = replay(tmp_path / "diverged-start-1.npz")
-    assert model.opt.timestep == 1e-4
-    assert (model.pair_solref[:, 0] == 2e-4).all()
-    assert np.array_equal(data.qpos, settled.qpos[1])
-    assert data.xfrc_applied[1, 1] == 7.0
-    assert insect.body_of(model) == settled.body
+def test_a_diverged_state_goes_on_as_it_did(tmp_path, monkeypatch):
+    """With the time step, the contacts and the push of its own roll, fine as it may be, and its conditions."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
+    conditions = Conditions.of(load=1.0, grasp=0.5, friction=0.7)
+    two = settle(draw_starts(2, 0), conditions)
+    batch, ids = MujocoBatch(two.compiled, 2, 1), np.arange(2)
+    batch.put(ids, two.state)
+    batch.push[1] = 7.0
+    batch.qvel[1] = 1e12
+    with pytest.raises(Diverged) as error:
+        batch.roll(ids, two.ctrl[:, np.newaxis].repeat(4, axis=1), parts=4)
+    assert error.value.start == 1
+    path = save_state(walk_error(error.value, "resting", 0.0, conditions), tmp_path)
+    model, data = replay(path)
+    step = two.compiled.model.opt.timestep / 4
+    assert model.opt.timestep == step
+    assert (model.pair_solref[:, 0] == 2 * step).all()
+    assert (model.pair_friction[:, 0] == 0.7).all()
+    assert model.body_mass.sum() == pytest.approx(2.0, rel=1e-4)
+    assert np.array_equal(data.qpos, two.qpos[1])
+    assert data.xfrc_applied[two.compiled.root, 1] == 7.0
+    assert np.load(path)["ctrl"].shape == (4, model.nu)
 
 
 def test_starts_out_of_reach_are_refused():
     with pytest.raises(InputError, match="start 0, leg 1: the tip at -30 mm is out of reach"):
-        settle(np.full((1, 6), -30.0), network=Network(pep_min=-30.0))
+        settle(np.full((1, 6), -30.0), stride=Stride(pep_min=-30.0))
 
 
 def test_targets_out_of_reach_are_counted():
-    low = Body(standing_height=7.0, step_height=14.0)
+    low = Conditions.of(standing_height=7.0, step_height=14.0)
     outcomes = physical_outcomes(settle(draw_starts(4, 0), low), LDVS, 0.5, 40.0)
     assert outcomes.unreachable.sum() > 0
 
 
 def test_comparison_holds_every_answer():
-    result = compare({"a": LDVS, "b": UNCOORDINATED}, [0.3, 0.6], starts=20, window="start")
-    assert result.sizes == {"model": 2, "velocity": 2, "start": 20, "leg": 6}
+    result = compare({"a": LDVS, "b": UNCOORDINATED}, [0.3, 0.6], n_starts=20, window="start")
+    assert result.sizes == {"controller": 2, "velocity": 2, "start": 20, "leg": 6}
     total = result.both + result.only_kinematic + result.only_physical + result.none
     assert (total == 20).all()
     assert np.allclose(result.agreement, (result.both + result.none) / 20)
@@ -217,5 +278,7 @@ def test_comparison_holds_every_answer():
 
 def test_halving_the_physics_step_hardly_changes_physical_flss():
     """Measured with 200 starts at V = 0.3, 0.5, 0.7: 0.155, 0.365, 0.690 became 0.160, 0.365, 0.695."""
-    coarse, fine = (physical_flss(LDVS, [0.5], body=Body(longest_substep=ms)).flss.item() for ms in (0.625, 0.3125))
+    coarse, fine = (
+        physical_flss(LDVS, [0.5], conditions=Conditions.of(longest_substep=ms)).flss.item() for ms in (0.625, 0.3125)
+    )
     assert abs(coarse - fine) <= 0.02

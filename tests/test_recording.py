@@ -1,23 +1,30 @@
 """Recordings of the physical insect and of puppets, and the files that they make."""
 
 import json
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose
 
+from hexmj.bodies.description import ROOT_QPOS
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.film.take import Take
 from hexmj.legs import FIG1
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import walk
-from hexmj.parameters import LDVS, UNCOORDINATED, Network
-from hexmj.physics import insect
-from hexmj.physics.body import Body
-from hexmj.physics.kinematics import joints_to_tips
-from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
-from hexmj.recording import load_recording, record, record_plan, save_recording
+from hexmj.measures.kinematic import walk
+from hexmj.measures.physical import PhysicalWalk, physical_walk, physical_walk_of_plan
+from hexmj.physics.settling import settle
+from hexmj.replay.recording import load_recording, record, record_plan, recorded_conditions, save_recording
+from hexmj.replay.take import Take
+from hexmj.rotations import rotated
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
+from hexmj.walks import PlannedWalk, one_start, part_of
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +53,7 @@ def test_a_recording_is_read_lazily(walked, tmp_path):
 def test_a_recording_comes_back_from_its_file(walked, fallen, tmp_path):
     for recording in (
         record(walked, fallen, "a fall"),
-        record_plan(walked.planned, walked.body, walked.network),
+        record_plan(walked.planned, walked.conditions, walked.stride),
     ):
         path = save_recording(recording, tmp_path / "recording.nc")
         with load_recording(path) as loaded:
@@ -60,7 +67,7 @@ def test_every_variable_says_what_it_is(walked):
         assert set(recording[name].attrs) == {"units", "long_name"}, name
     attributes = json.loads(json.dumps(recording.attrs))
     assert attributes["title"] == "one"
-    assert {"vp", "step_height", "friction", "dt", "order", "origins"} <= set(attributes)
+    assert {"vp", "step_height", "friction", "dt", "origins"} <= set(attributes)
 
 
 def test_what_was_measured_is_recorded_until_the_fall(walked, fallen):
@@ -69,7 +76,7 @@ def test_what_was_measured_is_recorded_until_the_fall(walked, fallen):
     assert recording.fall_part == outcomes.fall_part[fallen]
     lost = recording.measured_margin <= 0
     assert recording.time[int(np.argmax(lost.values))] == recording.measured_loss_time
-    after = recording.time.values >= outcomes.fall[fallen] + walked.network.dt
+    after = recording.time.values >= outcomes.fall[fallen] + walked.stride.dt
     assert after.any()
     for name in ("measured_x", "measured_margin", "qpos", "centre_of_mass", "planned_tip"):
         values = recording[name].values.reshape(len(after), -1)
@@ -81,51 +88,95 @@ def test_what_was_measured_is_recorded_until_the_fall(walked, fallen):
 def test_a_film_shows_the_feet_where_the_insect_has_them(walked, fallen):
     """Positions seen from the body, turned back into the world, against MuJoCo's own."""
     take = Take.of(record(walked, fallen))
-    model = insect.load()
+    model = compile_body(Conditions()).model
     data = mujoco.MjData(model)
     for row in range(0, len(take.qpos), 10):
         data.qpos[:] = take.qpos[row]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        feet = [data.site(f"{leg}_foot").xpos[:2] for leg in ("L1", "L2", "L3", "R1", "R2", "R3")]
-        np.testing.assert_allclose(take.feet[row], feet, atol=1e-9)
-        np.testing.assert_allclose(take.centre_of_mass[row], data.subtree_com[1], atol=1e-9)
+        feet = [data.site(foot).xpos[:2] for foot in STICK_INSECT.feet]
+        assert_allclose(take.feet[row], feet, atol=1e-9)
+        assert_allclose(take.centre_of_mass[row], data.subtree_com[1], atol=1e-9)
+
+
+def tips_of(recording: xr.Dataset) -> np.ndarray:
+    """Where the recorded joints put the tips in the root frame, (step, leg, axis) [mm]."""
+    return compile_body(Conditions()).forward(recording.qpos.values[:, ROOT_QPOS:].reshape(-1, 6, 3))
 
 
 def test_a_puppet_puts_its_tips_where_they_are_planned():
-    network, body = Network(), Body()
+    stride, conditions = Stride(), Conditions()
+    height, radius = conditions.path.standing_height, compile_body(conditions).foot_radius
     plan = walk(draw_starts(2, seed=3), LDVS, 0.4, 40.0)
-    recording = record_plan(plan, body, network, start=1)
-    root = recording.qpos.values[:, : insect.ROOT_QPOS]
-    legs = insect.dimensions(insect.load())
-    tips = joints_to_tips(recording.qpos.values[:, insect.ROOT_QPOS :].reshape(-1, 6, 3), legs)
-    np.testing.assert_allclose(root[:, None, :3] + tips, recording.planned_tip, atol=1e-9)
-    np.testing.assert_allclose(tips[..., 0], plan.x[:, 1] + FIG1.origin, atol=1e-9)
-    np.testing.assert_allclose(tips[..., 1], plan.y[:, 1], atol=1e-9)
-    lift = recording.planned_tip.values[..., 2] - legs.foot
+    recording = record_plan(plan, conditions, stride, start=1)
+    root, tips = recording.qpos.values[:, :ROOT_QPOS], tips_of(recording)
+    assert_allclose(root[:, None, :3] + tips, recording.planned_tip, atol=1e-9)
+    assert_allclose(tips[..., 0], plan.x[:, 1] + FIG1.origin, atol=1e-9)
+    assert_allclose(tips[..., 1], plan.y[:, 1], atol=1e-9)
+    lift = recording.planned_tip.values[..., 2] - radius
     assert lift.min() == pytest.approx(0.0, abs=1e-9)
-    assert lift.max() == pytest.approx(body.step_height)
-    np.testing.assert_allclose(np.diff(root[:, 0]), 0.4 * network.dt)
-    assert (root[:, 2] == body.standing_height + legs.foot).all()
+    assert lift.max() == pytest.approx(conditions.path.step_height)
+    assert_allclose(np.diff(root[:, 0]), 0.4 * stride.dt)
+    assert (root[:, 2] == height + radius).all()
     stands = recording.planned_stance.values
     stays = stands[1:] & stands[:-1]
     assert np.abs(np.diff(recording.planned_tip.values[..., 0], axis=0)[stays]).max() < 1e-9
     assert "measured_x" not in recording
 
 
+def swung_aside(plan: PlannedWalk) -> PlannedWalk:
+    """The same walk with every tip beside its line, and swinging feet raised to heights of the plan's own."""
+    out = np.sign(plan.y) * (1.0 + 0.1 * plan.x)
+    return replace(plan, y=plan.y + out, height=np.where(plan.stance, 0.0, 3.0 + 0.2 * np.abs(plan.x)))
+
+
+def test_tips_beside_their_lines_and_heights_of_their_own_are_recorded():
+    """Of a puppet and of the insect alike: what the plan asks for, not what the body would make of it."""
+    starts, stride, conditions = draw_starts(2, seed=3), Stride(), Conditions()
+    plan = swung_aside(walk(starts, LDVS, 0.3, 30.0))
+    recording = record_plan(plan, conditions, stride, start=1)
+    tips, wanted = tips_of(recording), one_start(plan, 1)
+    assert_allclose(tips[..., 0], wanted.feet[:, 0, :, 0], atol=1e-9)
+    assert_allclose(tips[..., 1], wanted.y[:, 0], atol=1e-9)
+    assert_allclose(tips[..., 2] + conditions.path.standing_height, wanted.height[:, 0], atol=1e-9)
+    assert (np.abs(wanted.y[:, 0] - FIG1.y) > 0.5).mean() > 0.5
+    settled = settle(starts, conditions, stride)
+    walked = physical_walk_of_plan(settled, Given(settled.starts, stride, plan), plan)
+    assert np.isinf(walked.outcomes.fall[1])
+    physical = record(walked, 1)
+    root = physical.qpos.values[:, :ROOT_QPOS]
+    turned = root[:, None, :3] + rotated(root[:, None, 3:7], tips)
+    assert_allclose(physical.planned_tip, turned, atol=1e-9)
+    assert_allclose(physical.planned_y, wanted.y[:, 0])
+    # The insect does it: its feet are nearer to where the plan has them than to their lines.
+    feet, stands = tips_of(physical), physical.measured_stance.values & wanted.stance[:, 0]
+    off_plan, off_line = np.abs(feet[..., 1] - wanted.y[:, 0])[stands], np.abs(feet[..., 1] - FIG1.y)[stands]
+    assert off_plan.mean() < 0.5 * off_line.mean()
+
+
+class Given:
+    """A plan that is known from its begin to its end."""
+
+    def __init__(self, starts: np.ndarray, stride: Stride, whole: PlannedWalk) -> None:
+        self.starts, self.stride, self.done, self._whole = starts, stride, 0, whole
+
+    def advance(self, steps: int) -> PlannedWalk:
+        self.done += steps
+        return part_of(self._whole, slice(self.done - steps, self.done))
+
+
 def test_a_leg_of_a_puppet_that_is_out_of_reach_keeps_its_angles():
-    body = Body(standing_height=5.0, step_height=14.0)
-    plan = walk(draw_starts(1, seed=3), LDVS, 0.4, 40.0)
-    recording = record_plan(plan, body, Network())
-    joints = recording.qpos.values[:, insect.ROOT_QPOS :].reshape(-1, 6, 3)
-    tips = joints_to_tips(joints, insect.dimensions(insect.load())) + recording.qpos.values[:, None, :3]
+    conditions = Conditions.of(standing_height=5.0, step_height=14.0)
+    recording = record_plan(walk(draw_starts(1, seed=3), LDVS, 0.4, 40.0), conditions, Stride())
+    joints = recording.qpos.values[:, ROOT_QPOS:].reshape(-1, 6, 3)
+    tips = tips_of(recording) + recording.qpos.values[:, None, :3]
     off = np.abs(tips - recording.planned_tip.values).max(axis=-1) > 1e-6
     assert off.any()
     assert not off.all()
     assert (np.diff(joints, axis=0)[off[1:]] == 0).all()
-    far = Network(pep_min=-40.0)
+    far = Stride(pep_min=-40.0)
     with pytest.raises(InputError, match="cannot reach its tip at time 0"):
-        record_plan(walk(np.full((1, 6), -40.0), LDVS, 0.4, 1.0, network=far), Body(), far)
+        record_plan(walk(np.full((1, 6), -40.0), LDVS, 0.4, 1.0, stride=far), Conditions(), far)
 
 
 def test_files_that_are_no_recordings(walked, tmp_path):
@@ -139,11 +190,21 @@ def test_files_that_are_no_recordings(walked, tmp_path):
         tmp_path / "nothing.nc": "is no file; expected a recording",
         other: "missing: .*planned_x.*qpos.*attribute title",
         part: "missing: fall_time, attribute title",
-        short: "no recording of this insect, with 6 legs",
+        short: "no recording of a body with 6 legs",
     }.items():
         with pytest.raises(InputError, match=said) as error:
             load_recording(path)
         assert str(path) in str(error.value)
+
+
+def test_a_recording_of_another_body_is_not_taken_for_ours(walked):
+    other = replace(STICK_INSECT, name="another")
+    recording = record(walked)
+    assert recorded_conditions(recording) == walked.conditions
+    with pytest.raises(InputError, match="is of the body 'stick_insect', not of 'another'"):
+        recorded_conditions(recording, other)
+    with pytest.raises(InputError, match="has 24 positions; expected 25"):
+        recorded_conditions(recording.isel(position=slice(24)))
 
 
 @pytest.mark.parametrize("start", [-1, 3])
@@ -151,4 +212,4 @@ def test_starts_that_do_not_exist(walked, start):
     with pytest.raises(InputError, match=f"start = {start}; expected 0 to 2"):
         record(walked, start)
     with pytest.raises(InputError, match=f"start = {start}; expected 0 to 2"):
-        record_plan(walked.planned, walked.body, walked.network, start)
+        record_plan(walked.planned, walked.conditions, walked.stride, start)

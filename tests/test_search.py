@@ -1,33 +1,35 @@
 """The search: laws of the paper's evolutionary algorithm, known minima, resuming, and what a damaged file does."""
 
 import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hexmj
+from hexmj import FieldsForm, NetworkForm, Problem
+from hexmj.controllers import Step, stepwise
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
-from hexmj.search import history as search_history
 from hexmj.search.convergence import convergence_figure
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import SIGMA, Evolution, mutated, selection_probabilities
-from hexmj.search.forms import FORMS, Form
-from hexmj.search.history import History
-from hexmj.search.problems import Problem, Sample
-from hexmj.search.stages import Plan, refine, run, search
+from hexmj.search.network_forms import FORMS
+from hexmj.search.problems import Sample
+from hexmj.search.stages import Effort, refine, run, search
 
 TARGET = np.array([3.0, -2.0, 0.0, 6.0, 0.5, 1.0])
 """Where the test cost is least: real numbers but for parameters 2 (0) and 5 (1), which are binary."""
 BINARY = np.array([False, False, True, False, False, True])
 DOMAIN = Domain(np.where(BINARY, 0.0, -10.0), np.where(BINARY, 1.0, 10.0), BINARY)
 
-PROBLEM = Problem("hws", 0.5, 0.5, window="start")
-PLAN = Plan(budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
+HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
+PROBLEM = Problem(HWS, 0.5, 0.5, window="start")
+EFFORT = Effort(budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
 
 costs_of_a_population = st.lists(st.floats(0.0, 1.0), min_size=2, max_size=20).map(np.array)
 
@@ -150,66 +152,122 @@ def test_cma_es_begins_anew_once_it_has_converged():
 
 
 @pytest.mark.parametrize("window", ["walk", "start", 30.0])
-def test_the_cost_is_the_flss_of_the_same_starts(window):
-    cases: list[tuple[Form, hexmj.Symmetric, np.ndarray]] = [
-        ("hws", hexmj.HWS, hexmj.HWS.to_vector(9)),
-        ("ldvs", hexmj.LDVS, hexmj.LDVS.to_vector(10)),
-        ("mirrored", hexmj.LDVS, FORMS["mirrored"].vector(hexmj.LDVS)),
-        ("general", hexmj.LDVS, FORMS["general"].vector(hexmj.LDVS)),
-    ]
-    for form, model, vector in cases:
-        one = Sample.draw(Problem(form, 0.4, 0.4, window), 300, 5)
-        expected = hexmj.flss(model, [0.4], starts=300, window=window, seed=5).flss.item()
+@pytest.mark.parametrize("order", ["printed", "sequential"])
+def test_the_cost_is_the_flss_of_the_same_starts(window, order):
+    for name in FORMS:
+        preset = hexmj.HWS if name == "hws" else hexmj.LDVS
+        form, controller = NetworkForm(name, order), hexmj.Cruse1998(preset.weights, order)
+        vector = form.vector(controller)
+        one = Sample(Problem(form, 0.4, 0.4, window), 300, 5)
+        expected = hexmj.flss(controller, [0.4], n_starts=300, window=window, seed=5).flss.item()
         assert one.costs(vector[None]) == [expected]
-        some = Sample.draw(Problem(form, 0.2, 0.6, window), 300, 5)
-        expected, _ = hexmj.flss_over_range(model, 0.2, 0.6, starts=300, window=window, seed=5)
+        some = Sample(Problem(form, 0.2, 0.6, window), 300, 5)
+        expected, _ = hexmj.flss_over_range(controller, 0.2, 0.6, n_starts=300, window=window, seed=5)
         assert some.costs(vector[None]) == [expected]
-        verdict = some.verdict({"model": model})
-        assert verdict.flss.sel(model="model", window=str(window)) == expected
+        verdict = some.verdict({"one": controller})
+        assert verdict.flss.sel(controller="one", window=str(window)) == expected
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_forms_are_what_their_names_say(form):
-    """Vectors and models turn into each other, and both sides are alike in every form but the general one."""
-    problem = Problem(form, 0.4, 0.4)
-    domain = problem.domain(10.0)
+@pytest.mark.parametrize("name", FORMS)
+def test_forms_are_what_their_names_say(name):
+    """Vectors and controllers turn into each other, and both sides are alike in every form but the general one."""
+    form = NetworkForm(name)
+    domain = Problem(form, 0.4, 0.4).domain(10.0)
     vector = domain.read(domain.draw(1, np.random.default_rng(3)))[0]
-    model = FORMS[form].model(vector)
-    assert len(problem.names()) == len(vector) == {"hws": 9, "ldvs": 10, "mirrored": 29, "general": 58}[form]
-    assert np.array_equal(FORMS[form].vector(model), vector)
+    controller = form.controller(vector)
+    assert len(form.names) == len(vector) == {"hws": 9, "ldvs": 10, "mirrored": 29, "general": 58}[name]
+    assert np.array_equal(form.vector(controller), vector)
     starts = hexmj.draw_starts(20, 5)
-    walked, mirrored = (hexmj.walk(one, model, 0.4, 60.0).x for one in (starts, starts[:, MIRROR]))
-    assert np.array_equal(walked[:, :, MIRROR], mirrored) == (form != "general")
+    walked, mirrored = (hexmj.walk(one, controller, 0.4, 60.0).x for one in (starts, starts[:, MIRROR]))
+    assert np.array_equal(walked[:, :, MIRROR], mirrored) == (name != "general")
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Two numbers, of which one is best at 3 and the other makes no difference: legs stand or not, all of them."""
+
+    good: float = 2.0
+    idle: float = -0.5
+    name: str = "pace"
+    legs: int = 6
+
+    def __post_init__(self) -> None:
+        if self.good < 0:
+            raise ValueError("good")
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        off, steps = abs(self.good - 3.0), 0
+
+        def step(v: np.ndarray) -> Step:
+            nonlocal steps
+            steps += 1
+            stands = np.abs(starts).sum(axis=1, keepdims=True) > 30 * off
+            return Step(starts - 1e-3 * steps, stands & np.ones(6, dtype=bool))
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+def test_the_fields_of_a_controller_are_searched():
+    """Those that are floats, from their usual values, over 0 to a multiple of them; what it refuses costs all."""
+    form = FieldsForm(Pace())
+    problem = Problem(form, 0.4, 0.4, window=5.0)
+    domain = problem.domain(4.0)
+    assert form.names == ("good", "idle")
+    assert not domain.binary.any()
+    assert (domain.low.tolist(), domain.high.tolist()) == ([0.0, -2.0], [8.0, 0.0])
+    assert domain.begin is not None and domain.begin.tolist() == [2.0, -0.5]
+    assert problem.domain(4.0, Pace(good=1.0)).begin.tolist() == [1.0, -0.5]  # pyright: ignore[reportOptionalMemberAccess]
+    assert form.controller(np.array([1.5, 0.25])) == Pace(good=1.5, idle=0.25)
+    sample = Sample(problem, 50, 0)
+    assert sample.costs(np.array([[-1.0, 0.0]])) == [1.0]
+    expected = [hexmj.flss(Pace(good=good), [0.4], n_starts=50, window=5.0).flss.item() for good in (2.0, 0.1)]
+    assert sample.costs(np.array([[2.0, 0.0], [0.1, 7.0]])).tolist() == expected
+    for algorithm in ("evolution", "cmaes"):
+        found = search(problem, Effort(algorithm, domain=2.0, starts=40, budget=60, refine_starts=60, refine_budget=30))
+        assert found.history.parameter.values.tolist() == ["good", "idle"]
+        assert found.cost == 0.0 < expected[0]
+        assert abs(found.vector[0] - 3.0) < 2.0
+
+
+def test_what_has_no_such_parameters_is_refused():
+    with pytest.raises(InputError, match="uncoordinated has no field of the type float"):
+        FieldsForm(hexmj.UNCOORDINATED)
+    with pytest.raises(InputError, match="ldvs to begin with; expected a Pace"):
+        search(Problem(FieldsForm(Pace()), 0.4, 0.4), Effort(begin=hexmj.LDVS))
+    with pytest.raises(InputError, match="pace has no weights"):
+        search(PROBLEM, Effort(begin=Pace()))
 
 
 def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
-    vectors = Problem("ldvs", 0.3, 0.6).domain(10.0).draw(5, np.random.default_rng(0))
-    vectors = Problem("ldvs", 0.3, 0.6).domain(10.0).read(vectors)
-    one, two = (Sample.draw(Problem("ldvs", 0.3, 0.6, "start"), 200, 0, threads) for threads in (1, 2))
-    costs = two.costs(vectors)
-    assert one.costs(vectors).tolist() == costs.tolist()
-    assert [two.costs(vector[None])[0] for vector in vectors] == costs.tolist()
+    domain = Problem(LDVS, 0.3, 0.6).domain(10.0)
+    vectors = domain.read(domain.draw(5, np.random.default_rng(0)))
+    sample = Sample(Problem(LDVS, 0.3, 0.6, "start"), 200, 0)
+    costs = sample.costs(vectors, threads=2)
+    assert sample.costs(vectors, threads=1).tolist() == costs.tolist()
+    assert [sample.costs(vector[None])[0] for vector in vectors] == costs.tolist()
 
 
-def test_the_physical_cost_is_the_physical_flss():
-    body = hexmj.Body(vp=200.0)
-    problem = Problem("ldvs", 0.6, 0.6, "start", body=body)
-    sample = Sample.draw(problem, 12, 0)
-    expected = hexmj.physical_flss(hexmj.LDVS, [0.6], starts=12, window="start", body=body).flss.item()
-    assert sample.costs(hexmj.LDVS.to_vector()[None]) == [expected]
+@pytest.mark.parametrize("feedback", [False, True])
+def test_the_physical_cost_is_the_physical_flss(feedback):
+    conditions = hexmj.Conditions.of(vp=200.0)
+    sample = Sample(Problem(LDVS, 0.6, 0.6, "start", conditions=conditions, feedback=feedback), 12, 0)
+    walked = hexmj.ReadsLegs(hexmj.LDVS) if feedback else hexmj.LDVS
+    how: Any = {"n_starts": 12, "conditions": conditions}
+    expected = hexmj.physical_flss(walked, [0.6], window="start", **how).flss.item()
+    assert sample.costs(LDVS.vector(hexmj.LDVS)[None]) == [expected]
     assert 0 < expected < 1
-    verdict = sample.verdict({"ldvs": hexmj.LDVS}).flss.sel(model="ldvs")
-    assert verdict.sel(window="start") == expected
-    walk = hexmj.physical_flss(hexmj.LDVS, [0.6], starts=12, window="walk", body=body).flss.item()
-    assert verdict.sel(window="walk") == walk
+    if not feedback:
+        verdict = sample.verdict({"ldvs": walked}).flss.sel(controller="ldvs")
+        assert verdict.sel(window="start") == expected
+        assert verdict.sel(window="walk") == hexmj.physical_flss(walked, [0.6], window="walk", **how).flss.item()
 
 
 def test_a_search_lowers_the_cost_and_says_what_it_did():
-    found = search(PROBLEM, PLAN)
+    found = search(PROBLEM, EFFORT)
     history = found.history
     assert set(history.stage.values.tolist()) == {0, 1}
     assert int((history.stage == 0).sum()) == 100
-    sample = Sample.draw(PROBLEM, PLAN.refine_starts, PLAN.seed)
+    sample = Sample(PROBLEM, EFFORT.refine_starts, EFFORT.seed)
     assert sample.costs(found.vector[None]) == [found.cost]
     uncoordinated = history.cost.values[0]
     first = history.isel(evaluation=np.argmax(history.stage.values == 1)).cost.item()
@@ -222,123 +280,92 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
 @pytest.mark.parametrize("stop", [0.05, 0.3, 0.7])
 def test_a_stopped_search_goes_on_to_the_same_bits(tmp_path, algorithm, stop):
-    plan = Plan(algorithm, budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
-    whole = search(PROBLEM, plan, path=tmp_path / "whole.nc")
-    gone = 0.0
+    effort = Effort(algorithm, budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
+    whole = search(PROBLEM, effort)
+    gone, asked = 0.0, []
 
     def power_cut(done: float) -> None:
         nonlocal gone
         gone += done
+        asked.append(done)
         if gone > stop:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        search(PROBLEM, plan, path=tmp_path / "broken.nc", progress=power_cut)
-    partial = xr.load_dataset(tmp_path / "broken.nc")
-    assert 0 < partial.sizes["evaluation"] < whole.history.sizes["evaluation"]
-    resumed = search(PROBLEM, plan, path=tmp_path / "broken.nc", threads=1)
-    assert resumed.replayed == partial.sizes["evaluation"]
+        search(PROBLEM, effort, folder=tmp_path, progress=power_cut)
+    resumed = search(PROBLEM, effort, folder=tmp_path, threads=1)
+    assert 0 < resumed.replayed < whole.history.sizes["evaluation"]
     assert resumed.vector.tobytes() == whole.vector.tobytes()
     assert resumed.cost == whole.cost
     assert resumed.history.identical(whole.history)
-    assert xr.load_dataset(tmp_path / "broken.nc").identical(xr.load_dataset(tmp_path / "whole.nc"))
 
 
 def test_a_finished_search_is_reported_without_an_evaluation(tmp_path, monkeypatch):
-    path = tmp_path / "history.nc"
-    whole, before = search(PROBLEM, PLAN, path=path), path.read_bytes()
-    monkeypatch.setattr(Sample, "costs", None)
-    again = search(PROBLEM, PLAN, path=path)
+    whole = search(PROBLEM, EFFORT, folder=tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def never(*_: object) -> None:
+        raise AssertionError("walked again")
+
+    monkeypatch.setattr(Sample, "_losses", never)
+    again = search(PROBLEM, EFFORT, folder=tmp_path)
     assert again.history.identical(whole.history)
-    assert again.replayed == whole.history.sizes["evaluation"]
-    assert path.read_bytes() == before
+    assert again.replayed > 0
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_the_state_is_saved_while_the_search_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr(search_history, "EVERY", 0.0)
-    history, sizes = History(tmp_path / "h.nc", list("abcdef"), {}), []
-    costs = history.recorded("population", mixed_sphere)
-
-    def seen(candidates: np.ndarray) -> np.ndarray:
-        result = costs(candidates)
-        sizes.append(xr.load_dataset(tmp_path / "h.nc").sizes["evaluation"])
-        return result
-
-    run(Evolution(DOMAIN, 10, seed=0), seen, 28)
-    assert sizes == [10, 19, 28]
-
-
-def _damage(path, how: str) -> None:
-    data = path.read_bytes()
-    if how == "cut":
-        path.write_bytes(data[: len(data) // 2])
-    elif how == "empty":
-        path.write_bytes(b"")
-    elif how == "text":
-        path.write_text("precious")
-    else:
-        history = xr.load_dataset(path)
-        history[how].values[5] += 1
-        history.to_netcdf(path, engine="h5netcdf")
-
-
-@pytest.mark.parametrize("how", ["cut", "empty", "text", "cost", "candidate", "stage"])
-def test_a_damaged_file_is_refused_and_left_alone(tmp_path, how):
-    path = tmp_path / "history.nc"
-    plan = Plan(budget=30, starts=20, refine_budget=0)
-    search(PROBLEM, plan, path=path)
-    _damage(path, how)
-    damaged = path.read_bytes()
-    with pytest.raises(InputError, match=r"history.nc is damaged"):
-        search(PROBLEM, plan, path=path)
-    assert path.read_bytes() == damaged
-
-
-def test_a_file_of_another_search_is_refused_and_left_alone(tmp_path):
-    path = tmp_path / "history.nc"
-    search(PROBLEM, Plan(budget=30, starts=20, refine_budget=0), path=path)
-    before = path.read_bytes()
-    for problem, plan, difference in (
-        (Problem("hws", 0.4, 0.5, window="start"), Plan(budget=30, starts=20, refine_budget=0), "problem.low is 0.5"),
-        (PROBLEM, Plan(budget=30, starts=21, refine_budget=0), "plan.starts is 20 there and 21 here"),
-        (Problem("ldvs", 0.5, 0.5, window="start"), Plan(budget=30, starts=20, refine_budget=0), "problem.form is hws"),
+def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(tmp_path):
+    few = Effort(budget=30, starts=20, refine_budget=0)
+    search(PROBLEM, few, folder=tmp_path)
+    (kept,) = tmp_path.iterdir()
+    before = kept.read_bytes()
+    for problem, effort in (
+        (Problem(HWS, 0.4, 0.5, window="start"), few),
+        (Problem(NetworkForm("hws", "sequential"), 0.5, 0.5, window="start"), few),
+        (PROBLEM, replace(few, starts=21)),
+        (PROBLEM, replace(few, seed=1)),
     ):
-        with pytest.raises(InputError, match=difference):
-            search(problem, plan, path=path)
-    assert path.read_bytes() == before
+        assert search(problem, effort, folder=tmp_path).replayed == 0
+    assert kept.read_bytes() == before
+    assert search(PROBLEM, replace(few, budget=60), folder=tmp_path).replayed == before.count(b"\n") - 1
+    assert kept.read_bytes().startswith(before)
 
 
-def test_a_history_whose_candidates_are_not_asked_for_is_refused(tmp_path):
-    path = tmp_path / "history.nc"
-    history = History(path, list("abcdef"), {})
-    history.recorded("population", mixed_sphere)(TARGET[None])
-    history.save()
-    before = path.read_bytes()
-    with pytest.raises(InputError, match="evaluation 0 is not what this search asks for"):
-        History(path, list("abcdef"), {}).recorded("population", mixed_sphere)(TARGET[None] + [1, 0, 0, 0, 0, 0])
-    with pytest.raises(InputError, match="evaluation 0 is not what this search asks for"):
-        History(path, list("abcdef"), {}).recorded("simplex", mixed_sphere)(TARGET[None])
-    assert path.read_bytes() == before
+def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_alone(tmp_path):
+    effort = Effort(budget=30, starts=20, refine_budget=0)
+    whole = search(PROBLEM, effort, folder=tmp_path)
+    (kept,) = tmp_path.iterdir()
+    lines = kept.read_text().splitlines(keepends=True)
+    kept.write_text("".join([*lines[:5], lines[5][:-4], *lines[6:]]))  # a damaged line is evaluated again
+    again = search(PROBLEM, effort, folder=tmp_path)
+    assert again.history.identical(whole.history)
+    assert again.replayed < len(lines) - 1
+    kept.write_text("precious")
+    with pytest.raises(InputError, match="is damaged, or of another search"):
+        search(PROBLEM, effort, folder=tmp_path)
+    assert kept.read_text() == "precious"
 
 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: Problem("hws", 0.5, 0.1), "expected 0 <= low <= high < 1"),
-        (lambda: Problem("hws", 0.5, 1.0), "expected 0 <= low <= high < 1"),
-        (lambda: Problem("hws", -0.1, 0.5), "expected 0 <= low <= high < 1"),
-        (lambda: Problem("hws", math.nan, 0.5), "expected 0 <= low <= high < 1"),
-        (lambda: Problem("hws", 0.0, 0.5), "has no period"),
-        (lambda: Problem("lvds", 0.5, 0.5), "valid names: hws, ldvs"),  # pyright: ignore[reportArgumentType]
-        (lambda: Plan(budget=0), "at least one generation, 10 evaluations"),
-        (lambda: Plan("annealing"), "valid names: evolution, cmaes"),  # pyright: ignore[reportArgumentType]
-        (lambda: Plan(refine_budget=-1), "expected 0 or more"),
-        (lambda: search(PROBLEM, Plan(population=0)), "expected at least 2 individuals"),
-        (lambda: search(PROBLEM, Plan("cmaes", population=0)), "expected at least 4 individuals"),
-        (lambda: search(PROBLEM, Plan(domain=0.0)), "domain = 0.0; expected a finite number above 0"),
-        (lambda: search(PROBLEM, Plan(starts=0)), "starts = 0; expected"),
-        (lambda: search(PROBLEM, Plan(refine_starts=0)), "starts = 0; expected"),
-        (lambda: search(PROBLEM, Plan(seed=-1)), "seed = -1; expected"),
+        (lambda: Problem(HWS, 0.5, 0.1), "expected 0 <= low <= high < 1"),
+        (lambda: Problem(HWS, 0.5, 1.0), "expected 0 <= low <= high < 1"),
+        (lambda: Problem(HWS, -0.1, 0.5), "expected 0 <= low <= high < 1"),
+        (lambda: Problem(HWS, math.nan, 0.5), "expected 0 <= low <= high < 1"),
+        (lambda: Problem(HWS, 0.0, 0.5), "has no period"),
+        (lambda: NetworkForm("lvds"), "valid names: hws, ldvs"),  # pyright: ignore[reportArgumentType]
+        (lambda: NetworkForm("hws", "x"), "valid names: printed, undelayed"),  # pyright: ignore[reportArgumentType]
+        (lambda: Problem(HWS, 0.5, 0.5, feedback=True), "feedback without conditions"),
+        (lambda: Effort(budget=0), "at least one generation, 10 evaluations"),
+        (lambda: Effort("annealing"), "valid names: evolution, cmaes"),  # pyright: ignore[reportArgumentType]
+        (lambda: Effort(refine_budget=-1), "expected 0 or more"),
+        (lambda: search(PROBLEM, Effort(population=0)), "expected at least 2 individuals"),
+        (lambda: search(PROBLEM, Effort("cmaes", population=0)), "expected at least 4 individuals"),
+        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain = 0.0; expected a finite number above 0"),
+        (lambda: search(PROBLEM, Effort(starts=0)), "starts = 0; expected"),
+        (lambda: search(PROBLEM, Effort(refine_starts=0)), "starts = 0; expected"),
+        (lambda: search(PROBLEM, Effort(seed=-1)), "seed = -1; expected"),
     ],
 )
 def test_nonsense_gets_a_sentence(make, sentence):

@@ -1,36 +1,43 @@
 """Feet never sink in: steps in which one strikes the ground are taken finely, and no others."""
 
+import pickle
+
 import mujoco
 import numpy as np
 import pytest
-from dm_control.rl import control
+from dm_control.rl.control import PhysicsError
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj import environment
-from hexmj.environment import InsectPhysics
-from hexmj.legs import LEGS
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import NetworkRun
-from hexmj.parameters import LDVS
-from hexmj.physics import insect, strikes
-from hexmj.physics.body import Body
-from hexmj.physics.drive import Push, Stretch, drive
-from hexmj.physics.ground import depth_in_ground
-from hexmj.physics.measurement import Outcomes
-from hexmj.physics.physical_walks import outcomes_of_plan
+from hexmj.bodies.grounds import depth_in_ground
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.losses import begin
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.environments import dm
+from hexmj.environments.dm import InsectPhysics
+from hexmj.measures.physical import outcomes_of_plan
+from hexmj.physics import chunks
+from hexmj.physics.backend import Diverged, Engine, Rolled
+from hexmj.physics.drive import Chunk, Push, drive
+from hexmj.physics.fine_steps import FINER, FINEST, FineSteps, in_whole_steps, strikes
+from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
+from hexmj.starts import draw_starts
 
 OBSTACLES = {
-    ground: Body(ground=ground, ground_at=45.0, ground_length=8.0, ground_height=4.0)
+    ground: Conditions.of(ground=ground, ground_at=45.0, ground_length=8.0, ground_height=4.0)
     for ground in ("flat", "step", "gap", "hurdle", "rough")
 }
-CONDITIONS = {
+CONDITIONS: dict[str, Conditions] = {
     **OBSTACLES,
-    "slow": Body(vp=20.0),
-    "fast": Body(vp=400.0),
-    "hard landing": Body(lift_time=1.0, landing_time=1.0),
-    "low": Body(standing_height=7.0),
-    "closed loop": Body(feedback=True),
+    "slow": Conditions.of(vp=20.0),
+    "fast": Conditions.of(vp=400.0),
+    "hard landing": Conditions.of(lift_time=1.0, landing_time=1.0),
+    "low": Conditions.of(standing_height=7.0),
+    "closed loop": Conditions(),
 }
 FAR = 10.0
 """Depth from which on the nearest side of an obstacle may be one that only MuJoCo knows, as its lower one [mm]."""
@@ -38,26 +45,43 @@ PUSH = 60.0
 """In multiples of m V_p, as `disturb` has it: the insect slides and tips at up to 4.8 m/s."""
 
 
-def walked(settled: Settled, velocity: float = 0.6) -> list[Stretch]:
+def walked(settled: Settled, velocity: float = 0.6) -> list[Chunk]:
     """80 time units; an obstacle is reached after 7 mm."""
-    return list(drive(settled, NetworkRun(settled.starts, LDVS, velocity), 80.0))
+    return list(drive(settled, begin(LDVS, settled.starts, velocity, settled.stride), 80.0))
 
 
-def outcomes(settled: Settled, push: float = 0.0, threads: int | None = None) -> Outcomes:
+def outcomes(
+    settled: Settled, push: float = 0.0, threads: int | None = None, controller: Controller = LDVS
+) -> Outcomes:
     """Of the same walks, pushed aside at 20 time units by a multiple of m V_p."""
     size = len(settled.starts)
-    pushed = Push(np.full(size, push * insect.MASS * settled.body.vp), np.full(size, 20.0))
-    plan = NetworkRun(settled.starts, LDVS, 0.6)
+    pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.time.vp), np.full(size, 20.0))
+    plan = begin(controller, settled.starts, 0.6, settled.stride)
     return outcomes_of_plan(settled, plan, 80.0, np.full(size, np.inf), push=pushed, threads=threads)
+
+
+def allowed(settled: Settled) -> float:
+    """How deep a foot may be: 2 % of the standing height [mm]."""
+    return 0.02 * settled.conditions.path.standing_height
+
+
+def never_finely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on no foot is ever too deep."""
+    for module in (chunks, dm):
+        monkeypatch.setattr(module, "SINK", np.inf)
+
+
+def measured(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
+    """Depth of feet in the world in the ground of some conditions [mm]."""
+    return depth_in_ground(conditions.ground, conditions.body.lengths, feet, radius)
 
 
 @pytest.mark.parametrize("ground", OBSTACLES)
 def test_depth_is_that_of_mujocos_contacts(ground):
     """The insect in random postures among the obstacles, turned and tilted; a foot without contact is above ground."""
-    body = OBSTACLES[ground]
-    model, rng = insect.load(body=body), np.random.default_rng(0)
-    data, radius = mujoco.MjData(model), insect.dimensions(model).foot
-    geoms = [model.geom(f"{leg}_foot").id for leg in LEGS]
+    compiled, rng = compile_body(OBSTACLES[ground]), np.random.default_rng(0)
+    model, data = compiled.model, mujoco.MjData(compiled.model)
+    geoms = [model.geom(foot).id for foot in STICK_INSECT.feet]
     in_contact = 0
     for _ in range(400):
         mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -70,7 +94,7 @@ def test_depth_is_that_of_mujocos_contacts(ground):
             for leg in (geoms.index(geom) for geom in contact.geom if geom in geoms):
                 found[leg] = max(found[leg], -contact.dist)
         in_contact += (found > 0).sum()
-        depth = np.maximum(depth_in_ground(body, data.geom_xpos[geoms], radius), 0.0)
+        depth = np.maximum(measured(compiled.conditions, data.geom_xpos[geoms], compiled.foot_radius), 0.0)
         far = (depth > FAR) & (found > FAR)
         assert_allclose(depth[~far], found[~far], atol=1e-6)
     assert in_contact > 200
@@ -79,18 +103,18 @@ def test_depth_is_that_of_mujocos_contacts(ground):
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_feet_never_sink_in(name, monkeypatch):
     """By 2 % of the standing height, wherever and however fast the insect walks, until it has fallen."""
-    settled, limit = settle(draw_starts(16, 4), CONDITIONS[name]), 0.02 * CONDITIONS[name].standing_height
-    assert (outcomes(settled).depth <= limit).all()
-    monkeypatch.setattr(strikes, "SINK", np.inf)
-    assert outcomes(settled).depth.max() > limit, "this test would notice nothing"
+    controller = ReadsLegs(LDVS) if name == "closed loop" else LDVS
+    settled = settle(draw_starts(16, 4), CONDITIONS[name])
+    assert (outcomes(settled, controller=controller).depth <= allowed(settled)).all()
+    never_finely(monkeypatch)
+    assert outcomes(settled, controller=controller).depth.max() > allowed(settled), "this test would notice nothing"
 
 
 def test_feet_never_sink_in_when_the_insect_is_pushed_off_them(monkeypatch):
     settled = settle(draw_starts(16, 4))
-    limit = 0.02 * settled.body.standing_height
-    assert (outcomes(settled, PUSH).depth <= limit).all()
-    monkeypatch.setattr(strikes, "SINK", np.inf)
-    assert outcomes(settled, PUSH).depth.max() > 5 * limit, "this test would notice nothing"
+    assert (outcomes(settled, PUSH).depth <= allowed(settled)).all()
+    never_finely(monkeypatch)
+    assert outcomes(settled, PUSH).depth.max() > 5 * allowed(settled), "this test would notice nothing"
 
 
 def test_fine_steps_depend_on_nothing_but_their_own_insect():
@@ -107,11 +131,11 @@ def test_a_dropped_insect_rebounds_as_from_fine_steps_and_hard_contacts_througho
 
     Measured: 16.2 mm, 16.3 mm with fine steps throughout, 17.3 mm with the usual steps alone.
     """
-    usual, fine = (settle(draw_starts(12, 4), Body(longest_substep=ms)) for ms in (0.625, 0.15625))
-    fine.mujoco_model.pair_solref[:, 0] = 2 * fine.mujoco_model.opt.timestep
+    usual, fine = (settle(draw_starts(12, 4), Conditions.of(longest_substep=ms)) for ms in (0.625, 0.15625))
+    fine.compiled.model.pair_solref[:, 0] = 2 * fine.compiled.model.opt.timestep
     struck, reference = rebound(usual), rebound(fine)
     assert struck == pytest.approx(reference, rel=0.02)
-    monkeypatch.setattr(strikes, "SINK", np.inf)
+    never_finely(monkeypatch)
     assert rebound(usual) != pytest.approx(reference, rel=0.02), "this test would notice nothing"
 
 
@@ -119,12 +143,12 @@ def rebound(settled: Settled) -> float:
     """Mean height to which the root comes back after a drop from 50 mm [mm]."""
     settled.qpos[:, 2] += 50.0
     heights = np.full((len(settled.starts), 0), np.nan)
-    for one in drive(settled, NetworkRun(settled.starts, LDVS, 0.0), 24.0):
+    for one in drive(settled, begin(LDVS, settled.starts, 0.0, settled.stride), 24.0):
         shown = np.full((len(heights), one.qpos.shape[1]), np.nan)
         shown[one.ids] = np.where(np.arange(shown.shape[1]) < one.valid[:, None], one.qpos[:, :, 2], np.nan)
         heights = np.concatenate([heights, shown], axis=1)
     settled.qpos[:, 2] -= 50.0
-    landing = round(0.2 / settled.mujoco_model.opt.timestep)
+    landing = round(0.2 / settled.compiled.model.opt.timestep)
     lowest = np.nanargmin(heights[:, :landing], axis=1)
     return float(np.mean([np.nanmax(one[i:]) for one, i in zip(heights, lowest, strict=True)]))
 
@@ -133,16 +157,16 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
     """Insects walk by the usual steps, to the last bit, until the first in which a foot would strike the ground."""
     settled = settle(draw_starts(24, 4))
     fine = walked(settled, 0.4)
-    monkeypatch.setattr(strikes, "SINK", np.inf)
+    never_finely(monkeypatch)
     usual = walked(settled, 0.4)
     monkeypatch.undo()
-    columns, m = insect.sensors(settled.mujoco_model), settled.body.substeps(settled.network)
+    columns, m = settled.compiled.columns, settled.conditions.substeps(settled.stride)
     parted = 0
     for start in np.intersect1d(fine[-1].ids, usual[-1].ids):
         one, other = (np.concatenate([x.qpos[x.ids == start][0] for x in walk]) for walk in (fine, usual))
         feet = np.concatenate([x.sensors[x.ids == start][0][:, columns.foot] for x in usual]).reshape(-1, 6, 3)
-        depth = depth_in_ground(settled.body, feet, insect.dimensions(settled.mujoco_model).foot)
-        struck = strikes.strikes(depth, m, settled.body.standing_height)
+        depth = measured(settled.conditions, feet, settled.compiled.foot_radius)
+        struck = strikes(depth, m, allowed(settled))
         first = np.argmax(struck) // m * m + 1 if struck.any() else len(one)
         assert_array_equal(one[:first], other[:first])
         assert not struck.any() or (one[first] != other[first]).any()
@@ -164,31 +188,34 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
 def test_a_step_is_fine_if_a_foot_is_too_deep_or_will_be_right_after_it(moves, struck):
     depth = np.full((2, 5, 6), -1.0)  # (start, 1 + step, leg); the limit is 0.2 mm
     depth[1, :, 4] = moves
-    assert_array_equal(strikes.strikes(depth, 2, 10.0), [4 * (False,), struck])
+    assert_array_equal(strikes(depth, 2, 0.2), [4 * (False,), struck])
 
 
 def test_forces_of_a_fine_step_are_means():
     sensors = np.arange(24.0).reshape(8, 3)  # (part, column)
-    assert_array_equal(strikes.in_whole_steps(sensors, 4, slice(1, 2)), [[0.0, 5.5, 2.0], [12.0, 17.5, 14.0]])
+    assert_array_equal(in_whole_steps(sensors, 4, slice(1, 2)), [[0.0, 5.5, 2.0], [12.0, 17.5, 14.0]])
 
 
 def thrown() -> InsectPhysics:
     """An insect thrown at the ground at 1 m/s, so that its next steps have to be fine."""
-    walking = environment.load(actions="joints")
+    walking = dm.load(actions="joints")
     walking.reset()
     walking.physics.data.qvel[2] = -1000.0
     walking.physics.forward()
     return walking.physics
 
 
-def test_a_copy_of_the_environments_physics_goes_on_the_same_way(monkeypatch):
-    """As planners need it, in fine steps too."""
+@pytest.mark.parametrize(
+    "copied", [InsectPhysics.copy, lambda one: pickle.loads(pickle.dumps(one))], ids=["copied", "pickled"]
+)
+def test_a_copy_of_the_environments_physics_goes_on_the_same_way(copied, monkeypatch):
+    """As planners need it, in fine steps too, and in another process."""
     physics = thrown()
-    copies = physics.copy(), physics.copy()
+    copies = copied(physics), copied(physics)
     physics.step(2)
     copies[0].step(2)
     assert_array_equal(copies[0].position(), physics.position())
-    monkeypatch.setattr(strikes, "SINK", np.inf)
+    never_finely(monkeypatch)
     copies[1].step(2)
     assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
 
@@ -200,16 +227,109 @@ def test_fine_steps_of_the_environment_last_no_longer():
 
 
 def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
-    physics, advance = thrown(), InsectPhysics._advance
+    physics, roll = thrown(), InsectPhysics._roll
     usual = physics.timestep(), physics.model.pair_solref.copy()
 
-    def diverge(self, rows):
-        if len(rows) > 2:
-            raise control.PhysicsError("diverged")
-        return advance(self, rows)
+    def diverge(self: InsectPhysics, control: np.ndarray) -> Rolled:
+        if len(control) > 2:
+            raise PhysicsError("diverged")
+        return roll(self, control)
 
-    monkeypatch.setattr(InsectPhysics, "_advance", diverge)
-    with pytest.raises(control.PhysicsError):
+    monkeypatch.setattr(InsectPhysics, "_roll", diverge)
+    with pytest.raises(PhysicsError):
         physics.step(2)
     assert physics.timestep() == usual[0]
     assert_array_equal(physics.model.pair_solref, usual[1])
+
+
+class PointMasses:
+    """An `Engine` of its own: feet that fall freely, on ground of any depth, with one number to control each body.
+
+    Their state is height and speed.  A control above 0 stops them at that height.
+    """
+
+    GRAVITY, STEP = -9810.0, 0.001  # mm/s^2, s
+
+    def __init__(self, height: np.ndarray, speed: np.ndarray) -> None:
+        self.now = np.stack([height, speed], axis=1)
+        self.rolled: list[tuple[list[int], int, int]] = []
+
+    def states(self, ids: np.ndarray) -> np.ndarray:
+        return self.now[ids].copy()
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        self.now[ids] = states
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
+        """Contact acts once a part has begun in the ground: what is there is put to its floor, and stays."""
+        self.rolled.append((ids.tolist(), control.shape[1], parts))
+        step = self.STEP / parts
+        feet, after, sensors = [self._feet(ids)], [], []
+        for column in control.swapaxes(0, 1):
+            height, speed = self.now[ids].T
+            stands = height <= 0.0
+            sensors.append(np.stack([np.full(len(ids), float(parts)), stands], axis=1))
+            if (column < 0).any():
+                raise Diverged(int(ids[np.argmax(column[:, 0] < 0)]), "told to", {})
+            speed = np.where(stands, 0.0, speed + self.GRAVITY * step)
+            self.now[ids] = np.stack([np.where(stands, 0.0, height + speed * step), speed], axis=1)
+            feet.append(self._feet(ids))
+            after.append(self.now[ids])
+        rows = np.array(after).swapaxes(0, 1)
+        seen = np.array(sensors).swapaxes(0, 1)
+        return Rolled(np.array(feet).swapaxes(0, 1), seen, control.copy(), rows)
+
+    def _feet(self, ids: np.ndarray) -> np.ndarray:
+        feet = np.full((len(ids), 6, 3), 100.0)
+        feet[:, 3, 2] = self.now[ids, 0]
+        return feet
+
+
+def falling(speed: list[float], steps: int = 8, control: float = 0.0) -> tuple[PointMasses, dict[str, np.ndarray]]:
+    """Bodies that begin 1 mm up, and what 8 physics steps show of them; two of these are one of the plan."""
+    engine = PointMasses(np.ones(len(speed)), np.array(speed))
+    loop = FineSteps(engine, 2, lambda feet: -feet[..., 2], 0.02, slice(1, 2))
+    return engine, loop.take(np.arange(len(speed)), np.full((len(speed), steps, 1), control))
+
+
+def test_any_engine_takes_strikes_again_finely():
+    """Masses that fall fast are taken again in parts, as many as it takes; the others by usual steps alone."""
+    engine, shown = falling([0.0, -400.0, 5000.0, -2130.0])
+    taken: Engine = engine
+    assert_array_equal(taken.states(np.array([1, 3])), 0.0)  # they lie on the ground
+    assert engine.rolled == [
+        ([0, 1, 2, 3], 8, 1),
+        ([1, 3], 8, FINER),  # one strikes, and one would right after this step of the plan
+        ([3], 32, FINER**2),
+        ([3], 128, FINEST),
+        ([1, 3], 6, 1),
+        ([1], 8, FINER),  # now it strikes
+        ([1], 32, FINER**2),
+        ([1], 4, 1),
+    ]
+    parts, force = shown["sensors"][:, :, 0], shown["sensors"][:, :, 1]
+    assert_array_equal(parts, [8 * [1], [4, 4, 16, 16, 1, 1, 1, 1], 8 * [1], [64, 64, 1, 1, 1, 1, 1, 1]])
+    assert_allclose(force[1], [0, 0, 9 / 16, 1, 1, 1, 1, 1])  # means over the parts of a step
+    assert (shown["depth"][:3] <= 0.02).all()
+    assert 0.02 < shown["depth"][3].max() <= 2140.0 * PointMasses.STEP / FINEST  # no finer than this
+    alone = PointMasses(np.ones(1), np.array([5000.0]))
+    assert_array_equal(shown["after"][2], alone.roll(np.array([0]), np.zeros((1, 8, 1))).after[0])
+
+
+def test_what_strikes_depends_on_nothing_but_itself_on_any_engine():
+    together = falling([-400.0, 0.0, -2000.0, -50.0])[1]
+    for i, speed in enumerate([-400.0, 0.0, -2000.0, -50.0]):
+        alone = falling([speed])[1]
+        for name, values in together.items():
+            assert_array_equal(alone[name][0], values[i])
+
+
+def test_a_body_that_diverges_says_from_which_step_on():
+    """That of the roll in which it did, the one that was taken again included."""
+    engine = PointMasses(np.ones(2), np.array([0.0, -400.0]))
+    loop = FineSteps(engine, 2, lambda feet: -feet[..., 2], 0.02, slice(1, 2))
+    control = np.zeros((2, 8, 1))
+    control[1, 6:] = -1.0
+    with pytest.raises(Diverged) as error:
+        loop.take(np.arange(2), control)
+    assert (error.value.start, error.value.substep) == (1, 0)

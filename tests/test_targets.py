@@ -2,87 +2,118 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
+from hexmj.controllers.losses import begin
+from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.loss_frequency import draw_starts
-from hexmj.network import NetworkRun, walk
-from hexmj.parameters import HWS, LDVS, UNCOORDINATED, Network
-from hexmj.physics.body import Body
-from hexmj.physics.targets import EVENLY, TipTargets
-from hexmj.walks import Walk
+from hexmj.measures.kinematic import walk
+from hexmj.physics.foot_path import EVENLY, TipTargets
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
+from hexmj.walks import PlannedWalk
+
+STRIDE = Stride()
+LINES = np.stack([STRIDE.geometry.origin, STRIDE.geometry.y], axis=-1)  # (leg, axis)
 
 
-def all_tips(body: Body, model=LDVS, velocity=0.6, steps=600, size=20, stretch=60):
-    """Tips of every substep, (start, substep, leg, 3), made in stretches, and the whole plan."""
-    network, starts = Network(), draw_starts(size, 0)
-    run, targets = NetworkRun(starts, model, velocity), TipTargets(starts, body, network)
-    tips = [targets.follow(run.advance(stretch), np.arange(size)) for _ in range(steps // stretch)]
-    return np.concatenate(tips, axis=1), walk(starts, model, velocity, steps * network.dt)
+def all_tips(
+    conditions: Conditions,
+    controller: Controller = LDVS,
+    velocity: float = 0.6,
+    steps: int = 600,
+    size: int = 20,
+    chunk: int = 60,
+) -> tuple[np.ndarray, PlannedWalk]:
+    """Tips of every substep, (start, substep, leg, 3), made in chunks, and the whole plan."""
+    starts = draw_starts(size, 0)
+    plan, targets = begin(controller, starts, velocity, STRIDE), TipTargets(starts, conditions, STRIDE)
+    tips = [targets.follow(plan.advance(chunk), np.arange(size)) for _ in range(steps // chunk)]
+    return np.concatenate(tips, axis=1), walk(starts, controller, velocity, steps * STRIDE.dt)
+
+
+def planned(
+    x: np.ndarray, stance: np.ndarray, y: np.ndarray | None = None, height: np.ndarray | None = None
+) -> PlannedWalk:
+    """A plan of one start, all (step, leg); on the lines and lifted by the body unless told, and no AEP is named."""
+    unknown = np.full(x.shape, np.nan)
+    rows = {
+        "x": x,
+        "y": np.broadcast_to(LINES[:, 1], x.shape) if y is None else y,
+        "stance": stance,
+        "aep": unknown,
+        "height": unknown if height is None else height,
+    }
+    whole = {name: values[:, np.newaxis] for name, values in rows.items()}
+    return PlannedWalk(STRIDE.dt * np.arange(1, len(x) + 1), np.zeros((len(x), 1)), **whole)
 
 
 @pytest.mark.parametrize("vp", [20.0, 80.0, 400.0])
-@pytest.mark.parametrize("model", [HWS, LDVS, UNCOORDINATED])
-def test_no_tip_jumps(vp, model):
+@pytest.mark.parametrize("controller", [HWS, LDVS, UNCOORDINATED], ids=lambda one: one.name)
+def test_no_tip_jumps(vp: float, controller: Controller):
     """Along its line a tip moves at most V_p; up and down at most as at a phase of 3/4, where it is steepest."""
-    body = Body(vp=vp)
-    tips, _ = all_tips(body, model)
-    seconds = body.seconds(Network()) / body.substeps(Network())
+    conditions = Conditions.of(vp=vp)
+    path = conditions.path
+    tips, _ = all_tips(conditions, controller)
+    seconds = conditions.timestep(STRIDE)
     moved = np.abs(np.diff(tips, axis=1))
     assert moved[..., 0].max() <= vp * seconds * (1 + 1e-9)
     assert moved[..., 1].max() == 0.0
     up = np.diff(tips[..., 2], axis=1)
-    steepest = (EVENLY + (1 - EVENLY) * 20 * 0.75**3 * 0.25) * body.step_height * 1000 * seconds * (1 + 1e-9)
-    assert up.max() <= steepest / body.lift_time
-    assert -up.min() <= steepest / body.landing_time
-    assert tips[..., 2].min() >= -body.standing_height
-    assert tips[..., 2].max() <= body.step_height - body.standing_height + 1e-12
+    steepest = (EVENLY + (1 - EVENLY) * 20 * 0.75**3 * 0.25) * path.step_height * 1000 * seconds * (1 + 1e-9)
+    assert up.max() <= steepest / path.lift_time
+    assert -up.min() <= steepest / path.landing_time
+    assert tips[..., 2].min() >= -path.standing_height
+    assert tips[..., 2].max() <= path.step_height - path.standing_height + 1e-12
 
 
 def test_a_foot_is_slow_where_the_ground_may_come_early():
     """Half a millimetre above the planned ground, as far as the body sags, a foot falls at less than 0.2 m/s."""
-    body = Body()
-    tips, _ = all_tips(body)
-    height = tips[..., 2] + body.standing_height
-    speed = -np.diff(height, axis=1) / (1000.0 * body.seconds(Network()) / body.substeps(Network()))  # mm/ms = m/s
+    conditions = Conditions()
+    tips, _ = all_tips(conditions)
+    height = tips[..., 2] + conditions.path.standing_height
+    speed = -np.diff(height, axis=1) / (1000.0 * conditions.timestep(STRIDE))  # mm/ms = m/s
     low = (height[:, 1:] <= 0.5) & (speed > 0)
     assert low.any()
     assert speed[low].max() < 0.2 < speed.max()
 
 
-def test_targets_at_the_network_s_steps_are_the_plan():
-    body = Body()
-    tips, plan = all_tips(body)
-    m = body.substeps(Network())
-    assert np.allclose(tips[:, m - 1 :: m, :, 0].swapaxes(0, 1), plan.feet[..., 0], atol=1e-12)
-    assert np.array_equal(tips[:, m - 1 :: m, :, 1].swapaxes(0, 1), plan.y)
+def test_targets_at_the_plans_steps_are_the_plan():
+    conditions = Conditions()
+    tips, plan = all_tips(conditions)
+    m = conditions.substeps(STRIDE)
+    assert_allclose(tips[:, m - 1 :: m, :, 0].swapaxes(0, 1), plan.feet[..., 0], rtol=0, atol=1e-12)
+    assert_array_equal(tips[:, m - 1 :: m, :, 1].swapaxes(0, 1), plan.y)
 
 
 def test_lift_takes_its_milliseconds_whatever_vp():
     """A foot is at full height exactly one lift time after its swing began, if the swing lasts that long."""
     for vp in (20.0, 50.0):
-        body = Body(vp=vp, lift_time=25.0)
-        tips, plan = all_tips(body, velocity=0.3, steps=900)
-        m, network = body.substeps(Network()), Network()
-        substep_ms = 1000.0 * body.seconds(network) / m
+        conditions = Conditions.of(vp=vp, lift_time=25.0)
+        path, m = conditions.path, conditions.substeps(STRIDE)
+        tips, plan = all_tips(conditions, velocity=0.3, steps=900)
+        substep_ms = 1000.0 * conditions.timestep(STRIDE)
         n, start, leg = np.argwhere(plan.stance[:-1] & ~plan.stance[1:])[0] + [1, 0, 0]
         rising = tips[start, (n + 1) * m :, leg, 2]
-        full = np.argmax(rising >= body.step_height - body.standing_height - 1e-9) + 1
-        assert full * substep_ms == pytest.approx(body.lift_time, abs=substep_ms)
+        full = np.argmax(rising >= path.step_height - path.standing_height - 1e-9) + 1
+        assert full * substep_ms == pytest.approx(path.lift_time, abs=substep_ms)
 
 
 @pytest.mark.parametrize("vp", [20.0, 80.0])
-def test_feet_meet_the_ground_at_their_aep(vp):
-    """Wherever a swing ends at AEP_0, within a step of the network; those that end earlier take their landing time."""
-    body, network = Body(vp=vp), Network()
-    tips, plan = all_tips(body, velocity=0.3, steps=900)
-    m = body.substeps(network)
-    height = tips[:, m - 1 :: m, :, 2].swapaxes(0, 1) + body.standing_height
+def test_feet_meet_the_ground_at_their_aep(vp: float):
+    """Wherever a swing ends at AEP_0, within a step of the plan; those that end earlier take their landing time."""
+    conditions = Conditions.of(vp=vp)
+    path, m = conditions.path, conditions.substeps(STRIDE)
+    tips, plan = all_tips(conditions, velocity=0.3, steps=900)
+    height = tips[:, m - 1 :: m, :, 2].swapaxes(0, 1) + path.standing_height
     lands = ~plan.stance[:-1] & plan.stance[1:]
-    there = lands & (plan.x[1:] >= network.aep0)
+    there = lands & (plan.x[1:] >= STRIDE.aep0)
     assert there.sum() > 100
     assert (height[1:][there] < 1e-9).all()
-    wait = int(np.ceil(body.landing_time / 1000.0 / body.seconds(network))) + 1
-    early = np.argwhere(lands[:-wait] & (plan.x[1:-wait] < network.aep0 - vp * body.landing_time / 1000.0))
+    wait = int(np.ceil(path.landing_time / 1000.0 / conditions.time.seconds(STRIDE))) + 1
+    early = np.argwhere(lands[:-wait] & (plan.x[1:-wait] < STRIDE.aep0 - path.landing_distance(conditions.time)))
     stay = [one for one in early.tolist() if plan.stance[one[0] + 1 : one[0] + 1 + wait, one[1], one[2]].all()]
     assert stay
     for step, start, leg in stay:
@@ -90,41 +121,79 @@ def test_feet_meet_the_ground_at_their_aep(vp):
 
 
 def test_a_leg_that_swings_back_is_lifted_at_once():
-    network, body, steps, one = Network(), Body(), 60, np.arange(1)
-    x, stance = np.full((steps, 1, 6), network.aep0), np.ones((steps, 1, 6), dtype=bool)
-    x[:, 0, 0] -= network.dt * np.arange(steps)
-    stance[:, 0, 0] = False
-    y = np.broadcast_to(network.geometry.y, x.shape)
-    plan = Walk(network.dt * np.arange(1, steps + 1), np.zeros((steps, 1)), x, y, stance, network.geometry)
-    height = TipTargets(x[0], body, network).follow(plan, one)[0, :, 0, 2] + body.standing_height
-    m = body.substeps(network)
-    full = 2 * m + round(body.lift_time / 1000.0 / body.seconds(network) * m)  # it swings from the first step's end
-    assert height[full - 1] == pytest.approx(body.step_height)
+    """And stays up as long as nothing tells where its swing ends."""
+    conditions, steps = Conditions(), 60
+    x, stance = np.full((steps, 6), STRIDE.aep0), np.ones((steps, 6), dtype=bool)
+    x[:, 0] -= STRIDE.dt * np.arange(steps)
+    stance[:, 0] = False
+    path, m = conditions.path, conditions.substeps(STRIDE)
+    tips = TipTargets(x[:1], conditions, STRIDE).follow(planned(x, stance), np.arange(1))
+    height = tips[0, :, 0, 2] + path.standing_height
+    full = m + round(path.lift_time / 1000.0 / conditions.timestep(STRIDE))  # it swings from the first step's end
+    assert_allclose(height[full - 1 :], path.step_height)
+
+
+@pytest.mark.parametrize(("vp", "m"), [(400.0, 1), (80.0, 2), (20.0, 8)])
+def test_a_height_of_its_own_and_a_place_beside_the_line_are_honoured(vp: float, m: int):
+    """At the end of each step they are what the plan says, between the steps they change evenly."""
+    conditions, rng, steps = Conditions.of(vp=vp), np.random.default_rng(5), 12
+    assert conditions.substeps(STRIDE) == m
+    x, aside, height = (rng.uniform(*range_, (steps, 6)) for range_ in ((-10, 10), (-4, 4), (0, 9)))
+    y, stance, start = LINES[:, 1] + aside, rng.random((steps, 6)) < 0.5, np.zeros((1, 6))
+    targets, halves = TipTargets(start, conditions, STRIDE), (slice(5), slice(5, None))
+    parts = [planned(x[half], stance[half], y[half], height[half]) for half in halves]
+    tips = np.concatenate([targets.follow(part, np.arange(1))[0] for part in parts])
+    at_steps = np.stack([x + LINES[:, 0], y, height - conditions.path.standing_height], axis=-1)
+    at_first = np.concatenate([LINES, np.full((6, 1), -conditions.path.standing_height)], axis=1)
+    whole = np.concatenate([at_first[np.newaxis], at_steps]).reshape(steps + 1, -1)
+    time = np.arange(1, steps * m + 1) / m
+    wanted = np.stack([np.interp(time, np.arange(steps + 1), one) for one in whole.T], axis=1)
+    assert_allclose(tips.reshape(steps * m, -1), wanted, rtol=0, atol=1e-12)
+    assert_allclose(tips[m - 1 :: m], at_steps, rtol=0, atol=1e-12)
+
+
+def test_the_body_goes_on_where_the_plan_names_no_height_any_more():
+    """A foot is lifted as if the plan had named none before, and the others as if it had named none at all."""
+    conditions, steps = Conditions(), 80
+    x, swings = np.tile(0.01 * np.arange(steps)[:, np.newaxis], 6), np.zeros((steps, 6), dtype=bool)
+    own = np.full((steps, 6), np.nan)
+    own[20:40, 2] = np.linspace(11.0, 3.0, 20)
+    path, m = conditions.path, conditions.substeps(STRIDE)
+    heights = []
+    for plan in (planned(x, swings), planned(x, swings, height=own)):
+        tips = TipTargets(x[:1], conditions, STRIDE).follow(plan, np.arange(1))
+        heights.append(tips[0, m - 1 :: m, :, 2] + path.standing_height)
+    usual, named = heights
+    assert usual[-1].min() == pytest.approx(path.step_height)
+    assert_allclose(named[20:40, 2], own[20:40, 2])
+    named[20:40, 2] = usual[20:40, 2]
+    assert_array_equal(named, usual)
 
 
 def test_starts_left_out_change_nothing_for_the_others():
-    network, starts, body = Network(), draw_starts(6, 1), Body()
-    whole, part = TipTargets(starts, body, network), TipTargets(starts, body, network)
-    run = NetworkRun(starts, LDVS, 0.5)
+    starts, conditions = draw_starts(6, 1), Conditions()
+    whole, part = TipTargets(starts, conditions, STRIDE), TipTargets(starts, conditions, STRIDE)
+    plan = begin(LDVS, starts, 0.5, STRIDE)
     for ids in (np.arange(6), np.array([0, 2, 5]), np.array([2])):
-        plan = run.advance(40)
-        assert np.array_equal(whole.follow(plan, np.arange(6))[ids], part.follow(plan, ids))
+        ahead = plan.advance(40)
+        assert_array_equal(whole.follow(ahead, np.arange(6))[ids], part.follow(ahead, ids))
 
 
 def test_substeps_are_whole_and_short_enough():
     for vp in (20.0, 80.0, 99.9, 100.0, 400.0):
-        body, network = Body(vp=vp), Network()
-        m = body.substeps(network)
-        assert body.seconds(network) / m <= 0.000625 + 1e-12
-        assert m == 1 or body.seconds(network) / (m - 1) > 0.000625
-    assert Body().substeps(Network()) == 2
+        conditions = Conditions.of(vp=vp)
+        m = conditions.substeps(STRIDE)
+        assert conditions.timestep(STRIDE) <= 0.000625 + 1e-12
+        assert m == 1 or conditions.time.seconds(STRIDE) / (m - 1) > 0.000625
+    assert Conditions().substeps(STRIDE) == 2
 
 
 @pytest.mark.parametrize(
     "change",
     [{"vp": 0.0}, {"vp": float("nan")}, {"step_height": -1.0}, {"step_height": 20.0}, {"friction": -0.1},
      {"lift_time": 0.0}, {"landing_time": 0.0}, {"longest_substep": 1.0}, {"standing_height": float("inf")}],
+    ids=str,
 )  # fmt: skip
-def test_conditions_that_make_no_sense(change):
+def test_conditions_that_make_no_sense(change: dict[str, float]):
     with pytest.raises(InputError, match=f"{next(iter(change))} = .*expected"):
-        Body(**change)
+        Conditions.of(**change)

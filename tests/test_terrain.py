@@ -1,9 +1,9 @@
 """Real obstacles: what lies ahead is solid, is not felt before it is reached, and every start is counted once."""
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,36 +12,38 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 from film_reader import read_film
-from hexmj.cli import Conditions, Terrain
-from hexmj.commands.terrain import run_terrain
-from hexmj.errors import InputError
-from hexmj.experiments.terrain import obstacles, reach, terrain
-from hexmj.experiments.terrain_figure import terrain_figure
-from hexmj.film.film import Film
-from hexmj.film.video import render
-from hexmj.loss_frequency import draw_starts
-from hexmj.parameters import LDVS, Network
-from hexmj.physics import insect
-from hexmj.physics.body import Body
-from hexmj.physics.ground import ground_level
-from hexmj.physics.physical_walks import PhysicalWalk, physical_outcomes, physical_walk
+from hexmj import LDVS, Conditions, InputError, ReadsLegs, Stride, draw_starts, physical_walk, render
+from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.loading import compile_body
+from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.physics.settling import settle
-from hexmj.recording import load_recording, record, recorded_body, save_recording
+from hexmj.replay.film.film import Film
+from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
+from hexmj.studies.terrain.figure import terrain_figure
+from hexmj.studies.terrain.study import Terrain, obstacles, reach
+from hexmj.sweeps import Cell, conduct
 
 GROUNDS = {
-    "flat": Body(ground_at=45.0),
-    "step": Body(ground="step", ground_at=45.0),
-    "gap": Body(ground="gap", ground_at=45.0, ground_length=5.0),
-    "hurdle": Body(ground="hurdle", ground_at=45.0),
-    "rough": Body(ground="rough", ground_at=45.0, ground_height=4.0),
+    "flat": Conditions.of(ground_at=45.0),
+    "step": Conditions.of(ground="step", ground_at=45.0),
+    "gap": Conditions.of(ground="gap", ground_at=45.0, ground_length=5.0),
+    "hurdle": Conditions.of(ground="hurdle", ground_at=45.0),
+    "rough": Conditions.of(ground="rough", ground_at=45.0, ground_height=4.0),
 }
-FEW = {"velocities": (0.6,), "grounds": ("step",), "heights": (4.0,), "grasps": (0.0,), "starts": 6}
+FEW: dict[str, Any] = {
+    "velocities": (0.6,), "grounds": ("step",), "heights": (4.0,), "grasps": (0.0,), "n_starts": 6,
+}  # fmt: skip
 
 
 @cache
 def walked(ground: str) -> PhysicalWalk:
     """A few starts that reach the obstacle when they have walked 7 mm, and cross it."""
-    return physical_walk(draw_starts(3, seed=0), LDVS, 0.6, 150.0, body=GROUNDS[ground])
+    return physical_walk(draw_starts(3, seed=0), LDVS, 0.6, 150.0, conditions=GROUNDS[ground])
+
+
+def level_of(conditions: Conditions, places: np.ndarray) -> np.ndarray:
+    """Height of the ground at some places, (..., 2) [mm]."""
+    return ground_level(conditions.ground, conditions.body.lengths, places)
 
 
 @pytest.fixture(scope="module")
@@ -51,14 +53,14 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def few(folder) -> xr.Dataset:
-    return terrain(LDVS, folder, **FEW)
+    return conduct(Terrain(LDVS, **FEW), folder)
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_the_ground_is_as_high_as_it_says(ground):
     """Rays from above meet the compiled geoms where `ground_level` has the ground."""
-    body = GROUNDS[ground]
-    model = insect.load(body=body)
+    conditions = GROUNDS[ground]
+    model = compile_body(conditions).model
     data = mujoco.MjData(model)
     data.qpos[1] = 5000.0  # the insect out of the way
     mujoco.mj_forward(model, data)
@@ -68,7 +70,7 @@ def test_the_ground_is_as_high_as_it_says(ground):
         mujoco.mj_ray(model, data, np.array([*place, 50.0]), np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
         for place in places
     ]
-    levels = ground_level(body, places)
+    levels = level_of(conditions, places)
     assert_allclose(50.0 - np.array(down), levels, atol=1e-6)
     assert (levels != 0).any() == (ground != "flat")
 
@@ -76,21 +78,23 @@ def test_the_ground_is_as_high_as_it_says(ground):
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_the_trunk_on_any_ground_is_a_fall(ground):
     """Laid down with its legs in the air, on the obstacle itself."""
-    body = replace(GROUNDS[ground], ground_length=300.0) if ground == "hurdle" else GROUNDS[ground]
-    model = insect.load(body=body)
+    compiled = compile_body(GROUNDS[ground].but(ground_length=300.0) if ground == "hurdle" else GROUNDS[ground])
+    model = compiled.model
     data = mujoco.MjData(model)
-    data.qpos[:7] = 150.0, 0.0, ground_level(body, np.array([150.0, 0.0])) + 1.0, 0.0, 1.0, 0.0, 0.0
+    level = level_of(compiled.conditions, np.array([150.0, 0.0]))
+    data.qpos[:7] = 150.0, 0.0, level + 1.0, 0.0, 1.0, 0.0, 0.0
     mujoco.mj_forward(model, data)
-    assert data.sensordata[insect.sensors(model).trunk].any()
+    assert data.sensordata[compiled.columns.trunk].any()
     assert {model.geom(geom).name for geom in data.contact.geom[:, 0]} != ({"ground"} if ground != "flat" else set())
 
 
 @pytest.mark.parametrize("ground", ["step", "hurdle"])
 def test_feet_stand_on_top_as_on_the_plane(ground):
-    body = replace(GROUNDS[ground], ground_length=300.0)
+    long = GROUNDS[ground].but(ground_length=300.0)
     depths, forces = [], []
-    for one, ahead, up in ((GROUNDS["flat"], 0.0, 0.0), (body, 150.0, body.ground_height)):
-        model = insect.load(body=one)
+    for one, ahead, up in ((GROUNDS["flat"], 0.0, 0.0), (long, 150.0, long.ground.ground_height)):
+        compiled = compile_body(one)
+        model = compiled.model
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)
         data.qpos[0] += ahead
@@ -98,7 +102,7 @@ def test_feet_stand_on_top_as_on_the_plane(ground):
         mujoco.mj_step(model, data, nstep=500)
         mujoco.mj_forward(model, data)
         depths.append(np.sort(data.contact.dist))
-        forces.append(data.sensordata[insect.sensors(model).touch].copy())
+        forces.append(data.sensordata[compiled.columns.touch].copy())
     assert_allclose(depths[1], depths[0], atol=0.001)
     assert_allclose(forces[1], forces[0], rtol=0.01)
 
@@ -107,7 +111,8 @@ def test_feet_stand_on_top_as_on_the_plane(ground):
 def test_nothing_is_felt_before_it_is_reached(ground):
     """The same bits as on flat ground; a bank's box rounds other than a plane."""
     flat, ahead = walked("flat").qpos, walked(ground).qpos
-    far = np.where(np.isfinite(flat), flat, 0.0)[..., 0].max(axis=1) < GROUNDS[ground].ground_at - reach(Network())[0]
+    begin = GROUNDS[ground].ground.ground_at - reach(Stride())[0]
+    far = np.where(np.isfinite(flat), flat, 0.0)[..., 0].max(axis=1) < begin
     assert 50 < far.sum() < len(far)
     if ground == "gap":
         assert_allclose(ahead[far], flat[far], atol=1e-9)
@@ -121,7 +126,7 @@ def test_every_start_is_counted_once(few):
     flat, step = few.isel(obstacle=0), few.isel(obstacle=1)
     assert few.obstacle.values.tolist() == ["flat", "step 4 mm"]
     assert_array_equal(step.reached, flat.reached)
-    begin = few.attrs["body"]["ground_at"] - reach(Network())[0]
+    begin = few.attrs["conditions"]["ground_at"] - reach(Stride())[0]
     before = few.fall * few.velocity <= begin
     assert_array_equal(few.reached + before.sum("start"), few.sizes["start"])
     assert_array_equal(before.isel(obstacle=0), before.isel(obstacle=1))
@@ -132,9 +137,9 @@ def test_every_start_is_counted_once(few):
     assert (few.crossed + few.after.sum("start") <= few.reached).all()
 
 
-def test_a_cell_is_a_physical_walk_of_that_body(few):
-    body = Body(ground_at=80.0, ground="step", ground_height=4.0)
-    settled = settle(draw_starts(6, 0), body)
+def test_a_cell_is_a_physical_walk_under_those_conditions(few):
+    conditions = Conditions.of(ground_at=80.0, ground="step", ground_height=4.0)
+    settled = settle(draw_starts(6, 0), conditions)
     walks = physical_outcomes(settled, LDVS, 0.6, few.attrs["distance"] / 0.6, threads=1)
     one = few.sel(obstacle="step 4 mm").squeeze()
     for name in ("fall", "fall_part", "tilt", "speed"):
@@ -142,14 +147,21 @@ def test_a_cell_is_a_physical_walk_of_that_body(few):
 
 
 def test_what_is_finished_is_not_walked_again(few, folder, monkeypatch):
-    monkeypatch.setattr("hexmj.experiments.terrain.settle", lambda *_: pytest.fail("walked again"))
-    xr.testing.assert_identical(terrain(LDVS, folder, **FEW), few)
+    monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
+    xr.testing.assert_identical(conduct(Terrain(LDVS, **FEW), folder), few)
 
 
-def test_where_nothing_is_reached_there_is_no_frequency(folder):
+def test_where_nothing_is_reached_there_is_no_frequency():
     """At V = 0.95 this start falls at once."""
-    alone = np.isnan(terrain(LDVS, folder, **FEW | {"starts": 1, "seed": 1, "velocities": (0.95,)}).flss)
-    assert alone.all()
+    alone = conduct(Terrain(LDVS, **FEW | {"n_starts": 1, "seed": 1, "velocities": (0.95,)}))
+    assert (alone.reached == 0).all() and np.isnan(alone.flss).all()
+
+
+def test_a_controller_may_read_the_legs(few):
+    """It goes another way, not only at the step, and all its starts are counted."""
+    reading = conduct(Terrain(ReadsLegs(LDVS), **FEW))
+    assert reading.sizes == few.sizes and np.isfinite(reading.flss).all()
+    assert not np.array_equal(reading.speed, few.speed)
 
 
 def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
@@ -157,14 +169,13 @@ def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
     assert [axes.get_xlabel() for axes in figure.axes] == ["height of the step [mm]"]
 
 
-def test_the_command_prints_what_it_measured(few, folder, tmp_path, capsys):
-    names = {name: FEW[name] for name in ("velocities", "grounds", "heights", "grasps", "starts")}
+def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
+    words = ["terrain", "--velocities", "0.6", "--grounds", "step", "--heights", "4", "--grasps", "0", "--starts", "6"]
     (tmp_path / "walks").symlink_to(folder)
-    run_terrain(Terrain(**names, out=tmp_path, json=True))
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["flss"] == few.flss.values.tolist()
-    run_terrain(Terrain(**names, out=tmp_path))
-    assert "step 4 mm" in capsys.readouterr().out
+    code, text, _ = run(*words, "--out", tmp_path, "--json")
+    assert code == 0
+    assert json.loads(text)["flss"] == few.flss.values.tolist()
+    assert "step 4 mm" in run(*words, "--out", tmp_path)[1]
     with xr.open_dataset(tmp_path / "terrain.nc", engine="h5netcdf") as saved:
         assert_array_equal(saved.fall, few.fall)
     assert {"terrain.png", "manifest.json"} <= {file.name for file in tmp_path.iterdir()}
@@ -178,35 +189,43 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, capsys):
         ({"heights": (2.0, 2.0)}, "heights = .*; expected at least one, and none of them twice"),
         ({"grounds": ("gap",), "lengths": ()}, "lengths = .*; expected at least one"),
         ({"grounds": ("gap",), "lengths": (0.0,)}, "ground_length = 0.0; expected above 0"),
-        ({"grounds": ("rough",), "heights": (9.0,)}, "ground_height = 9.0; expected at most 8 mm where rough"),
+        (
+            {"grounds": ("rough",), "heights": (9.0,)},
+            "ground_height = 9.0; expected above 0 and at most 8 mm where rough",
+        ),
         ({"grounds": ("flat",)}, "'flat' is none of step, gap, hurdle, rough"),
         ({"grasps": (-1.0,)}, "grasp = -1.0; expected 0 to 100"),
         ({"velocities": (0.0,)}, "velocities = .*; expected V > 0"),
-        ({"starts": 0}, "starts = 0; expected a whole number"),
-        ({"conditions": Conditions(body=Body(ground="step"))}, "--ground = step; expected --grounds"),
-        ({"conditions": Conditions(body=Body(grasp=1.0))}, "--grasp = 1.0; expected --grasps"),
-        ({"conditions": Conditions(window="start")}, "--window = start; expected none"),
-        ({"conditions": Conditions(acceleration=0.00008)}, "--acceleration = 8e-05; expected none"),
+        ({"n_starts": 0}, "starts = 0; expected a whole number"),
+        ({"conditions": Conditions.of(ground="step")}, "ground = step; expected grounds"),
+        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected grasps"),
     ],
 )
-def test_what_makes_no_sense_is_refused(wrong, said, tmp_path):
+def test_what_makes_no_sense_is_refused(wrong, said):
     with pytest.raises(InputError, match=said):
-        run_terrain(Terrain(**{"starts": 2, "velocities": (0.6,), "out": tmp_path / "out"} | wrong))
+        Terrain(LDVS, **{"n_starts": 2, "velocities": (0.6,)} | wrong)
+
+
+@pytest.mark.parametrize("option", ["window", "acceleration", "initial-velocity", "ground", "ground-height", "grasp"])
+def test_the_command_offers_no_option_that_it_does_not_obey(run, tmp_path, option):
+    code, _, error = run("terrain", f"--{option}", 1, "--out", tmp_path / "out")
+    assert code == 2
+    assert "Unrecognized options" in error
     assert not (tmp_path / "out").exists()
 
 
 def test_obstacles_have_their_names_and_sizes():
-    worlds = obstacles(Body(), ("gap", "hurdle"), (2.0,), (5.0,))
-    assert list(worlds) == ["flat", "gap 5 mm", "hurdle 2 mm"]
-    assert worlds["gap 5 mm"] == Body(ground="gap", ground_length=5.0)
-    assert worlds["hurdle 2 mm"] == Body(ground="hurdle", ground_height=2.0)
+    found = obstacles(Conditions(), ("gap", "hurdle"), (2.0,), (5.0,))
+    assert list(found) == ["flat", "gap 5 mm", "hurdle 2 mm"]
+    assert found["gap 5 mm"] == Conditions.of(ground="gap", ground_length=5.0)
+    assert found["hurdle 2 mm"] == Conditions.of(ground="hurdle", ground_height=2.0)
 
 
 def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
     path = save_recording(record(walked("step"), 0).isel(step=slice(600, 640)), tmp_path / "recording.nc")
     film, shown = Film(width=160, height=120, slow_motion=1.0), []
     with load_recording(path) as recording:
-        assert recorded_body(recording) == GROUNDS["step"]
+        assert recorded_conditions(recording) == GROUNDS["step"]
         for ground in ("step", "flat"):
             render([recording.assign_attrs(ground=ground)], tmp_path / "film.mp4", film)
             shown.append(read_film(tmp_path / "film.mp4")[0].astype(int))

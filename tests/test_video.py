@@ -5,21 +5,20 @@ import subprocess
 import sys
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 import xarray as xr
 
 from film_reader import read_film
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.film import gl
-from hexmj.film.film import CAMERAS, Film
-from hexmj.film.video import render
-from hexmj.loss_frequency import draw_starts
-from hexmj.parameters import UNCOORDINATED
-from hexmj.physics import insect
-from hexmj.physics.physical_walks import PhysicalWalk, physical_walk
-from hexmj.recording import load_recording, record, record_plan, save_recording
+from hexmj.measures.physical import PhysicalWalk, physical_walk
+from hexmj.replay.film import gl
+from hexmj.replay.film.film import CAMERAS, Film
+from hexmj.replay.film.video import render
+from hexmj.replay.recording import load_recording, record, record_plan, save_recording
+from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s
 
@@ -60,7 +59,7 @@ def fallen(walked: PhysicalWalk, start: int) -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def plan(walked: PhysicalWalk, start: int) -> xr.Dataset:
-    return record_plan(walked.planned, walked.body, walked.network, start, "its plan")
+    return record_plan(walked.planned, walked.conditions, walked.stride, start, "its plan")
 
 
 def test_a_film_has_the_frames_of_its_walk_in_its_colours(fallen, tmp_path):
@@ -127,8 +126,7 @@ def test_the_insect_keeps_clear_of_the_diagram(camera, plan, tmp_path):
 
 
 def test_cameras_are_those_of_the_insect():
-    model = insect.load()
-    assert {model.camera(i).name for i in range(model.ncam)} == set(CAMERAS)
+    assert STICK_INSECT.cameras == CAMERAS
 
 
 def test_films_that_make_no_sense(fallen, tmp_path):
@@ -158,38 +156,13 @@ def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize(
-    ("environment", "expected"),
-    [
-        ({}, "egl"),
-        ({"MUJOCO_GL": "osmesa"}, "osmesa"),
-        ({"DISPLAY": ":0"}, None),
-        ({"WAYLAND_DISPLAY": "wayland-0"}, None),
-    ],
-)
-def test_egl_is_preferred_where_there_is_no_screen(environment, expected, monkeypatch):
-    for name in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    gl.prefer_egl()
-    assert os.environ.get("MUJOCO_GL") == expected
-
-
-def test_egl_is_not_chosen_where_its_libraries_are_missing(monkeypatch):
-    for name in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(gl, "LIBRARIES", ("libEGL.so.1", "libNoSuchThing.so.0"))
-    gl.prefer_egl()
-    assert "MUJOCO_GL" not in os.environ
-
-
 def test_whether_anything_can_be_rendered_is_known():
     assert gl.missing() is None
     kept = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
+    program = "from hexmj.replay.film import gl; gl.missing(); print(gl.missing())"
     for backend in ("glfw", "disable"):
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", "from hexmj.film import gl; gl.missing(); print(gl.missing())"],
+            [sys.executable, "-W", "error", "-c", program],
             env=kept | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
             capture_output=True,
             text=True,
@@ -203,4 +176,4 @@ def test_nothing_is_left_in_memory_of_the_graphics(fallen, tmp_path):
     """Films one after the other: every renderer is closed, and a new context still works."""
     for _ in range(3):
         render([fallen], tmp_path / "film.mp4", Film(width=64, height=64, slow_motion=0.2))
-    mujoco.GLContext(16, 16).free()
+    gl.context_type()(16, 16).free()

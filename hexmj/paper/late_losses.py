@@ -3,18 +3,19 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.network import NetworkRun, steps_within
-from hexmj.parameters import Model, Network
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.starts import checked_starts
+from hexmj.timing import Stride, steps_within
 
 
 def lost_after(
     starts: ArrayLike,
-    model: Model,
+    controller: Cruse1998,
     velocity: float,
     wait: float,
     durations: ArrayLike,
     *,
-    network: Network | None = None,
+    stride: Stride | None = None,
     threads: int | None = None,
 ) -> np.ndarray:
     """Whether each start is statically unstable within `durations` after the first `wait` of its walk.
@@ -23,17 +24,19 @@ def lost_after(
 
     Args:
         starts: tips at time 0, all standing, (start, leg) [mm].
-        model: coupling weights.
+        controller: the network.
         velocity: V_r, 0 <= V < 1.
         wait: time that passes unseen [time units].
         durations: observation times after it, (duration,) [time units].
-        network: the constants that the paper leaves out.
+        stride: step range, lines of the tips and time step.
         threads: one per core unless given.
 
     Returns:
         (duration, start)
     """
-    run = NetworkRun(starts, model, velocity, network=network, threads=threads)
-    unseen, seen = int(steps_within(wait, run.network)), steps_within(durations, run.network)
-    first = run.first_losses(unseen, int(seen.max()))
+    stride = stride or Stride()
+    x = checked_starts(starts, stride)
+    plan = controller.begin(x, np.full(len(x), velocity), stride, threads=threads)
+    unseen, seen = int(steps_within(wait, stride)), steps_within(durations, stride)
+    first = plan.first_losses_after(unseen, int(seen.max()))
     return (first > 0) & (first <= unseen + seen[:, np.newaxis])

@@ -12,7 +12,7 @@ import numpy as np
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
 from hexmj.intervals import WILSON_Z, wilson_interval
 from hexmj.paper.found_sets import found_sets
-from hexmj.paper.protocol import NO_SET
+from hexmj.paper.measurements import NO_SET
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -211,10 +211,10 @@ class Weight:
         """One for each set."""
         for one in found_sets():
             if one.window == window and one.low == one.high:
-                value = getattr(one.model, self.parameter)
+                value = getattr(one.controller.weights, self.parameter)
                 if self.over:
                     with np.errstate(divide="ignore", invalid="ignore"):
-                        value = abs(np.float64(value) / getattr(one.model, self.over))
+                        value = abs(np.float64(value) / getattr(one.controller.weights, self.over))
                 yield Point(one.low, "", np.array([value]))
 
 

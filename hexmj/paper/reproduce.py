@@ -1,18 +1,17 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
-from hexmj.cells import kept
 from hexmj.errors import InputError
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
-from hexmj.paper.protocol import COSTS, FULL, MEASUREMENTS, Protocol
+from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
-from hexmj.progress import Progress
 from hexmj.results import json_text, results_folder, save_dataset, write_whole
+from hexmj.sweeps import How, along, finish, run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,11 +22,7 @@ KEPT = "measurements"
 
 
 def reproduce(
-    out: Path,
-    protocol: Protocol = FULL,
-    *,
-    only: Sequence[str] = (),
-    progress: Progress | None = None,
+    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), **how: Unpack[How]
 ) -> tuple[list[Row], list[Path]]:
     """Measure what the claims need, judge them, draw the figures.
 
@@ -38,7 +33,7 @@ def reproduce(
         out: folder for ``claims.md``, ``claims.json``, figures (PDF, PNG and their data as NetCDF) and measurements.
         protocol: how much is simulated.
         only: keys of the claims to judge, all unless given; figures are drawn only with all.
-        progress: told the fraction of the work that has been done since the last call.
+        how: see `sweeps.How`.
 
     Returns:
         The rows in the paper's order, and the files written.
@@ -50,18 +45,11 @@ def reproduce(
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
     results_folder(out, TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
-    needed = {name for claim in claims for name in claim.rule.quantity.needs}
-    if not only:
-        needed |= {name for needs, _ in FIGURES.values() for name in needs}
-    names = [name for name in MEASUREMENTS if name in needed]
-    total = sum(COSTS.get(name, 1.0) for name in names)
     measured: dict[str, xr.Dataset] = {}
     judged: dict[str, Row] = {}
     files = _judge_ready(out, claims, measured, judged, protocol)
-    for name in names:
-        part = COSTS.get(name, 1.0) / total
-        told = progress and (lambda done, part=part: progress(part * done))
-        measured[name] = measure(name, protocol, out / KEPT, told)
+    for name, data in _measurements(_needed(claims, figures=not only), protocol, out / KEPT, how):
+        measured[name] = data
         files = _judge_ready(out, claims, measured, judged, protocol)
     if not only:
         for name, (_, draw) in FIGURES.items():
@@ -69,31 +57,37 @@ def reproduce(
     return _rows(claims, judged), files
 
 
-def measure(name: str, protocol: Protocol, folder: Path, progress: Progress | None = None) -> "xr.Dataset":
-    """One measurement of `MEASUREMENTS`, (velocity, ...); the rows that `folder` holds are not walked again.
+def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[How]) -> "xr.Dataset":
+    """One measurement of `MEASUREMENTS`, (velocity, ...); folder and `how` as of `sweeps.finish`."""
+    return _over_velocities(name, protocol, run(cells(name, protocol), folder, **how))
 
-    A row's file is named by all that its outcomes depend on, so none is ever overwritten or mistaken for another.
 
-    Args:
-        name: of the measurement.
-        protocol: how much is simulated.
-        folder: keeps a file for each velocity, written as soon as it is finished.
-        progress: told the fraction of the measurement that has been done since the last call.
+def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
+    """Names of the measurements that claims, and the figures, are looked up in."""
+    needed = {name for claim in claims for name in claim.rule.quantity.needs}
+    if figures:
+        needed |= {name for needs, _ in FIGURES.values() for name in needs}
+    return [name for name in MEASUREMENTS if name in needed]
 
-    Raises:
-        InputError: a kept row is damaged.
-    """
-    import xarray as xr
 
-    measurement = MEASUREMENTS[name]
-    rows: list[xr.Dataset] = []
-    velocities = measurement.velocities(protocol)
-    for v in velocities:
-        settings = {"measurement": name, "velocity": v} | measurement.settings(v, protocol)
-        rows.append(kept(folder, f"{name}-{v:g}", settings, lambda v=v: measurement.at(v, protocol)))
-        if progress:
-            progress(1 / len(velocities))
-    return xr.concat(rows, xr.DataArray(list(velocities), dims="velocity", name="velocity"), combine_attrs="drop")
+def _measurements(
+    names: Sequence[str], protocol: Protocol, folder: Path, how: How
+) -> "Iterator[tuple[str, xr.Dataset]]":
+    """Measurements, each as soon as it has come together, from one sweep over the velocities of all."""
+    parts = {name: cells(name, protocol) for name in names}
+    places = [(name, row) for name, part in parts.items() for row in range(len(part))]
+    found: dict[str, dict[int, xr.Dataset]] = {name: {} for name in names}
+    for i, data in finish([cell for part in parts.values() for cell in part], folder, **how):
+        name, row = places[i]
+        found[name][row] = data
+        if len(found[name]) == len(parts[name]):
+            rows = found.pop(name)
+            yield name, _over_velocities(name, protocol, [rows[row] for row in sorted(rows)])
+
+
+def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]") -> "xr.Dataset":
+    velocities = list(MEASUREMENTS[name].velocities(protocol))
+    return along({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(velocity=velocities)
 
 
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:

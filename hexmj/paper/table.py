@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hexmj.loss_frequency import WINDOWS
 from hexmj.paper.claims import Claim
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
+from hexmj.timing import WINDOWS
 
 NOT_SEARCHED = "not yet searched"
 SAME = "same"

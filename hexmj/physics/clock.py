@@ -21,7 +21,8 @@ def stopped_clock() -> Iterator[None]:
     try:
         yield
     finally:
-        mujoco.set_mjcb_time(None)
+        if mujoco.get_mjcb_time() is _midnight.ctypes:  # another thread may have set one meanwhile
+            mujoco.set_mjcb_time(None)
 
 
 @cfunc("float64()", cache=True)

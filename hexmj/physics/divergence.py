@@ -1,50 +1,46 @@
-"""A simulation that diverged is an error, never an outcome: its last good state is written, to be replayed."""
+"""A simulation that diverged is an error, never an outcome: its last good state can be saved and replayed."""
 
 import json
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
+from hexmj.bodies.description import Body
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
 from hexmj.errors import SimulationError
-from hexmj.physics import insect
-from hexmj.physics.body import Body
+from hexmj.physics.backend import Diverged
 
 
-def raise_if_diverged(
-    batch: Batch, ids: np.ndarray, time: float, speeds: np.ndarray | None, state: dict[str, np.ndarray]
-) -> None:
-    """A MuJoCo warning or a number that is not finite in one of `ids` ends everything; its state is written.
+def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
+    """The error of an insect that diverged while it was `doing` something, at a time [time units]."""
+    state = error.state | {"conditions": np.array(json.dumps(conditions.flat(), default=lambda number: number.item()))}
+    sentence = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
+    return SimulationError(sentence, state, f"diverged-start-{error.start}.npz")
 
-    `speeds` are the velocities V_r of all starts, none while they settle.
+
+def save_state(error: SimulationError, folder: Path) -> Path:
+    """Write the last good state of an error that has one into a folder; `replay` reads it.
+
+    Raises:
+        OSError: it cannot be written.
     """
-    warned = batch.warning[ids, :, 1] > 0
-    broken = ~np.isfinite(batch.bind("qpos")[ids]).all(axis=1)
-    failed = np.flatnonzero(warned.any(axis=1) | broken)
-    if len(failed) == 0:
-        return
-    i = failed[0]
-    kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
-    path = Path(f"diverged-start-{ids[i]}.npz").resolve()
-    when = "while settling" if speeds is None else f"while walking at V = {speeds[ids[i]]:g}"
-    model = batch.get_model(ids[i])
-    saved = {name: values[i] for name, values in state.items()}
-    saved |= {"xfrc_applied": batch.bind("xfrc_applied")[ids[i]], "contact": model.pair_solref[:, 0]}
-    saved["timestep"] = np.array(model.opt.timestep)
-    try:
-        np.savez(path, allow_pickle=False, **saved, body=json.dumps(asdict(insect.body_of(model))))
-        written = f"its last good state is in {path} (hexmj.physics.divergence.replay)"
-    except OSError as error:
-        written = f"its last good state could not be written to {path}: {error.strerror}"
-    raise SimulationError(f"start {ids[i]} diverged {when}, at {time:.4g} time units: {', '.join(kinds)}; {written}")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = (folder / error.file_name).resolve()
+    np.savez(path, allow_pickle=False, **error.state)
+    return path
 
 
-def replay(path: Path | str) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A written state of divergence, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep, actuator)."""
+def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A written state of divergence of a body, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep,
+    actuator)."""
     with np.load(path) as saved:
-        model = insect.load(float(saved["timestep"]), Body(**json.loads(str(saved["body"]))))
+        conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
+        model = compile_body(replace(Conditions.of(**conditions), body=body), float(saved["timestep"])).model
         model.pair_solref[:, 0] = saved["contact"]
         data = mujoco.MjData(model)
         for name in ("qpos", "qvel", "qacc_warmstart", "xfrc_applied"):

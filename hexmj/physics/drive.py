@@ -1,8 +1,8 @@
 """Physical walks: the insect follows a plan in MuJoCo, all starts at once on all cores.
 
-Settled starts go in, what was measured comes out, stretch by stretch; a start whose trunk has touched the
-ground is dropped.  In the open loop the plan goes on by itself: while MuJoCo's threads step one stretch, this
-one plans the next and the caller measures the last.  `closed_loop` is the other way to walk.
+Settled starts go in, what was measured comes out, chunk by chunk; a start whose trunk has touched the ground is
+dropped.  A plan that reads the legs is told of them before each of its steps.  Any other goes on by itself: while
+MuJoCo's threads step one chunk, this one plans the next and the caller measures the last.
 """
 
 from collections.abc import Iterator
@@ -10,16 +10,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from hexmj.network import steps_within
-from hexmj.physics.clock import stopped_clock
-from hexmj.physics.closed_loop import closed_loop
-from hexmj.physics.joint_targets import JointTargets
+from hexmj.controllers.protocol import Plan, ReadingPlan
+from hexmj.physics.chunks import Chunk, Insects, Push
+from hexmj.physics.orders import JointTargets, Orders
 from hexmj.physics.settling import Settled
-from hexmj.physics.stretches import Insects, Push, Stretch
-from hexmj.plans import Plan
 from hexmj.progress import Progress
+from hexmj.timing import steps_within
 
-__all__ = ["Push", "Stretch", "drive"]
+__all__ = ["Chunk", "Push", "drive"]
 
 
 def drive(
@@ -30,43 +28,59 @@ def drive(
     push: Push | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> Iterator[Stretch]:
-    """Walk settled starts by a plan, stretch by stretch.
+) -> Iterator[Chunk]:
+    """Walk settled starts by a plan, chunk by chunk.
 
     Args:
         settled: starts at rest.
         plan: of the same starts, at time 0.
-        duration: observation time [time units of the network].
+        duration: observation time [time units].
         push: from the side.
         threads: one per core unless given; the result does not depend on it.
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError: with `Body.feedback`, a plan that cannot see.
-        SimulationError: a simulation that diverged; its state is written for `divergence.replay`.
+        InputError: a plan of other starts, with another stride, not at time 0, or of other shapes than asked for.
+        SimulationError: a simulation that diverged; it carries its last good state.
     """
-    insects = Insects(settled, push, threads)
-    loop = closed_loop if settled.body.feedback else _open_loop
-    total = int(steps_within(duration, settled.network)) * settled.body.substeps(settled.network)
+    insects, targets = Insects(settled, push, threads), JointTargets(settled, plan, duration)
+    total = int(steps_within(duration, settled.stride)) * settled.conditions.substeps(settled.stride)
     told = 0.0
-    with stopped_clock():
-        for stretch in loop(insects, plan, duration):
-            yield stretch
-            if progress:
-                done = 1.0 if stretch.fell.all() else min(1.0, (stretch.first + stretch.qpos.shape[1]) / total)
-                progress(done - told)
-                told = done
+    for chunk in _reading(insects, plan, targets) if isinstance(plan, ReadingPlan) else _by_itself(insects, targets):
+        yield chunk
+        if progress:
+            done = 1.0 if chunk.fell.all() else min(1.0, (chunk.first + chunk.qpos.shape[1]) / total)
+            progress(done - told)
+            told = done
 
 
-def _open_loop(insects: Insects, plan: Plan, duration: float) -> Iterator[Stretch]:
+def _by_itself(insects: Insects, targets: JointTargets) -> Iterator[Chunk]:
     """The plan goes on, whatever happens to the insects."""
-    targets = JointTargets(insects.settled, plan, duration)
     now = targets.ahead(np.arange(len(insects.settled.starts)))
     with ThreadPoolExecutor(1) as stepper:
         stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
         while now and stepping:
             ahead = targets.ahead(now.ids)
-            stretch = stepping.result()
-            now = ahead.only(~stretch.fell) if ahead and not stretch.fell.all() else None
+            chunk = stepping.result()
+            now = ahead.only(~chunk.fell) if ahead and not chunk.fell.all() else None
             stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
-            yield stretch
+            yield chunk
+
+
+def _reading(insects: Insects, plan: ReadingPlan, targets: JointTargets) -> Iterator[Chunk]:
+    """The plan is told what the insects know before each of its steps."""
+    ids = np.arange(len(insects.settled.starts))
+    while len(ids) and (steps := targets.steps_ahead()):
+        chunk = insects.obey(_step_by_step(insects, plan, targets, ids, steps), steps)
+        yield chunk
+        ids = ids[~chunk.fell]
+
+
+def _step_by_step(
+    insects: Insects, plan: ReadingPlan, targets: JointTargets, ids: np.ndarray, steps: int
+) -> Iterator[Orders]:
+    """Orders for one step after the other, each made from what the last one has brought about."""
+    for _ in range(steps):
+        plan.sense(insects.sensed(ids))
+        if orders := targets.ahead(ids, steps=1):
+            yield orders

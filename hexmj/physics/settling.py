@@ -2,90 +2,93 @@
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
 from numpy.typing import ArrayLike
 
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.description import ROOT_QPOS
+from hexmj.bodies.loading import compile_body
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
-from hexmj.network import checked_starts
-from hexmj.parameters import Network
-from hexmj.physics import insect
-from hexmj.physics.body import Body
-from hexmj.physics.clock import stopped_clock
-from hexmj.physics.divergence import raise_if_diverged
-from hexmj.physics.kinematics import tips_to_joints
-from hexmj.physics.targets import standing_tips
-from hexmj.threads import thread_count
-
-AT_REST = 5.0
-"""Speed of the root below which a start counts as settled [mm/s]."""
+from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.divergence import walk_error
+from hexmj.physics.foot_path import standing_tips
+from hexmj.starts import checked_starts
+from hexmj.timing import Stride
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Starts at rest in MuJoCo; the same for every model and velocity."""
+    """Starts at rest in MuJoCo; the same for every controller and velocity."""
 
     starts: np.ndarray
     """(start, leg) planned tips [mm]."""
-    qpos: np.ndarray
-    """(start, 25) positions."""
-    qvel: np.ndarray
-    """(start, 24) velocities."""
+    state: np.ndarray
+    """(start, state) positions, velocities and what the solver goes on from, as `backend.Engine.put` takes it."""
     ctrl: np.ndarray
     """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion where they grasp."""
-    warmstart: np.ndarray
-    """(start, 24) accelerations from which the solver goes on."""
-    mujoco_model: mujoco.MjModel
-    """The insect with the time step and the friction of the walk."""
-    body: Body
-    network: Network
+    load: np.ndarray
+    """(start, leg) normal force of the ground on each foot [g mm/s^2]."""
+    torques: np.ndarray
+    """(start, joint) of the servos [g mm^2/s^2]."""
+    compiled: CompiledBody
+    """With the time step and the conditions of the walk."""
+    conditions: Conditions
+    stride: Stride
+
+    @property
+    def qpos(self) -> np.ndarray:
+        """(start, position)."""
+        return self.state[:, : self.compiled.model.nq]
 
 
 def settle(
-    starts: ArrayLike, body: Body | None = None, network: Network | None = None, threads: int | None = None
+    starts: ArrayLike,
+    conditions: Conditions | None = None,
+    stride: Stride | None = None,
+    threads: int | None = None,
 ) -> Settled:
     """Put the insect on its six feet at every start and let it come to rest.
 
     Args:
         starts: planned tips, (start, leg) [mm].
-        body: conditions of the walk.
-        network: constants of the plan.
+        conditions: of the walk.
+        stride: of the plan.
         threads: one per core unless given.
 
     Raises:
         InputError: a start that the legs cannot reach.
         SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
     """
-    body, network = body or Body(), network or Network()
-    x = checked_starts(starts, network)
-    model = insect.load(body.seconds(network) / body.substeps(network), body, looks=False)
-    tips = standing_tips(x, body, network)
-    joints, reachable = tips_to_joints(tips, legs := insect.dimensions(model))
+    conditions, stride = conditions or Conditions(), stride or Stride()
+    height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
+    x = checked_starts(starts, stride)
+    compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
+    model, columns = compiled.model, compiled.columns
+    tips = standing_tips(x, height, stride)
+    joints, reachable = compiled.inverse(tips)
     if not reachable.all():
         start, leg = np.argwhere(~reachable)[0]
         raise InputError(
             f"start {start}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
-            f" at a standing height of {body.standing_height:g} mm"
+            f" at a standing height of {height:g} mm"
         )
-    batch = Batch(model, len(x), thread_count(threads))
-    qpos, qvel, warmstart = batch.bind("qpos"), batch.bind("qvel"), batch.bind("qacc_warmstart")
-    qpos[:, : insect.ROOT_QPOS] = (0.0, 0.0, body.standing_height + legs.foot, 1.0, 0.0, 0.0, 0.0)
-    qpos[:, insect.ROOT_QPOS :] = joints.reshape(len(x), -1)
+    batch, everyone = MujocoBatch(compiled, len(x), threads), np.arange(len(x))
+    batch.qpos[:, :ROOT_QPOS] = (0.0, 0.0, height + compiled.foot_radius, 1.0, 0.0, 0.0, 0.0)
+    batch.qpos[:, columns.qpos] = joints.reshape(len(x), -1)
     ctrl = np.ones((len(x), model.nu))
-    ctrl[:, : insect.JOINT_ACTUATORS] = joints.reshape(len(x), -1)
-    batch.bind("ctrl")[:] = ctrl
-    before = {"qpos": qpos.copy(), "qvel": qvel.copy(), "qacc_warmstart": warmstart.copy(), "ctrl": ctrl[:, None]}
-    sensordata, columns = batch.bind("sensordata"), insect.sensors(model)
-    steps = max(1, round(body.settling_time / 1000.0 / model.opt.timestep))
-    with stopped_clock():
-        batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
-    raise_if_diverged(batch, np.arange(len(x)), 0.0, None, before)
+    ctrl[:, columns.ctrl] = joints.reshape(len(x), -1)
+    try:
+        batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
+    except Diverged as error:
+        raise walk_error(error, "settling", 0.0, conditions) from None
+    touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
     for name, failed in {
-        "it still moves": np.linalg.norm(qvel[:, :3], axis=1) > AT_REST,
-        "a foot is off the ground": (sensordata[:, columns.touch] <= 0).any(axis=1),
-        "the trunk is on the ground": (sensordata[:, columns.trunk] > 0).any(axis=1),
+        "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
+        "a foot is off the ground": (touch <= 0).any(axis=1),
+        "the trunk is on the ground": (trunk > 0).any(axis=1),
     }.items():
         if failed.any():
-            raise SimulationError(f"start {np.argmax(failed)} did not settle in {body.settling_time:g} ms: {name}")
-    return Settled(x, qpos.copy(), qvel.copy(), ctrl, warmstart.copy(), model, body, network)
+            raise SimulationError(f"start {np.argmax(failed)} did not settle in {settling_time:g} ms: {name}")
+    torques = batch.force[:, columns.ctrl].copy()
+    return Settled(x, batch.states(everyone), ctrl, touch, torques, compiled, conditions, stride)

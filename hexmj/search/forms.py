@@ -1,78 +1,89 @@
-"""Forms of the model whose parameters a search can choose, as vectors.
+"""Forms: which numbers of a controller a search chooses, as a vector; `network_forms` has those of the 1998 network."""
 
-Appendix A makes all legs of a side alike: nine numbers, or ten.  In the form 'mirrored' only the two sides are alike,
-and each leg's neighbours have weights of their own: 29 of the 58 general weights of Section 2.  In the form 'general'
-all 58 are free.
-"""
-
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import dataclass, fields, replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from hexmj.legs import MIRROR
-from hexmj.parameters import BINARY, NEIGHBOURS, Model, Symmetric, Weights, weights
-
-Form = Literal["hws", "ldvs", "mirrored", "general"]
-"""Names of the forms."""
-
-_NEUTRAL = ("p31", "p34")
-_ALL = [(kind, d, e) for kind, neighbours in NEIGHBOURS.items() for d in range(6) for e in neighbours[d]]
-_LEFT = [(kind, d, e) for kind, d, e in _ALL if d < 3]
+from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.errors import InputError
 
 
-@dataclass(frozen=True)
-class Parameters:
-    """What a form's vector means."""
+class Form(Protocol):
+    """A frozen dataclass that turns vectors into controllers."""
 
-    names: tuple[str, ...]
-    """In the order of the vector; of general weights with destination and source leg."""
-    model: Callable[[np.ndarray], Model]
-    """From a vector, (parameter,)."""
-    vector: Callable[[Model], np.ndarray]
-    """The parameters of a model of another form too, for comparison, (parameter,)."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters, in the order of the vector."""
+        ...
 
     @property
     def binary(self) -> np.ndarray:
-        """(parameter,) P^2 and P^4."""
-        return np.array([name.startswith(BINARY) for name in self.names])
+        """(parameter,) which are 0 or 1."""
+        ...
 
     @property
-    def neutral(self) -> np.ndarray:
-        """(parameter,) neutral positions and their change with velocity [mm]."""
-        return np.array([name.startswith(_NEUTRAL) for name in self.names])
+    def begin(self) -> np.ndarray | None:
+        """(parameter,) where a search begins unless told; None where its algorithm knows better."""
+        ...
+
+    def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest values of the first population, (parameter,) each."""
+        ...
+
+    def controller(self, vector: np.ndarray) -> Controller:
+        """From a vector, (parameter,)."""
+        ...
+
+    def vector(self, controller: Controller) -> np.ndarray:
+        """The parameters of a controller, (parameter,).
+
+        Raises:
+            InputError: it has none of this form.
+        """
+        ...
 
 
-def _symmetric(size: Literal[9, 10]) -> Parameters:
-    names = [f.name for f in fields(Symmetric) if f.name != "p34_i" or size == 10]
+@dataclass(frozen=True)
+class FieldsForm:
+    """The fields of a controller that are annotated as float; the others stay."""
 
-    def vector(model: Model) -> np.ndarray:
-        return np.array([getattr(model, name, np.nan) for name in names])
+    usual: Controller
+    """With its usual values, from which the search begins."""
 
-    return Parameters(tuple(names), Symmetric.from_vector, vector)
+    def __post_init__(self) -> None:
+        check_controller_type(self.usual)
+        if not self.names:
+            raise InputError(f"{self.usual.name} has no field of the type float; expected one that can be searched")
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See `Form.names`."""
+        of: Any = self.usual
+        return tuple(one.name for one in fields(of) if one.init and one.type in (float, "float"))
 
-def _names(places: list[tuple[str, int, int]]) -> tuple[str, ...]:
-    return tuple(f"{kind} {d + 1},{e + 1}" for kind, d, e in places)
+    @property
+    def binary(self) -> np.ndarray:
+        """None is."""
+        return np.zeros(len(self.names), dtype=bool)
 
+    @property
+    def begin(self) -> np.ndarray:
+        """The usual values."""
+        return self.vector(self.usual)
 
-def _mirrored(vector: np.ndarray) -> Weights:
-    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    for (kind, d, e), value in zip(_LEFT, vector, strict=True):
-        matrices[kind][d, e] = matrices[kind][MIRROR[d], MIRROR[e]] = value
-    return Weights(**matrices)
+    def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """0 to `reach` times the usual value, or to `reach` itself where that is 0."""
+        ends = reach * np.where(self.begin == 0, 1.0, self.begin)
+        return np.minimum(0.0, ends), np.maximum(0.0, ends)
 
+    def controller(self, vector: np.ndarray) -> Controller:
+        """See `Form.controller`."""
+        of: Any = self.usual
+        return replace(of, **dict(zip(self.names, vector.tolist(), strict=True)))
 
-def _left(model: Model) -> np.ndarray:
-    general = weights(model)
-    return np.array([getattr(general, kind)[d, e] for kind, d, e in _LEFT])
-
-
-FORMS: dict[Form, Parameters] = {
-    "hws": _symmetric(9),
-    "ldvs": _symmetric(10),
-    "mirrored": Parameters(_names(_LEFT), _mirrored, _left),
-    "general": Parameters(_names(_ALL), Weights.from_vector, lambda model: weights(model).to_vector()),
-}
-"""Forms by their names."""
+    def vector(self, controller: Controller) -> np.ndarray:
+        """See `Form.vector`."""
+        if type(controller) is not type(self.usual):
+            raise InputError(f"{controller.name} to begin with; expected a {type(self.usual).__name__}")
+        return np.array([getattr(controller, name) for name in self.names], dtype=float)

@@ -3,53 +3,62 @@
 import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
-from hexmj.loss_frequency import WINDOWS, draw_starts, observation_time
-from hexmj.network import checked_velocities, first_loss, steps_within
-from hexmj.parameters import Acceleration, Model, Network
-from hexmj.physics.body import Body
+from hexmj.measures.kinematic import first_loss
 from hexmj.search.domain import Domain
-from hexmj.search.forms import FORMS, Form
+from hexmj.search.forms import Form
+from hexmj.starts import check_draw, checked_velocities, draw_starts
+from hexmj.sweeps.plain import plain
 from hexmj.threads import thread_count
+from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.physics.settling import Settled
 
+REFUSED = 1.0
+"""Cost of a candidate that its controller refuses: as if every start lost stability."""
+
 
 @dataclass(frozen=True)
 class Problem:
-    """A cost function G: FLSS of a form of the model, I_N^t of Eq. 9 or J_N^t of Eq. 10."""
+    """A cost function G: FLSS of controllers of a form, I_N^t of Eq. 9 or J_N^t of Eq. 10."""
 
     form: Form
-    """Which parameters are free, see `forms`."""
+    """Which parameters are free."""
     low: float
     """Least velocity of the range W, a fraction of V_p; Problem 1 where it is also the greatest."""
     high: float
     """Greatest velocity of the range W, a fraction of V_p."""
     window: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
-    network: Network = field(default_factory=Network)
-    """The constants that the paper leaves out."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11."""
-    body: Body | None = None
-    """Conditions of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
+    conditions: Conditions | None = None
+    """Of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
+    feedback: bool = False
+    """Candidates read the legs, see `ReadsLegs`, in physical walks."""
 
     def __post_init__(self) -> None:
-        if self.form not in FORMS:
-            raise InputError(f"form = {self.form!r}; valid names: {', '.join(FORMS)}")
         if not 0 <= self.low <= self.high < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
+        if self.feedback and not self.conditions:
+            raise InputError("feedback without conditions; expected it with physical walks only")
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
-        steps_within(observation_time(self.window, ends, self.network, self.acceleration), self.network)
+        steps_within(observation_time(self.window, ends, self.stride, self.acceleration), self.stride)
 
     @property
     def windows(self) -> list[str | float]:
@@ -57,100 +66,110 @@ class Problem:
         named = [name for name in WINDOWS if self.low > 0 or name != "walk"]
         return list(dict.fromkeys([self.window, *named]))
 
-    def names(self) -> list[str]:
-        """Names of the parameters, in the order of the vector."""
-        return list(FORMS[self.form].names)
-
-    def domain(self, reach: float, begin: Model | None = None) -> Domain:
-        """Where a search begins, not printed in the paper: -reach to reach for the neutral positions [mm], 0 to
-        reach for shifts [mm] and weights (the signs of the printed sets), 0 to 1 for the binary P^2 and P^4."""
+    def domain(self, reach: float, begin: Controller | None = None) -> Domain:
+        """Where a search begins, see `Form.box`; at `begin`, if one is given."""
         if not 0 < reach < math.inf:
             raise InputError(f"domain = {reach}; expected a finite number above 0")
-        form = FORMS[self.form]
-        vector = None if begin is None else form.vector(begin)
-        return Domain(np.where(form.neutral, -reach, 0.0), np.where(form.binary, 1.0, reach), form.binary, vector)
+        form = self.form
+        return Domain(*form.box(reach), form.binary, form.vector(begin) if begin else form.begin)
+
+    def controller(self, vector: np.ndarray) -> Controller:
+        """A candidate, from (parameter,)."""
+        planning = self.form.controller(vector)
+        return ReadsLegs(planning) if self.feedback else planning
+
+    def settings(self) -> dict[str, Any]:
+        """The problem as plain data."""
+        told = {name: plain(getattr(self, name)) for name in ("form", "low", "high", "window", "feedback")}
+        told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
+        return told | {"conditions": self.conditions and self.conditions.settings()}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Sample:
-    """Starts of a problem: common random numbers, the same for every candidate that is judged on them."""
+    """Starts of a problem: common random numbers, the same for every candidate that is judged on them.
+
+    They are the first starts of a seed, as `kinematic.flss` and `flss_over_range` draw them.
+    """
 
     problem: Problem
-    starts: np.ndarray
-    """(start, leg) tips at time 0 [mm]."""
-    velocity: np.ndarray
-    """(start,) V_r of each start, a fraction of V_p."""
-    settled: "Settled | None"
-    """The starts at rest in MuJoCo, for a physical problem."""
-    threads: int | None
-    """One per core unless given; no result depends on it."""
+    n_starts: int
+    seed: int
 
-    @classmethod
-    def draw(cls, problem: Problem, size: int, seed: int, threads: int | None = None) -> "Sample":
-        """The first `size` starts of a seed, as `loss_frequency.flss` and `flss_over_range` draw them."""
-        starts = draw_starts(size, seed, problem.network)
-        velocity = np.random.default_rng([seed, 1]).uniform(problem.low, problem.high, size)
-        settled = None
-        if problem.body:
-            from hexmj.physics.settling import settle
+    def __post_init__(self) -> None:
+        check_draw(self.n_starts, self.seed)
 
-            settled = settle(starts, problem.body, problem.network, threads)
-        return cls(problem, starts, velocity, settled, threads)
+    @cached_property
+    def starts(self) -> np.ndarray:
+        """(start, leg) tips at time 0 [mm]."""
+        return draw_starts(self.n_starts, self.seed, self.problem.stride)
 
-    def costs(self, vectors: np.ndarray) -> np.ndarray:
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """(start,) V_r of each start, a fraction of V_p."""
+        return np.random.default_rng([self.seed, 1]).uniform(self.problem.low, self.problem.high, self.n_starts)
+
+    @cached_property
+    def _at_rest(self) -> "list[Settled]":
+        """The starts at rest in MuJoCo, once they have settled."""
+        return []
+
+    def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else."""
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
-            return self._losses(FORMS[self.problem.form].model(vector), [self.problem.window], threads)[0] / len(
-                self.starts
-            )
+            try:
+                candidate = self.problem.controller(vector)
+            except (InputError, ValueError):
+                return REFUSED
+            return self._losses(candidate, [self.problem.window], threads)[0] / self.n_starts
 
-        if self.problem.body or len(vectors) == 1:
-            return np.array([cost(vector, self.threads) for vector in vectors])
-        with ThreadPoolExecutor(thread_count(self.threads)) as pool:
+        if self.problem.conditions or len(vectors) == 1:
+            return np.array([cost(vector, threads) for vector in vectors])
+        with ThreadPoolExecutor(thread_count(threads)) as pool:
             return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
 
-    def verdict(self, models: Mapping[str, Model]) -> "xr.Dataset":
-        """FLSS of models over (model, window) with its 95 % Wilson interval, on these starts."""
+    def verdict(self, controllers: Mapping[str, Controller], threads: int | None = None) -> "xr.Dataset":
+        """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts."""
         import xarray as xr
 
-        size, windows = len(self.starts), self.problem.windows
-        lost = np.array([self._losses(model, windows, self.threads) for model in models.values()])
-        low, high = wilson_intervals(lost, size)
-        over, unit = ("model", "window"), {"units": "1"}
+        windows = self.problem.windows
+        lost = np.array([self._losses(one, windows, threads) for one in controllers.values()])
+        low, high = wilson_intervals(lost, self.n_starts)
+        over, unit = ("controller", "window"), {"units": "1"}
         return xr.Dataset(
             {
-                "flss": (over, lost / size, unit | {"long_name": "frequency of the loss of static stability"}),
+                "flss": (over, lost / self.n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
                 "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
                 "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             },
-            coords={"model": list(models), "window": [str(window) for window in windows]},
+            coords={"controller": list(controllers), "window": [str(window) for window in windows]},
         )
 
-    def _losses(self, model: Model, windows: list[str | float], threads: int | None) -> np.ndarray:
+    def _losses(self, controller: Controller, windows: list[str | float], threads: int | None) -> np.ndarray:
         """Number of starts that lose stability, or fall, within each window, (window,)."""
-        p, dt = self.problem, self.problem.network.dt
-        steps = [
-            steps_within(observation_time(w, self.velocity, p.network, p.acceleration), p.network) for w in windows
-        ]
-        ends = np.array(steps) * dt
+        p, dt = self.problem, self.problem.stride.dt
+        times = [observation_time(window, self.velocity, p.stride, p.acceleration) for window in windows]
+        ends = np.array([steps_within(time, p.stride) for time in times]) * dt
         longest = ends.max(axis=0)
-        if self.settled:
-            from hexmj.physics.physical_walks import physical_outcomes
-
-            time = float(longest.max())
-            outcomes = physical_outcomes(
-                self.settled, model, self.velocity, time, acceleration=p.acceleration, threads=threads
-            )
-            lost = outcomes.fall
+        if p.conditions:
+            lost = self._falls(controller, float(longest.max()), p.conditions, threads)
         else:
             lost = first_loss(
-                self.starts,
-                model,
-                self.velocity,
-                longest,
-                network=p.network,
-                acceleration=p.acceleration,
-                threads=threads,
-            )
+                self.starts, controller, self.velocity, longest,
+                stride=p.stride, acceleration=p.acceleration, threads=threads,
+            )  # fmt: skip
         return (lost <= ends + 1e-6 * dt).sum(axis=1)
+
+    def _falls(self, controller: Controller, time: float, conditions: Conditions, threads: int | None) -> np.ndarray:
+        """When each start falls in a physical walk, (start,) [time units]; the starts settle once for all walks."""
+        from hexmj.measures.physical import physical_outcomes
+        from hexmj.physics.settling import settle
+
+        p = self.problem
+        if not self._at_rest:
+            self._at_rest.append(settle(self.starts, conditions, p.stride, threads))
+        walked = physical_outcomes(
+            self._at_rest[0], controller, self.velocity, time, acceleration=p.acceleration, threads=threads
+        )
+        return walked.fall

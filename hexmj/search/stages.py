@@ -1,21 +1,29 @@
 """Minimisation of the cost function (paper, Section 4): a population from few starts, then the simplex from many."""
 
-from dataclasses import asdict, dataclass
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
+from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.parameters import Model
 from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
-from hexmj.search.history import Costs, History
+from hexmj.search.history import History
 from hexmj.search.problems import Problem, Sample
+from hexmj.sweeps import Cell, Ledger
+from hexmj.sweeps.plain import plain
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Costs = Callable[[np.ndarray], np.ndarray]
+"""(candidate, parameter) -> (candidate,)."""
 
 ALGORITHMS = {"evolution": Evolution, "cmaes": CovarianceAdaptation}
 
@@ -33,7 +41,7 @@ class Searcher(Protocol):
 
 
 @dataclass(frozen=True)
-class Plan:
+class Effort:
     """How a problem is searched."""
 
     algorithm: Literal["evolution", "cmaes"] = "evolution"
@@ -42,8 +50,9 @@ class Plan:
     """Individuals of a generation; the paper's L."""
     domain: float = 10.0
     """Reach of the initial population [mm, or 1], see `Problem.domain`."""
-    begin: Model | None = None
-    """A set from which the population begins; without it the paper's '0'-individual, or the middle of the domain."""
+    begin: Controller | None = None
+    """Where the population begins; without it at `Form.begin`, and with none there either at the paper's '0'-individual
+    (evolution) or in the middle of the domain (cmaes)."""
     starts: int = 500
     """Starts of each candidate."""
     budget: int = 1000
@@ -63,6 +72,10 @@ class Plan:
         if self.refine_budget < 0:
             raise InputError(f"refine_budget = {self.refine_budget}; expected 0 or more evaluations")
 
+    def settings(self) -> dict[str, Any]:
+        """The effort as plain data."""
+        return plain(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -75,55 +88,54 @@ class Found:
     history: "xr.Dataset"
     """Every candidate and cost, see `History.dataset`."""
     replayed: int
-    """Evaluations that an earlier, unfinished run had already made."""
+    """Different candidates whose cost an earlier run had kept."""
 
 
 def search(
     problem: Problem,
-    plan: Plan,
+    effort: Effort,
     *,
-    path: Path | None = None,
+    folder: Path | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Found:
-    """Search with a population, then refine the best of it; P^2 and P^4 stay as the first stage found them.
+    """Search with a population, then refine the best of it; binary parameters stay as the first stage found them.
 
     Args:
         problem: what is minimised.
-        plan: how.
-        path: NetCDF file for the history; a search that was killed goes on from it, to the same bits.
+        effort: how.
+        folder: keeps every evaluation as it is made; none of them is made again, by this search or another of the same
+            problem and starts.
         threads: one per core unless given; the result does not depend on it.
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError: settings that make no sense, or a file that is damaged or of another search.
-        SimulationError: a physical walk that failed; the history up to it is kept.
+        InputError: settings that make no sense, or a file that is damaged.
+        SimulationError: a physical walk that failed; the evaluations before it are kept.
     """
-    domain = problem.domain(plan.domain, plan.begin)
-    begin = None if domain.begin is None else domain.begin.tolist()
-    history = History(path, problem.names(), {"problem": asdict(problem), "plan": asdict(plan) | {"begin": begin}})
-    work = plan.budget * plan.starts + plan.refine_budget * plan.refine_starts
+    domain, history = problem.domain(effort.domain, effort.begin), History()
+    work = effort.budget * effort.starts + effort.refine_budget * effort.refine_starts
+    sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if effort.refine_budget else {})
+    samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
+    searcher = ALGORITHMS[effort.algorithm](domain, effort.population, effort.seed)
+    ledgers = {
+        stage: Ledger(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
+    }
 
-    def costs(stage: str, starts: int) -> Costs:
-        evaluate = history.recorded(stage, Sample.draw(problem, starts, plan.seed, threads).costs)
+    def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
+        result = ledgers[stage](candidates)
+        history.add(stage, candidates, result)
+        if progress:
+            progress(len(candidates) * sizes[stage] / work)
+        return result
 
-        def told(candidates: np.ndarray) -> np.ndarray:
-            result = evaluate(candidates)
-            if progress:
-                progress(len(candidates) * starts / work)
-            return result
-
-        return told
-
-    few, many = costs("population", plan.starts), costs("simplex", plan.refine_starts)
-    searcher = ALGORITHMS[plan.algorithm](domain, plan.population, plan.seed)
-    try:
-        best, cost = run(searcher, few, plan.budget)
-        if plan.refine_budget:
-            best, cost = refine(best, ~domain.binary, many, plan.refine_budget)
-    finally:
-        history.save()
-    return Found(best, cost, history.dataset(), history.known)
+    best, cost = run(searcher, partial(costs, "population"), effort.budget)
+    if effort.refine_budget:
+        best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget)
+    asked = history.dataset(problem.form.names)
+    settings = json.dumps({"problem": problem.settings(), "effort": effort.settings()}, sort_keys=True)
+    replayed = min(sum(ledger.known for ledger in ledgers.values()), asked.sizes["evaluation"])
+    return Found(best, cost, asked.assign_attrs(settings=settings), replayed)
 
 
 def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:

@@ -1,0 +1,50 @@
+"""A controller of one's own: a tripod of six phase oscillators that pull each other into anti-phase."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import hexmj
+from hexmj.controllers import Step, stepwise
+
+SIGN = np.array([1, -1, 1, -1, 1, -1])  # of the tripod a leg belongs to: L1, L3 and R2, or L2, R1 and R3
+
+
+@dataclass(frozen=True)
+class Tripod:
+    """Every leg is an oscillator; standing legs keep to V_r, and only the time at which they are lifted gives way."""
+
+    pull: float = 1.0
+    name: str = "tripod"
+    mirrored = True
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `hexmj.controllers.Controller`."""
+        span, dt = stride.aep0 - stride.pep0, stride.dt
+        x, stands, age = starts, np.ones(starts.shape, dtype=bool), (stride.aep0 - starts) / span
+
+        def step(v):
+            nonlocal x, stands, age  # age: part of its stance that a standing leg has behind it
+            v = v[:, None]
+            part = 1 / (1 + v)  # of the period for which legs stand
+            phase = np.where(stands, age * part, 1 - (stride.aep0 - x) / span * (1 - part))
+            hand = SIGN * np.exp(2j * np.pi * phase)  # of the clock that each oscillator is
+            mean = (hand[:, :3] + hand[:, 3:]).mean(axis=1, keepdims=True) / 2
+            pulled = 1 + self.pull * (mean * hand.conj()).imag
+            age = np.where(stands, np.minimum(age + pulled * v * dt / span, 1), 0)
+            others_stand = np.stack([stands[:, 1::2].all(axis=1), stands[:, ::2].all(axis=1)] * 3, axis=1)
+            x = np.where(stands, x - v * dt, x + dt)
+            lifted = (age == 1) & others_stand | (x - v * dt < stride.pep_min)
+            stands = np.where(stands, ~lifted, x > stride.aep0 - dt / 2)
+            return Step(x, stands)
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+if __name__ == "__main__":
+    velocities = [0.1, 0.3, 0.5]
+    for controller in (Tripod(), hexmj.LDVS):
+        kinematic = hexmj.flss(controller, velocities, n_starts=500)
+        physical = hexmj.physical_flss(controller, velocities, n_starts=16)
+        print(f"{controller.name}: FLSS at V = {velocities}: kinematic {kinematic.flss.values.round(3)},", end=" ")
+        print(f"physical {physical.flss.values.round(3)}")

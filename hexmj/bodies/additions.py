@@ -1,0 +1,98 @@
+"""What a body's MJCF may lack is added as it is compiled: servos, pairs that touch, sensors.
+
+Nothing is added to an MJCF that has it all, as the stick insect's.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.description import Body
+from hexmj.bodies.gains import Gains
+from hexmj.legs import LEGS
+
+_SENSOR, _OBJECT = mujoco.mjtSensor, mujoco.mjtObj
+
+_FOUND = 1 << mujoco.mjtConDataField.mjCONDATA_FOUND.value
+"""Of a contact sensor that counts contacts."""
+
+
+@dataclass(frozen=True)
+class SensorGroup:
+    """Sensors of one kind that lie side by side in `sensordata`."""
+
+    kind: mujoco.mjtSensor
+    of: mujoco.mjtObj
+    """What they are attached to."""
+    objects: tuple[str, ...]
+    """Names of that, one for each sensor."""
+    names: tuple[str, ...]
+    """Of the sensors where they are added."""
+
+    def find(self, model: mujoco.MjModel) -> slice | None:
+        """Their columns of `sensordata`; none where the model lacks them, or has them in another order."""
+        wanted = np.array([mujoco.mj_name2id(model, self.of, name) for name in self.objects])
+        fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.of) & (model.sensor_refid < 0)
+        if self.kind == _SENSOR.mjSENS_CONTACT:
+            fits &= model.sensor_intprm[:, 0] == _FOUND
+        for first in range(model.nsensor - len(wanted) + 1):
+            these = slice(first, first + len(wanted))
+            if fits[these].all() and (model.sensor_objid[these] == wanted).all():
+                end = these.stop - 1
+                return slice(int(model.sensor_adr[first]), int(model.sensor_adr[end] + model.sensor_dim[end]))
+        return None
+
+
+def sensor_groups(body: Body) -> dict[str, SensorGroup]:
+    """The sensors that walks are measured with, by what they measure."""
+    touches, grounds = tuple(f"{leg}_touch" for leg in LEGS), tuple(f"{part}_ground" for part in body.trunk)
+    return {
+        "foot": SensorGroup(_SENSOR.mjSENS_FRAMEPOS, _OBJECT.mjOBJ_SITE, body.feet, body.feet),
+        "touch": SensorGroup(_SENSOR.mjSENS_TOUCH, _OBJECT.mjOBJ_SITE, body.feet, touches),
+        "trunk": SensorGroup(_SENSOR.mjSENS_CONTACT, _OBJECT.mjOBJ_GEOM, body.trunk, grounds),
+        "centre_of_mass": SensorGroup(_SENSOR.mjSENS_SUBTREECOM, _OBJECT.mjOBJ_BODY, (body.root,), ("centre_of_mass",)),
+    }
+
+
+def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gains) -> None:
+    """Make a spec walk: servos with these gains at the joints, nothing that touches but feet and trunk the ground.
+
+    Args:
+        spec: the body's, as its MJCF says.
+        plain: the same, compiled.
+        body: its description.
+        gains: of the servos.
+    """
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    paired = [{pair.geomname1, pair.geomname2} for pair in spec.pairs]
+    for touching in (*body.trunk, *body.feet):
+        if {body.ground, touching} not in paired:
+            spec.add_pair(name=f"{body.ground}_{touching}", geomname1=body.ground, geomname2=touching)
+    for servo in _servos(spec, body):
+        servo.set_to_position(kp=gains.stiffness, dampratio=gains.damping_ratio)
+        servo.forcerange, servo.gear = [-gains.torque, gains.torque], [1.0] + 5 * [0.0]
+        servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
+    for group in sensor_groups(body).values():
+        if group.find(plain) is None:
+            _add_sensors(spec, group)
+
+
+def _servos(spec: mujoco.MjSpec, body: Body) -> Iterator[mujoco.MjsActuator]:
+    """The actuators of the joints, added where there is none."""
+    if spec.actuators:
+        yield from spec.actuators
+    else:
+        for joint in body.joints:
+            yield spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+
+
+def _add_sensors(spec: mujoco.MjSpec, group: SensorGroup) -> None:
+    taken = {sensor.name for sensor in spec.sensors}
+    for name, of in zip(group.names, group.objects, strict=True):
+        name = f"{name}_measured" if name in taken else name
+        sensor = spec.add_sensor(name=name, type=group.kind, objtype=group.of, objname=of)
+        if group.kind == _SENSOR.mjSENS_CONTACT:
+            sensor.intprm[:3] = _FOUND, 0, 1

@@ -1,0 +1,157 @@
+"""A compiled body: the one object that is asked for its model, its columns, its kinematics and its measures."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.bodies.additions import sensor_groups
+from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
+from hexmj.bodies.hinges import ThreeHinges, three_hinges
+from hexmj.bodies.numeric import HingeChains, hinge_chains
+from hexmj.errors import InputError
+
+if TYPE_CHECKING:
+    from hexmj.conditions import Conditions
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Where joints and sensors stand in MuJoCo's arrays: ``qpos[..., columns.qpos]`` is (..., leg * joint)."""
+
+    qpos: slice
+    """Of `qpos`: angles of the joints, leg by leg, each leg's from the body outwards [rad]."""
+    qvel: slice
+    """Of `qvel` and other arrays over the degrees of freedom: velocities of the joints [rad/s]."""
+    ctrl: slice
+    """Of `ctrl` and other arrays over the actuators: targets of the joints [rad]."""
+    grasp: slice
+    """Of `ctrl`: adhesion of each foot, 0 to 1, (..., leg); empty where feet do not grasp."""
+    foot: slice
+    """Of `sensordata`: feet in the world, (..., leg * axis) [mm]; reshape to (leg, 3)."""
+    touch: slice
+    """Of `sensordata`: normal force of the ground on each foot, (..., leg) [g mm/s^2]."""
+    trunk: slice
+    """Of `sensordata`: number of contacts of each part of the trunk, (..., part)."""
+    centre_of_mass: slice
+    """Of `sensordata`: centre of mass of the whole body in the world, (..., axis) [mm]."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledBody:
+    """A body under some conditions, ready to walk."""
+
+    model: mujoco.MjModel
+    """The caller's own."""
+    conditions: "Conditions"
+    """Those it was compiled for."""
+    columns: Columns
+    kinematics: ThreeHinges | HingeChains
+    """In closed form where its legs have one, else numeric."""
+    foot_radius: float
+    """Height of a standing foot's tip over the ground [mm]."""
+    trunk_corners: tuple[np.ndarray, np.ndarray]
+    """Where the trunk ends in the root frame, (corner, axis) [mm], and how thick it is there, (corner,) [mm]."""
+    home: np.ndarray
+    """`qpos` in posture home, (position,)."""
+
+    @property
+    def body(self) -> Body:
+        """Its description."""
+        return self.conditions.body
+
+    @property
+    def joints(self) -> int:
+        """Number of joints of all legs."""
+        return len(self.body.joints)
+
+    @property
+    def root(self) -> int:
+        """MuJoCo's number of the root."""
+        return int(self.model.jnt_bodyid[0])
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of gravity [mm/s^2]."""
+        return -float(self.model.opt.gravity[2])
+
+    @property
+    def mass(self) -> float:
+        """Of the body itself, without what it carries [g]."""
+        return self.body.mass
+
+    @property
+    def weight(self) -> float:
+        """Of the body itself [g mm/s^2]."""
+        return self.mass * self.gravity
+
+    @property
+    def torque_limits(self) -> np.ndarray:
+        """Greatest torque of each joint, (leg * joint,) [g mm^2/s^2]."""
+        return self.model.actuator_forcerange[self.columns.ctrl, 1]
+
+    @property
+    def home_joints(self) -> np.ndarray:
+        """Angles of the joints in posture home, (leg, joint) [rad]."""
+        return self.home[self.columns.qpos].reshape(len(self.body.legs), -1)
+
+    def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].
+
+        Returns:
+            The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether it can, (..., leg).
+        """
+        return self.kinematics.inverse(tips)
+
+    def forward(self, joints: ArrayLike) -> np.ndarray:
+        """Tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""
+        return self.kinematics.forward(joints)
+
+
+def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:
+    """Kinematics of a compiled body's legs, in closed form where all of them have one."""
+    chains = hinge_chains(model, body)
+    return three_hinges(model, body, chains) or chains
+
+
+def columns(model: mujoco.MjModel, body: Body) -> Columns:
+    """Where a compiled body has its joints and sensors."""
+    found = {}
+    for name, group in sensor_groups(body).items():
+        if (here := group.find(model)) is None:
+            raise InputError(f"body {body.name!r}: its sensors {', '.join(group.names)} do not measure {name}")
+        found[name] = here
+    joints = len(body.joints)
+    return Columns(
+        qpos=slice(ROOT_QPOS, ROOT_QPOS + joints),
+        qvel=slice(ROOT_QVEL, ROOT_QVEL + joints),
+        ctrl=slice(0, joints),
+        grasp=slice(joints, model.nu),
+        **found,
+    )
+
+
+def trunk_corners(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the trunk's capsules, middles of its spheres and corners of its boxes, (corner, axis) [mm], in the root
+    frame, and the radius around each, (corner,) [mm]."""
+    data = mujoco.MjData(model)
+    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    mujoco.mj_kinematics(model, data)
+    ends, radii = [], []
+    for part in body.trunk:
+        geom = model.geom(part).id
+        size, place, axes = model.geom_size[geom], data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            corners, radius = [place - size[1] * axes[:, 2], place + size[1] * axes[:, 2]], size[0]
+        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
+            corners, radius = [place], size[0]
+        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+            signs = np.stack(np.meshgrid(*3 * [[-1, 1]]), axis=-1).reshape(-1, 3)
+            corners, radius = list(place + (signs * size) @ axes.T), 0.0
+        else:
+            raise InputError(f"body {body.name!r}: trunk part {part!r}; expected a capsule, a sphere or a box")
+        ends += corners
+        radii += len(corners) * [radius]
+    return np.array(ends), np.array(radii)

@@ -1,0 +1,212 @@
+"""The description of a six-legged body: its MJCF, the names in it, and the lengths that limits are made of.
+
+Units mm, g, s, rad; forces in g mm/s^2.  The MJCF of a body uses them too.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from hexmj.errors import InputError
+from hexmj.legs import LEGS, Geometry
+
+ROOT_QPOS = 7
+"""Numbers of `qpos` before the joints: the free root's position (3) and unit quaternion (4)."""
+
+ROOT_QVEL = 6
+"""Numbers of `qvel` before the joints: the free root's velocity (3) and angular velocity (3)."""
+
+FEWEST_JOINTS = 3
+"""Hinges that a leg needs to put its foot anywhere in space."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One leg by its names in the MJCF."""
+
+    joints: tuple[str, ...]
+    """Its hinges from the body outwards, each with a range."""
+    foot: str
+    """The site at its tip, and the sphere around it that stands on the ground."""
+    parts: tuple[str, ...]
+    """The bodies whose mass is the leg's; the foot's is one of them."""
+
+
+@dataclass(frozen=True)
+class Servo:
+    """What the gains of the joints are computed from, see `gains`."""
+
+    step: float
+    """The time step for which the joints are as stiff as it allows [s]."""
+    damping_ratio: float
+    """Of the lightest motion of each joint; 1 is critical."""
+    digits: int
+    """Significant digits of the gains."""
+
+    def __post_init__(self) -> None:
+        _check_positive("Servo", step=(self.step, "s"), damping_ratio=(self.damping_ratio, ""))
+        if not 1 <= self.digits <= 17:
+            raise InputError(f"Servo: digits = {self.digits}; expected 1 to 17")
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """The lengths, and one speed, that limits and tolerances are made of."""
+
+    highest_lift: float
+    """Greatest height to which a swinging foot is lifted [mm]."""
+    highest_stand: float
+    """Greatest standing height [mm]."""
+    slowest_swing: float
+    """Least velocity V_p of a protracting tip relative to the body [mm/s]."""
+    fastest_swing: float
+    """Greatest velocity V_p [mm/s]."""
+    shortest_leg: float
+    """Length of the shortest leg [mm]: no obstacle is taller, and a gap is as deep."""
+    farthest_centre_of_mass: float
+    """How far the centre of mass may be moved ahead or back [mm]."""
+    load_gyration: float
+    """Radius of gyration of what is carried [mm]."""
+    nearest_obstacle: float
+    """Least distance of what lies ahead from O at the start, ahead of the front feet [mm]."""
+    farthest_obstacle: float
+    """Greatest distance of what lies ahead from O at the start [mm]."""
+    longest_obstacle: float
+    """Greatest length of a gap or a hurdle along the way [mm]."""
+    highest_bump: float
+    """Height of the highest bump of rough ground [mm]; bumps are caps of spheres, twice as wide."""
+    bump_spacing: float
+    """Distance of the bumps' centres [mm]; neighbours leave only small gaps."""
+    ground_half_width: float
+    """Half the width of everything that lies ahead [mm]."""
+    ground_reach: float
+    """How far steps and the banks of a gap reach [mm]."""
+    speed_at_rest: float
+    """Speed of the root below which a start counts as settled [mm/s]."""
+    tracking_bin: float
+    """Width of the bins in which distances of feet from their targets are counted [mm]."""
+    tracking_bins: int
+    """Number of these bins; greater distances are counted together."""
+    largest_tip_offset: float
+    """Greatest offset of a planned tip in each direction that an environment's action may ask for [mm]."""
+    no_foot_margin: float
+    """Stands for the stability margin of a body without a foot on the ground [mm]; a foot in contact gives more,
+    since no leg reaches so far."""
+
+    def __post_init__(self) -> None:
+        positive = {field.name: (getattr(self, field.name), "") for field in fields(self)}
+        positive["no_foot_margin"] = (-self.no_foot_margin, "with the sign turned")
+        _check_positive("Lengths", **positive)
+
+    def scaled(self, factor: float) -> "Lengths":
+        """The lengths of a body so many times as large; speeds grow with them, the number of bins does not."""
+        values = {field.name: getattr(self, field.name) * factor for field in fields(self)}
+        return Lengths(**(values | {"tracking_bins": self.tracking_bins}))
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Sizes of the marks that a film draws on the ground and at the tips [mm]."""
+
+    fill_height: float
+    """Height of the support polygon's area over the ground; its outline lies on the ground."""
+    outline: float
+    """Radius of the polygon's outline."""
+    plumb_line: float
+    """Radius of the line from the centre of mass down to the ground."""
+    rim: tuple[float, float]
+    """Radius and half height of the disc whose rim shows whether the body is stable."""
+    centre: tuple[float, float]
+    """Radius and half height of the disc below the centre of mass."""
+    tip: float
+    """Radius of the ball at a planned tip."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A six-legged body, described so that it can be compiled, loaded with masses, put on any ground and walked."""
+
+    name: str
+    """What it is called where bodies are listed."""
+    mjcf: Path
+    """Its MJCF file; may include others and refer to meshes beside it."""
+    root: str
+    """Body with the free joint.  Its frame is at O: x forward, y left, z up."""
+    trunk: tuple[str, ...]
+    """Parts from front to rear, names of bodies and of their geoms, that fall on the ground; they carry the mass that
+    is not the legs'."""
+    legs: tuple[Leg, ...]
+    """The six legs in the order of `hexmj.legs.LEGS`."""
+    ground: str
+    """Geom of the plane on which it stands."""
+    home: str
+    """Keyframe in which the feet stand on the origins of their lines."""
+    cameras: tuple[str, ...]
+    """From which it can be filmed."""
+    lines: Geometry
+    """Lines of the tips in posture `home`."""
+    standing_height: float
+    """Height of the root's frame above the tips in posture `home` [mm]."""
+    longest_step: float
+    """Longest time step that its gains and contacts allow [s]."""
+    mass: float
+    """Its own mass [g]."""
+    servo: Servo
+    """What its gains are computed from."""
+    lengths: Lengths
+    """What limits and tolerances are made of."""
+    marks: Marks
+    """Sizes of a film's marks."""
+
+    def __post_init__(self) -> None:
+        _check_positive(
+            f"body {self.name!r}",
+            mass=(self.mass, "g"),
+            standing_height=(self.standing_height, "mm"),
+            longest_step=(self.longest_step, "s"),
+        )
+        if not self.mjcf.is_file():
+            raise InputError(f"body {self.name!r}: mjcf = {str(self.mjcf)!r} is no file; expected the body's MJCF")
+        if not self.trunk:
+            raise InputError(f"body {self.name!r}: trunk = (); expected the names of at least one part")
+        if len(self.legs) != len(LEGS):
+            raise InputError(
+                f"body {self.name!r}: {len(self.legs)} legs; expected {len(LEGS)}, in the order {', '.join(LEGS)}"
+            )
+        numbers = [len(leg.joints) for leg in self.legs]
+        if len(set(numbers)) > 1 or numbers[0] < FEWEST_JOINTS:
+            raise InputError(
+                f"body {self.name!r}: its legs have {', '.join(map(str, numbers))} joints;"
+                f" expected equally many in each, at least {FEWEST_JOINTS}"
+            )
+        for kind, names in {
+            "joints": self.joints,
+            "feet": self.feet,
+            "trunk": self.trunk,
+            "parts of legs": tuple(part for leg in self.legs for part in leg.parts),
+        }.items():
+            twice = [name for i, name in enumerate(names) if name in names[:i]]
+            if twice:
+                raise InputError(f"body {self.name!r}: {kind} name {twice[0]!r} twice; expected every name once")
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all joints, leg by leg, each leg's from the body outwards."""
+        return tuple(joint for leg in self.legs for joint in leg.joints)
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """Names of the feet, (leg,)."""
+        return tuple(leg.foot for leg in self.legs)
+
+    def text(self) -> str:
+        """Its MJCF."""
+        return self.mjcf.read_text(encoding="utf-8")
+
+
+def _check_positive(what: str, **values: tuple[Any, str]) -> None:
+    """Refuse numbers that are not finite and above 0; `values` are named pairs of number and unit."""
+    for name, (value, unit) in values.items():
+        if not 0 < value < math.inf:
+            raise InputError(f"{what}: {name} = {value}; expected a finite number above 0 {unit}".rstrip())

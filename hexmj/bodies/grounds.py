@@ -1,0 +1,122 @@
+"""The ground: a plane, or what lies ahead on it.  Only feet and trunk touch it, as listed pairs.
+
+Everywhere `ground` says what lies ahead: `ground.ground` is its kind, `ground_height`, `ground_at`, `ground_length` and
+`ground_seed` its measures (`hexmj.conditions.Ground`).
+"""
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.description import Body, Lengths
+
+if TYPE_CHECKING:
+    from hexmj.conditions import Ground
+
+BUMPS = (15, 9)
+"""Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
+
+LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
+"""Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
+
+
+def lay_ground(spec: mujoco.MjSpec, ground: "Ground", body: Body) -> None:
+    """Add what lies ahead to a spec of a body on its plane."""
+    lengths = body.lengths
+    near, length, height, far = ground.ground_at, ground.ground_length, ground.ground_height, lengths.ground_reach
+    boxes, caps = {}, {}
+    if ground.ground == "step":
+        boxes = {"step": (near, near + far, height)}
+    elif ground.ground == "hurdle":
+        boxes = {"hurdle": (near, near + length, height)}
+    elif ground.ground == "gap":
+        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
+        boxes = {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)}
+    elif ground.ground == "rough":
+        caps = {f"bump_{i}": bump for i, bump in enumerate(zip(*_bumps(ground, lengths), strict=True))}
+    look = LOOK | {"material": spec.geom(body.ground).material}
+    for name, (begin, end, top) in boxes.items():
+        half = (top + lengths.shortest_leg) / 2
+        spec.worldbody.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[(end - begin) / 2, lengths.ground_half_width, half],
+            pos=[(begin + end) / 2, 0.0, top - half],
+            **look,
+        )
+    # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that is
+    # deeper than its distance from their sides sideways into the next, and there it stays.
+    for name, ((x, y), top, radius) in caps.items():
+        spec.worldbody.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[radius, 0.0, 0.0],
+            pos=[x, y, top - radius],
+            **look,
+        )
+    for piece in (*boxes, *caps):
+        for touching in (*body.trunk, *body.feet):
+            spec.add_pair(name=f"{piece}_{touching}", geomname1=piece, geomname2=touching)
+
+
+def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.ndarray:
+    """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
+    x = places[..., 0]
+    if ground.ground == "rough":
+        centres, heights, radii = _bumps(ground, lengths)
+        off = np.linalg.norm(places[..., None, :] - centres, axis=-1)
+        caps = np.sqrt(np.maximum(radii**2 - off**2, 0.0)) - (radii - heights)
+        return np.maximum(caps.max(axis=-1), 0.0)
+    end = np.inf if ground.ground == "step" else ground.ground_at + ground.ground_length
+    height = {"flat": 0.0, "gap": -lengths.shortest_leg}.get(ground.ground, ground.ground_height)
+    return np.where((x > ground.ground_at) & (x < end), height, 0.0)
+
+
+def depth_in_ground(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+    """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
+
+    Args:
+        ground: what lies ahead.
+        lengths: of the body that walks there.
+        feet: the spheres' centres in the world, (..., 3) [mm].
+        radius: of the spheres [mm].
+
+    Returns:
+        (...,) [mm].
+    """
+    x, z = feet[..., 0], feet[..., 2]
+    near, length = ground.ground_at, ground.ground_length
+    if ground.ground == "flat":
+        return radius - z
+    if ground.ground == "rough":
+        return np.maximum(radius - z, _depth_in_bumps(ground, lengths, feet, radius))
+    off_middle = np.abs(x - near - length / 2)
+    outside = {"step": near - x, "hurdle": off_middle - length / 2, "gap": length / 2 - off_middle}[ground.ground]
+    above = z - (0.0 if ground.ground == "gap" else ground.ground_height)
+    from_block = np.hypot(np.maximum(outside, 0.0), np.maximum(above, 0.0)) + np.minimum(np.maximum(outside, above), 0)
+    floor = -lengths.shortest_leg if ground.ground == "gap" else 0.0
+    return radius - np.minimum(from_block, z - floor)
+
+
+def _depth_in_bumps(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+    """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
+    centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(ground, lengths))
+    corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
+    depth = np.full(feet.shape[:-1], -np.inf)
+    for along, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        i, j = (np.clip(corner[..., k] + step, 0, BUMPS[k] - 1) for k, step in enumerate((along, across)))
+        below = (heights - radii)[i, j]
+        centre = np.concatenate([centres[i, j], below], axis=-1)
+        depth = np.maximum(depth, radii[i, j, 0] + radius - np.linalg.norm(feet - centre, axis=-1))
+    return depth
+
+
+def _bumps(ground: "Ground", lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
+    along, across = BUMPS
+    x = ground.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)
+    y = lengths.bump_spacing * (np.arange(across) - (across - 1) / 2)
+    heights = ground.ground_height * np.random.default_rng(ground.ground_seed).random(along * across)
+    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return centres, heights, (lengths.highest_bump**2 + heights**2) / (2 * heights)

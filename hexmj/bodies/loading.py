@@ -1,0 +1,125 @@
+"""A body compiled for its conditions: with its gains, on its ground, under its load."""
+
+import copy
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+
+from hexmj.bodies.additions import complete
+from hexmj.bodies.checks import check_described
+from hexmj.bodies.compiled import CompiledBody, columns, kinematics, trunk_corners
+from hexmj.bodies.description import Body
+from hexmj.bodies.gains import gains
+from hexmj.bodies.grounds import lay_ground
+from hexmj.errors import InputError
+from hexmj.legs import LEGS
+
+if TYPE_CHECKING:
+    from hexmj.conditions import Conditions, FootContact, Ground, Masses
+
+
+def compile_body(conditions: "Conditions", timestep: float | None = None, *, looks: bool = True) -> CompiledBody:
+    """The body of some conditions, compiled; every call gives a model of its own.
+
+    Args:
+        conditions: body, masses, contact of the feet and ground are taken from them.
+        timestep: integration step [s], at most the longest one that the body's gains and contacts are made for, which
+            it is unless given.
+        looks: with the geoms that are only to look at; without them it walks to the same bits, 2 % faster.
+
+    Raises:
+        InputError: a time step that makes no sense, or a body whose MJCF is not as described.
+    """
+    body = conditions.body
+    timestep = body.longest_step if timestep is None else timestep
+    if not 0 < timestep <= body.longest_step:
+        raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
+    compiled, measures = _compiled(body, conditions.masses, conditions.contact, conditions.ground, looks)
+    model = copy.copy(compiled)
+    model.opt.timestep = timestep
+    return CompiledBody(model=model, conditions=conditions, **measures)
+
+
+@lru_cache(maxsize=16)
+def plain_model(body: Body) -> mujoco.MjModel:
+    """The MJCF of a body, compiled as it is; not to be written to.
+
+    Raises:
+        InputError: it does not compile, or it is not as described.
+    """
+    try:
+        model = _spec(body).compile()
+    except ValueError as error:
+        raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
+    check_described(model, body)
+    return model
+
+
+def gravity(body: Body) -> float:
+    """Acceleration of gravity where a body walks [mm/s^2]."""
+    return -float(plain_model(body).opt.gravity[2])
+
+
+@lru_cache(maxsize=16)
+def _compiled(
+    body: Body, masses: "Masses", contact: "FootContact", ground: "Ground", looks: bool
+) -> tuple[mujoco.MjModel, dict[str, Any]]:
+    """The model under some conditions, and what is measured on it once."""
+    plain = plain_model(body)
+    spec = _spec(body)
+    spec.compiler.discardvisual = not looks
+    complete(spec, plain, body, gains(plain, body))
+    lay_ground(spec, ground, body)
+    if masses.load:
+        mass = masses.load * body.mass
+        load = spec.body(body.root).add_body(name="load", mass=mass, inertia=3 * [body.lengths.load_gyration**2 * mass])
+        load.explicitinertial = True
+    if contact.grasp:
+        _add_grasp(spec, body, contact.grasp * body.mass * gravity(body))
+    model = spec.compile()
+    model.pair_friction[:, :2] = contact.friction
+    if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
+        _redistribute(model, body, masses)
+    measures = {
+        "columns": columns(model, body),
+        "kinematics": kinematics(model, body),
+        "foot_radius": float(model.geom(body.feet[0]).size[0]),
+        "trunk_corners": trunk_corners(model, body),
+        "home": model.key(body.home).qpos.copy(),
+    }
+    return model, measures
+
+
+def _spec(body: Body) -> mujoco.MjSpec:
+    return mujoco.MjSpec.from_file(str(body.mjcf))
+
+
+def _add_grasp(spec: mujoco.MjSpec, body: Body, force: float) -> None:
+    """Let feet hold on to the ground, each with a force [g mm/s^2] times its actuator's 0 to 1."""
+    for name, foot in zip(LEGS, body.feet, strict=True):
+        spec.add_actuator(
+            name=f"{name}_grasp",
+            trntype=mujoco.mjtTrn.mjTRN_BODY,
+            target=spec.geom(foot).parent.name,
+            gainprm=[force] + 9 * [0.0],
+            ctrllimited=True,
+            ctrlrange=[0.0, 1.0],
+        )
+
+
+def _redistribute(model: mujoco.MjModel, body: Body, masses: "Masses") -> None:
+    """Give the legs their share of the mass, and move the trunk's masses until the centre of mass lies there."""
+    legs = [model.body(part).id for leg in body.legs for part in leg.parts]
+    trunk = [model.body(part).id for part in body.trunk]
+    in_legs, in_trunk = model.body_mass[legs].sum(), model.body_mass[trunk].sum()
+    for bodies, factor in ((legs, masses.leg_mass), (trunk, 1.0 + in_legs / in_trunk * (1.0 - masses.leg_mass))):
+        model.body_mass[bodies] *= factor
+        model.body_inertia[bodies] *= factor
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(body.home).id)
+    mujoco.mj_forward(model, data)
+    offset = masses.centre_of_mass - (data.subtree_com[model.body(body.root).id] - data.qpos[:3])[0]
+    model.body_ipos[trunk, 0] += offset * model.body_mass.sum() / model.body_mass[trunk].sum()
+    mujoco.mj_setConst(model, data)

@@ -1,0 +1,105 @@
+"""`hexmj flss`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tyro.conf import OmitArgPrefixes
+
+from hexmj.cli.options import Accelerating, Controlled, ControllerName, Walks, Workers, refuse_physical
+from hexmj.cli.tables import conditions_line, new_table, physical_report, print_json, report_line, save_figure, show
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.progress import progress_bar
+from hexmj.results import results_folder, save_dataset, save_manifest
+from hexmj.starts import SAMPLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Flss:
+    """FLSS of one controller over velocities, kinematic or physical."""
+
+    model: ControllerName = "ldvs"
+    velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    physical: bool = False
+    """Count falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    starts: int | None = None
+    """Number of random starts; 7000 unless given (seven samples of 1000, as in the paper), 200 if physical."""
+    out: Path | None = None
+    """Folder for figure, NetCDF and manifest; none are written unless given."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
+    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
+    workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+    @property
+    def kind(self) -> str:
+        """Which measure it is."""
+        return "physical" if self.physical else "kinematic"
+
+    @property
+    def n_starts(self) -> int:
+        """Number of random starts."""
+        return self.starts if self.starts is not None else 200 if self.physical else 7 * SAMPLE
+
+    def run(self) -> None:
+        """Measure, write what is asked for, and print."""
+        if not self.physical:
+            refuse_physical(self.conditions, self.controlled, "without --physical")
+        controller = self.controlled.controller(self.model)
+        if self.out:
+            results_folder(self.out, ("flss.nc", "flss.png", "manifest.json"))
+        table = self._measured(controller)
+        table.attrs = {"model": self.model, "physical": self.physical} | table.attrs
+        self._print(table, self._write(table, controller, self.out) if self.out else [])
+
+    def _measured(self, controller: Controller) -> "xr.Dataset":
+        how = {
+            "n_starts": self.n_starts,
+            "window": self.walks.time,
+            "seed": self.walks.seed,
+            "stride": self.walks.stride,
+            "acceleration": self.accelerating.procedure,
+            "threads": self.workers.threads,
+        }
+        with progress_bar(f"{self.kind} FLSS") as progress:
+            if self.physical:
+                from hexmj.measures.compare import physical_flss
+
+                return physical_flss(controller, self.velocities, conditions=self.conditions, progress=progress, **how)
+            from hexmj.measures.kinematic import flss
+
+            return flss(controller, self.velocities, progress=progress, **how)
+
+    def _write(self, table: "xr.Dataset", controller: Controller, out: Path) -> list[Path]:
+        from hexmj.measures.figures import flss_figure
+
+        title = f"{controller.name}, {self.kind} FLSS, {self.n_starts} starts, window {self.walks.window}"
+        return [
+            save_dataset(table, out / "flss.nc"),
+            save_figure(flss_figure(table, title), out / "flss.png"),
+            save_manifest(table.attrs, out / "manifest.json"),
+        ]
+
+    def _print(self, table: "xr.Dataset", files: list[Path]) -> None:
+        columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]
+        report = physical_report(table) if self.physical else {}
+        if self.json:
+            lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
+            print_json(lists | ({"report": report} if report else {}) | {"settings": table.attrs, "files": files})
+            return
+        rows = new_table("V", *columns)
+        for v in table.velocity.values:
+            one = table.sel(velocity=v)
+            rows.add_row(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns))
+        conditions = self.conditions if self.physical else None
+        lines = [conditions_line(self.walks, self.controlled, self.accelerating.procedure, conditions)]
+        lines += [report_line(report)] if report else []
+        show(f"{self.kind} FLSS of {self.model}, {self.n_starts} starts", rows, *lines, *map(str, files))

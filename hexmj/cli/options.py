@@ -1,0 +1,213 @@
+"""What several commands are told: which walks, by which controller, under which conditions.
+
+Each command is a frozen dataclass made of these parts, and offers just the options that it obeys.
+"""
+
+from collections.abc import Collection, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Annotated, Any, get_type_hints
+
+from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
+from tyro.constructors import (
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    StructConstructorSpec,
+    StructFieldSpec,
+    StructTypeInfo,
+)
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.legs import GEOMETRIES, Geometry
+from hexmj.timing import Acceleration, Stride
+
+CONTROLLER = (
+    "a preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9), a file of weights (TOML), module:object,"
+    " file.py:object or an entry point"
+)
+"""How controllers are named."""
+
+ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
+
+
+@dataclass(frozen=True)
+class Walks:
+    """Which walks: their starts, how long they are observed, and where the tips step."""
+
+    window: str = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (40 time units) or a number [time units]."""
+    seed: int = 0
+    """Seed of the random starts."""
+    stride: OmitArgPrefixes[Stride] = field(default_factory=Stride)
+
+    @property
+    def time(self) -> str | float:
+        """The window's name, or its number of time units."""
+        try:
+            return float(self.window)
+        except ValueError:
+            return self.window
+
+
+@dataclass(frozen=True)
+class Accelerating:
+    """Whether walks accelerate."""
+
+    acceleration: float | None = None
+    """Accelerate from --initial-velocity with this a of Eq. 11 [1 / time unit]; the paper's is 0.00008."""
+    initial_velocity: float | None = None
+    """V_r(0) when accelerating, a fraction of V_p; 0.1 unless given."""
+
+    @property
+    def procedure(self) -> Acceleration | None:
+        """Eq. 11, if walks accelerate.
+
+        Raises:
+            InputError: an initial velocity without an acceleration.
+        """
+        if self.acceleration is not None:
+            start = Acceleration.start if self.initial_velocity is None else self.initial_velocity
+            return Acceleration(self.acceleration, start)
+        if self.initial_velocity is not None:
+            raise InputError(
+                f"--initial-velocity = {self.initial_velocity:g} without --acceleration; expected both or neither"
+            )
+        return None
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """How the controllers plan that are named."""
+
+    order: str | None = None
+    """Order of updates of the 1998 network: 'printed' (Eq. 6 to the letter, unless given), 'undelayed' or
+    'sequential'."""
+    feedback: bool = False
+    """The controller reads the legs before each of its steps, where the tips are and which feet meet the ground,
+    instead of going on by itself."""
+
+    def controller(self, name: str) -> Controller:
+        """A controller by its name, see `load_controller`, planning in this way.
+
+        Raises:
+            InputError: no such controller, or one that has no order of updates, or not this one.
+        """
+        from hexmj.controllers.cruse1998 import Cruse1998
+        from hexmj.controllers.named import load_controller
+        from hexmj.controllers.reads_legs import ReadsLegs
+
+        found = load_controller(name)
+        if self.order is not None:
+            if not isinstance(found, Cruse1998):
+                raise InputError(f"--order = {self.order} with {name}; expected it with the 1998 network only")
+            found = replace(found, order=self.order)  # pyright: ignore[reportArgumentType]
+        return ReadsLegs(found) if self.feedback else found
+
+
+@dataclass(frozen=True)
+class Workers:
+    """What works."""
+
+    threads: int | None = None
+    """Threads; one per core unless given.  No result depends on it."""
+
+
+@dataclass(frozen=True)
+class Sweepers:
+    """What works on cells, which are kept as they finish."""
+
+    threads: int | None = None
+    """Threads of each process; unless given, processes share the cores.  No result depends on it."""
+    processes: int = 1
+    """Processes that compute cells side by side.  No result depends on it."""
+
+    @property
+    def threads_each(self) -> int | None:
+        """Threads of each process; None where a single one takes all cores."""
+        from hexmj.threads import thread_count
+
+        shared = max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
+        return self.threads if self.threads is not None else shared
+
+    @contextmanager
+    def executor(self) -> Iterator[Executor | None]:
+        """The processes, or None where this one does the work.
+
+        Raises:
+            InputError: no process.
+        """
+        if self.processes < 1:
+            raise InputError(f"--processes = {self.processes}; expected at least 1")
+        if self.processes == 1:
+            yield None
+            return
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        with ProcessPoolExecutor(self.processes, get_context("spawn")) as executor:
+            yield executor
+
+
+def refuse_physical(conditions: Conditions, controlled: Controlled, reason: str, obeyed: Collection[str] = ()) -> None:
+    """Refuse what only a body obeys, where none walks.
+
+    Args:
+        conditions: as given on the command line.
+        controlled: may ask for feedback.
+        reason: why no body walks, such as 'without --physical'.
+        obeyed: names of conditions that are obeyed nevertheless.
+
+    Raises:
+        InputError: a condition that is not the usual one, or feedback.
+    """
+    given = [name for name in changed(conditions, Conditions()) if name not in obeyed]
+    given += ["feedback"] if controlled.feedback else []
+    if given:
+        raise InputError(f"--{given[0].replace('_', '-')} {reason}; expected it only where the insect walks in physics")
+
+
+def changed(given: Any, usual: Any) -> Iterator[str]:
+    """Names of the options, of their parts too, that are not as usual; both are of one dataclass."""
+    for name in (one.name for one in fields(given)):
+        value, other = getattr(given, name), getattr(usual, name)
+        if value != other:
+            yield from changed(value, other) if is_dataclass(value) and not isinstance(value, Geometry) else [name]
+
+
+registry = ConstructorRegistry()
+
+
+@registry.primitive_rule
+def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometry] | None:
+    """On the command line a geometry is given by its name."""
+    if info.type is not Geometry:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="{" + ",".join(GEOMETRIES) + "}",
+        instance_from_str=lambda words: GEOMETRIES[words[0]],
+        is_instance=lambda value: isinstance(value, Geometry),
+        str_from_instance=lambda value: [name for name, g in GEOMETRIES.items() if g == value],
+        choices=tuple(GEOMETRIES),
+    )
+
+
+@registry.struct_rule
+def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
+    """On the command line conditions are given one by one, and hold for the stick insect."""
+    if not (isinstance(info.type, type) and issubclass(info.type, Conditions)):
+        return None
+    usual = info.default if isinstance(info.default, info.type) else info.type()
+    hints = get_type_hints(info.type, include_extras=True)
+    parts = [one.name for one in fields(info.type) if one.name != "body"]
+    return StructConstructorSpec(
+        info.type, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
+    )
+
+
+Hidden = Annotated[float, Fixed, Suppress]
+"""An option that a command does not offer: a field of a subclass of one of these parts, which keeps its default."""

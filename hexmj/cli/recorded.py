@@ -1,0 +1,73 @@
+"""One start as a recording, and what is said of it."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.cli.options import Walks
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.progress import progress_bar
+from hexmj.timing import Acceleration, observation_time
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def recorded(
+    controller: Controller,
+    velocity: float,
+    start: int,
+    walks: Walks,
+    acceleration: Acceleration | None,
+    conditions: Conditions,
+    *,
+    physical: bool,
+    title: str,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """A recording of one of the seed's starts: what the insect did, or, unless `physical`, a puppet of the plan."""
+    from hexmj.measures.kinematic import walk
+    from hexmj.measures.physical import physical_walk
+    from hexmj.replay.recording import record, record_plan
+    from hexmj.starts import draw_starts
+
+    if start < 0:
+        raise InputError(f"start = {start}; expected at least 0")
+    starts = draw_starts(start + 1, walks.seed, walks.stride)[start:]
+    time = float(observation_time(walks.time, np.array(velocity), walks.stride, acceleration))
+    how: Any = {"stride": walks.stride, "acceleration": acceleration, "threads": threads}
+    if not physical:
+        return record_plan(walk(starts, controller, velocity, time, **how), conditions, walks.stride, title=title)
+    with progress_bar("walking") as progress:
+        walked = physical_walk(starts, controller, velocity, time, conditions=conditions, progress=progress, **how)
+    return record(walked, title=title)
+
+
+def walk_summary(walked: "xr.Dataset") -> dict[str, Any]:
+    """When a recorded walk lost stability or fell [time units], and its least margins [mm]."""
+    from hexmj.measures.compare import REPORTED
+    from hexmj.replay.recording import recorded_conditions
+
+    summary: dict[str, Any] = {
+        "time units": float(walked.time[-1]),
+        "planned loss": float(walked.planned_loss_time),
+        "least planned margin [mm]": float(walked.planned_margin.min()),
+    }
+    if "measured_margin" in walked:
+        part = int(walked.fall_part)
+        summary |= {
+            "measured loss": float(walked.measured_loss_time),
+            "least measured margin [mm]": float(walked.measured_margin.min()),
+            "fall": float(walked.fall_time),
+            "fell on": recorded_conditions(walked).body.trunk[part] if part >= 0 else None,
+        }
+        summary |= {named(walked[name]): walked[name].item() for name in REPORTED}
+    return summary
+
+
+def named(value: "xr.DataArray") -> str:
+    """Name and unit of one of a recording's numbers."""
+    unit = value.attrs["units"]
+    return f"{value.name} [{unit}]" if unit != "1" else str(value.name)

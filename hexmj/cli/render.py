@@ -1,0 +1,103 @@
+"""`hexmj render`."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from hexmj.cli.options import Accelerating, Controlled, ControllerName, Walks, Workers, changed
+from hexmj.cli.recorded import recorded, walk_summary
+from hexmj.cli.tables import print_json, show
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError, RenderingError
+from hexmj.progress import progress_bar
+from hexmj.replay.film.film import Film
+from hexmj.results import results_folder
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Render:
+    """A gait video, from recordings or from a walk that is recorded first."""
+
+    recordings: Positional[tuple[Path, ...]] = ()
+    """One recording, or two for side by side (recording.nc of `hexmj walk`); none: record a physical walk first, to
+    which all options but the film's belong."""
+    model: ControllerName = "ldvs"
+    velocity: float = 0.3
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    beside: str | None = None
+    """Side by side on the same start: 'planned' (the plan, with its polygon) or a second controller."""
+    start: int = 0
+    """Which of the seed's random starts."""
+    out: Path = Path("results/render")
+    """Folder for the video and its recordings."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    film: OmitArgPrefixes[Film] = field(default_factory=Film)
+    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
+    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
+    workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+    def run(self) -> None:
+        """Record if there is nothing to render yet, then render from the recordings."""
+        from hexmj.replay.film import gl
+        from hexmj.replay.film.video import render
+        from hexmj.replay.recording import load_recording
+
+        self._check()
+        controllers = {
+            name: self.controlled.controller(name) for name in (self.model, self.beside) if name and name != "planned"
+        }
+        shown = [load_recording(path) for path in self.recordings]
+        out = results_folder(self.out, ("gait.mp4", "recording-1.nc", "recording-2.nc"))
+        if sentence := gl.missing():
+            raise RenderingError(sentence)
+        files = []
+        if not shown:
+            shown, files = self._recorded(controllers, out)
+        out.mkdir(parents=True, exist_ok=True)
+        with progress_bar("rendering") as progress:
+            frames = render(shown, out / "gait.mp4", self.film, progress)
+        files.append(out / "gait.mp4")
+        if self.json:
+            summary = {"frames": frames, "film": asdict(self.film), "files": files}
+            print_json(summary | {"recordings": [walk_summary(one) for one in shown]})
+        else:
+            show(f"{frames} frames at {self.film.fps:g} per second", *map(str, files))
+        for one in shown:
+            one.close()
+
+    def _check(self) -> None:
+        """Refuse options that would not be obeyed."""
+        if len(self.recordings) > 2:
+            raise InputError(f"{len(self.recordings)} recordings were given; expected one, or two for side by side")
+        obeyed = Render(self.recordings, out=self.out, json=self.json, film=self.film)
+        if self.recordings and (names := list(changed(self, obeyed))):
+            raise InputError(
+                f"--{names[0].replace('_', '-')} was given with recordings; expected a second recording for side by"
+                " side, and options of walks only where one is recorded first"
+            )
+
+    def _recorded(self, controllers: dict[str, Controller], out: Path) -> "tuple[list[xr.Dataset], list[Path]]":
+        """The walks that are to be seen, recorded, and their files."""
+        from hexmj.replay.recording import save_recording
+
+        walked = [(one, Path(name).stem, True) for name, one in controllers.items()]
+        if self.beside == "planned":
+            first, title, _ = walked[0]
+            walked.insert(0, (first, f"{title}, planned", False))
+        shown = [
+            recorded(
+                one, self.velocity, self.start, self.walks, self.accelerating.procedure, self.conditions,
+                physical=physical, title=title, threads=self.workers.threads,
+            )
+            for one, title, physical in walked
+        ]  # fmt: skip
+        return shown, [save_recording(one, out / f"recording-{i + 1}.nc") for i, one in enumerate(shown)]

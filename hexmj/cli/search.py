@@ -1,0 +1,238 @@
+"""`hexmj search`."""
+
+import json
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from tyro.conf import OmitArgPrefixes
+
+from hexmj.cli.options import Accelerating, Controlled, Walks, Workers, refuse_physical
+from hexmj.cli.tables import conditions_line, interval, new_table, print_json, save_figure, show
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError
+from hexmj.progress import progress_bar
+from hexmj.results import results_folder, save_dataset, save_manifest, write_whole
+from hexmj.starts import SAMPLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.search.forms import Form
+    from hexmj.search.problems import Problem
+    from hexmj.search.stages import Effort, Found
+
+KEPT = "evaluations"
+"""Folder of the evaluations, beside the results."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with many.
+
+    Repeat the command to go on with a search that was stopped.
+    """
+
+    form: str = "ldvs"
+    """Nine parameters (hws), ten with a neutral position that depends on the velocity (ldvs), or 29, in which only
+    left and right are alike (mirrored), or all 58 weights (general) of the 1998 network; or a controller of your own
+    (module:object, file.py:object, an entry point), whose float fields are searched."""
+    velocity: float | None = None
+    """Problem 1: this velocity V_r as a fraction of V_p, 0 <= V < 1; 0.3 unless one or a range is given."""
+    velocities: tuple[float, float] | None = None
+    """Problem 2: velocities drawn uniformly from this range."""
+    physical: bool = False
+    """Minimise falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    algorithm: Literal["evolution", "cmaes"] = "evolution"
+    """The paper's evolutionary algorithm, or CMA-ES."""
+    population: int = 10
+    """Individuals of a generation; the paper's L."""
+    domain: float = 10.0
+    """The first population's shifts [mm] and weights are drawn from 0 to this, neutral positions [mm] from minus this
+    to this; not printed in the paper.  Fields of a controller of your own: from 0 to this times the usual value."""
+    begin: str | None = None
+    """A controller from which the population begins; without it the paper's '0'-individual (evolution), the middle of
+    the domain (cmaes), or the usual values of a controller of your own."""
+    starts: int | None = None
+    """Random starts of each candidate, the same for all; 500 unless given, 50 if physical."""
+    budget: int = 1000
+    """Most evaluations of the population's search; at L = 10 about the paper's 100 iterations."""
+    refine_starts: int | None = None
+    """Random starts of each candidate of the simplex; 7000 unless given, 100 if physical."""
+    refine_budget: int = 400
+    """Most evaluations of the simplex; 0 leaves it out."""
+    verdict_starts: int | None = None
+    """Fresh random starts for the verdict; 7000 unless given, 200 if physical."""
+    verdict_seed: int = 1998
+    """Seed of the fresh starts; another than --seed."""
+    out: Path = Path("results/search")
+    """Folder for what was found (TOML), the history (NetCDF), a figure, a manifest and all evaluations."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
+    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
+    workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+    def run(self) -> None:
+        """Search, judge what was found on fresh starts, write and print."""
+        from hexmj.search.problems import Sample
+        from hexmj.search.stages import search
+
+        self._check()
+        problem, effort = self._problem(), self._effort()
+        fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
+        out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
+        with progress_bar("searching") as progress:
+            found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
+        beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
+        verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
+        manifest = {
+            "problem": problem.settings(),
+            "effort": effort.settings(),
+            "found": dict(zip(problem.form.names, found.vector.tolist(), strict=True)),
+            "verdict_starts": fresh.n_starts,
+            "verdict_seed": self.verdict_seed,
+        }
+        files = self._write(problem, found, manifest)
+        if self.json:
+            evaluations = found.history.sizes["evaluation"]
+            told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
+            told |= {"verdict": _judged(verdict), "settings": manifest, "files": files}
+            print_json({"found": manifest["found"]} | told)
+        else:
+            self._show(problem, found, verdict, fresh.n_starts, files)
+
+    def _check(self) -> None:
+        """Refuse what makes no sense together, or would not be obeyed."""
+        if not self.physical:
+            refuse_physical(self.conditions, self.controlled, "without --physical")
+        if self.verdict_seed == self.walks.seed:
+            raise InputError(f"--verdict-seed = {self.verdict_seed} is also --seed; expected another, for fresh starts")
+        if self.velocity is not None and self.velocities is not None:
+            raise InputError("--velocity and --velocities were both given; expected one velocity or one range")
+        if self.refine_starts is not None and not self.refine_budget:
+            raise InputError("--refine-starts was given with --refine-budget 0; expected evaluations that walk them")
+
+    def _problem(self) -> "Problem":
+        from hexmj.search.problems import Problem
+
+        v = 0.3 if self.velocity is None else self.velocity
+        low, high = self.velocities or (v, v)
+        conditions = self.conditions if self.physical else None
+        return Problem(
+            self._form(), low, high, self.walks.time, self.walks.stride, self.accelerating.procedure, conditions,
+            self.controlled.feedback,
+        )  # fmt: skip
+
+    def _form(self) -> "Form":
+        from hexmj.controllers.named import load_controller
+        from hexmj.search.forms import FieldsForm
+        from hexmj.search.network_forms import FORMS, NetworkForm
+
+        if self.form in FORMS:
+            return NetworkForm(self.form, self.controlled.order or NetworkForm.order)  # pyright: ignore[reportArgumentType]
+        if self.controlled.order:
+            raise InputError(f"--order = {self.controlled.order} with {self.form}; expected it with {', '.join(FORMS)}")
+        try:
+            return FieldsForm(load_controller(self.form))
+        except InputError as error:
+            raise InputError(f"--form: {error}; forms of the 1998 network: {', '.join(FORMS)}") from None
+
+    def _effort(self) -> "Effort":
+        from hexmj.controllers.named import load_controller
+        from hexmj.search.stages import Effort
+
+        return Effort(
+            algorithm=self.algorithm,
+            population=self.population,
+            domain=self.domain,
+            begin=load_controller(self.begin) if self.begin else None,
+            starts=self._size(self.starts, 500, 50),
+            budget=self.budget,
+            refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
+            refine_budget=self.refine_budget,
+            seed=self.walks.seed,
+        )
+
+    def _size(self, given: int | None, planned: int, walked: int) -> int:
+        """A number of starts: fewer of physical walks."""
+        return given if given is not None else walked if self.physical else planned
+
+    @property
+    def _beside(self) -> dict[str, str]:
+        """What the found set is compared with: the paper's two, or the usual values of a controller of the user's."""
+        from hexmj.search.network_forms import FORMS
+
+        return {"hws": "hws", "ldvs": "ldvs"} if self.form in FORMS else {"usual": self.form}
+
+    @property
+    def _kind(self) -> str:
+        return "physical" if self.physical else "kinematic"
+
+    @property
+    def _title(self) -> str:
+        v = 0.3 if self.velocity is None else self.velocity
+        at = f"V from {self.velocities[0]:g} to {self.velocities[1]:g}" if self.velocities else f"V = {v:g}"
+        method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
+        return f"{self.form}, {self._kind} FLSS at {at}, {method}"
+
+    def _write(self, problem: "Problem", found: "Found", manifest: dict[str, Any]) -> list[Path]:
+        from hexmj.search.convergence import convergence_figure
+
+        text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
+        return [
+            save_dataset(found.history, self.out / "history.nc"),
+            write_whole(self.out / "found.toml", lambda part: part.write_text(text, encoding="utf-8")),
+            save_figure(convergence_figure(found.history, self._title), self.out / "convergence.png"),
+            save_manifest(manifest, self.out / "manifest.json"),
+        ]
+
+    def _toml(self, problem: "Problem", found: "Found") -> str:
+        """What `load_controller` reads to the same bits: weights, or a controller and its fields."""
+        from hexmj.controllers.cruse1998 import Cruse1998
+        from hexmj.controllers.cruse1998.presets import weights_toml
+
+        controller = problem.form.controller(found.vector)
+        if isinstance(controller, Cruse1998):
+            return weights_toml(controller.weights)
+        values = zip(problem.form.names, found.vector.tolist(), strict=True)
+        lines = [f"controller = {json.dumps(self.form)}", "", "[fields]", *(f"{key} = {one!r}" for key, one in values)]
+        return "\n".join(lines) + "\n"
+
+    def _show(
+        self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
+    ) -> None:
+        from hexmj.controllers.named import load_controller
+
+        vectors = {name: problem.form.vector(load_controller(one)) for name, one in self._beside.items()}
+        parameters = new_table("parameter", "found", *vectors)
+        for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
+            parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
+        windows = verdict.window.values.tolist()
+        judged = new_table("model", *(f"window {window}" for window in windows))
+        for name in verdict.controller.values.tolist():
+            one = verdict.sel(controller=name)
+            judged.add_row(name, *(interval(one.sel(window=window), "flss") for window in windows))
+        show(
+            self._title,
+            parameters,
+            f"{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
+            judged,
+            f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
+            f" least cost {found.cost:.4g}",
+            conditions_line(self.walks, self.controlled, self.accelerating.procedure, problem.conditions),
+            *map(str, files),
+        )
+
+
+def _judged(verdict: "xr.Dataset") -> dict[str, Any]:
+    """FLSS and its interval by controller and window."""
+    places = product(verdict.controller.values.tolist(), verdict.window.values.tolist())
+    judged: dict[str, Any] = {}
+    for name, window in places:
+        one = verdict.sel(controller=name, window=window)
+        judged.setdefault(name, {})[window] = {str(key): values.item() for key, values in one.items()}
+    return judged

@@ -1,0 +1,89 @@
+"""Tables, lines and JSON that the commands print, and the small files they write."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hexmj.cli.options import Controlled, Walks
+from hexmj.conditions import Conditions
+from hexmj.results import json_text, write_whole
+from hexmj.timing import Acceleration
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
+"""Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
+
+
+def physical_report(result: "xr.Dataset") -> dict[str, float]:
+    """How far the bodies did what they were told, over all walks of a comparison or a physical FLSS."""
+    return {
+        "mean slip [mm/s]": result.slip.mean().item(),
+        "tracking, 95th percentile [mm]": result.tracking.mean().item(),
+        "deepest foot in the ground [mm]": result.depth.max().item(),
+        "joints at their torque limit": result.saturation.mean().item(),
+        "tip targets out of reach": result.unreachable.sum().item(),
+        "least clearance [mm]": result.clearance.min().item(),
+        "greatest tilt [rad]": result.tilt.max().item(),
+    }
+
+
+def report_line(report: dict[str, float]) -> str:
+    return "; ".join(f"{key}: {value:.3g}" for key, value in report.items())
+
+
+def conditions_line(
+    walks: Walks,
+    controlled: Controlled,
+    acceleration: Acceleration | None = None,
+    conditions: Conditions | None = None,
+    varied: tuple[str, ...] = (),
+) -> str:
+    """What stands beside every measure, in a line: conditions of physical walks, but for those that were `varied`."""
+    line = f"window {walks.window} (t in time units); seed {walks.seed}"
+    if acceleration:
+        line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
+    line += f"; order {controlled.order}" if controlled.order else ""
+    line += "; feedback" if controlled.feedback else ""
+    if conditions:
+        values, usual = conditions.flat(), Conditions().flat()
+        shown = (key for key in values if (key in TOLD or values[key] != usual[key]) and key not in varied)
+        line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
+    return line
+
+
+def interval(one: "xr.Dataset", measure: str) -> str:
+    flss, low, high = (one[measure + end].item() for end in ("", "_low", "_high"))
+    return f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
+
+
+def short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def save_figure(figure: "Figure", path: Path) -> Path:
+    return write_whole(path, lambda part: figure.savefig(part, dpi=150))
+
+
+def new_table(*columns: str) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for column in columns:
+        table.add_column(column.replace("_", " "), overflow="fold")
+    return table
+
+
+def show(*parts: Any) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    for part in parts:
+        console.print(part, markup=False) if isinstance(part, str) else console.print(part)
+
+
+def print_json(value: dict[str, Any]) -> None:
+    print(json_text(value))

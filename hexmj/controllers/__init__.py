@@ -1,0 +1,10 @@
+"""Controllers: what tells the legs where to go.  `protocol` says what one is, `named` finds one by its name.
+
+A controller of your own is a frozen dataclass with a `name` and a method `begin`; `stepwise` makes its plan from a
+function of one step.
+"""
+
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.controllers.stepwise import Step, stepwise
+
+__all__ = ["Controller", "Plan", "ReadingPlan", "Sensed", "Step", "stepwise"]

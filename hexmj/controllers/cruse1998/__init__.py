@@ -1,0 +1,7 @@
+"""The coordination network of Cymbalyuk, Borisyuk, Mueller-Wilm and Cruse (1998)."""
+
+from hexmj.controllers.cruse1998.network import Cruse1998, Order
+from hexmj.controllers.cruse1998.presets import HWS, LDVS, PRESETS, UNCOORDINATED
+from hexmj.controllers.cruse1998.weights import Symmetric, Weights
+
+__all__ = ["HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Order", "Symmetric", "Weights"]

@@ -1,0 +1,205 @@
+"""The coordination network of 1998 as a controller: Eq. 1-6 and 11 of the paper, for many starts at once.
+
+One step goes from the states at t to those at t + dt with V_r(t).  A walk begins with Delta(0) = 0,
+AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent.  The equations are in
+`kernel`, compiled; ``tests/plain_network.py`` holds them in their readable form.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from hexmj.controllers.cruse1998 import kernel
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, general
+from hexmj.errors import InputError
+from hexmj.legs import MIRROR
+from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import run_blocks, thread_count
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk
+
+Order = Literal["printed", "undelayed", "sequential"]
+"""Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
+
+
+@dataclass(frozen=True)
+class Cruse1998:
+    """The coordination network of Cymbalyuk, Borisyuk, Mueller-Wilm and Cruse (Neural Networks 11, 1998)."""
+
+    weights: AnyWeights
+    """Coupling weights."""
+    order: Order = "printed"
+    """Order of updates: 'printed', all legs at once, PEP(t+dt) from Delta(t) as Eq. 6 has it; 'undelayed', from
+    Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
+    name: str = "cruse1998"
+    """Of the set of weights."""
+
+    def __post_init__(self) -> None:
+        general(self.weights)
+        if self.order not in get_args(Order):
+            raise InputError(f"order = {self.order!r}; valid names: {', '.join(get_args(Order))}")
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether mirrored starts give mirrored walks: the legs move at once, and both sides weigh the same."""
+        w = general(self.weights)
+        matrices = [getattr(w, kind) for kind in NEIGHBOURS]
+        return self.order != "sequential" and all(np.array_equal(one, one[MIRROR, :][:, MIRROR]) for one in matrices)
+
+    def begin(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> "NetworkPlan":
+        """See `protocol.Controller.begin`."""
+        return NetworkPlan(self, starts, velocity, stride, acceleration, threads)
+
+    def begin_at_speed(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> "NetworkPlan":
+        """See `protocol.SteerableController.begin_at_speed`."""
+        return NetworkPlan(self, starts, velocity, stride, acceleration, threads, at_speed=True)
+
+    def first_losses(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        steps: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> np.ndarray:
+        """See `protocol.FastLosses.first_losses`; only the present state of a walk is kept."""
+        constants = self._constants(stride, acceleration)
+        first_velocity = _first_velocity(velocity, acceleration)
+        lost = np.empty(len(starts))
+
+        def work(begin: int, end: int) -> None:
+            part = slice(begin, end)
+            kernel.first_losses(starts[part], first_velocity[part], velocity[part], steps[part], *constants, lost[part])
+
+        run_blocks(work, len(starts), max(8 * kernel.LANES, -(-len(starts) // (4 * thread_count(threads)))), threads)
+        return lost
+
+    def _constants(
+        self, stride: Stride, acceleration: Acceleration | None
+    ) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
+        """The order of updates, weights and constants, as the kernel reads them."""
+        w, d, g = general(self.weights), np.arange(6), stride.geometry
+        span = stride.aep0 - stride.pep_min
+        table = [(w.p1, kernel.REAR), (w.p1, kernel.CONTRA), (span * w.p2, kernel.REAR), (w.p4, kernel.FRONT)]
+        table += [(p, source) for source in (kernel.FRONT, kernel.CONTRA) for p in (w.p31, w.p32, w.p33, w.p34)]
+        p = np.concatenate([matrix[d, source] for matrix, source in table])
+        v_start, rate = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
+        k = np.concatenate(
+            [[stride.aep0, stride.pep0, stride.pep_min, stride.dt, v_start, rate], g.origin, 1 / np.abs(g.y)]
+        )
+        return get_args(Order).index(self.order), tuple(p.tolist()), tuple(k.tolist())
+
+
+class NetworkPlan:
+    """A `protocol.SteerablePlan`: the network of many starts, advanced as far as asked for."""
+
+    def __init__(
+        self,
+        controller: Cruse1998,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+        at_speed: bool = False,
+    ) -> None:
+        """Put every start at time 0; see `Cruse1998.begin` and `begin_at_speed`."""
+        self.starts, self.stride, self.done = checked_starts(starts, stride), stride, 0
+        velocity = checked_velocities(velocity, len(self.starts), acceleration)
+        self._constants = *_, k = controller._constants(stride, acceleration)
+        self._blocks = np.empty((-(-len(velocity) // kernel.LANES), kernel.ROWS * kernel.LANES))
+        first_velocity = _first_velocity(velocity, None if at_speed else acceleration)
+        kernel.begin_blocks(self._blocks, self.starts, first_velocity, velocity, k)
+        self._restart_velocity = _first_velocity(velocity, acceleration)
+        self._threads = threads
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """The next `steps` steps of the walk."""
+        shape = (steps, len(self.starts))
+        velocity, x, stance = np.empty(shape), np.empty((*shape, 6)), np.empty((*shape, 6), dtype=bool)
+
+        def work(begin: int, end: int) -> None:
+            kernel.record(self._blocks, begin, end, *self._constants, velocity, x, stance)
+
+        run_blocks(work, len(self._blocks), 1, self._threads)
+        self.done += steps
+        time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
+        geometry = self.stride.geometry
+        y, aep, height = (np.broadcast_to(one, x.shape) for one in (geometry.y, self.stride.aep0, np.nan))
+        return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
+
+    def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
+        """Begin with `unseen` steps and go on by `seen` more.
+
+        Returns:
+            The first of the latter that is statically unstable, counted from time 0, (start,); 0 where none is.
+        """
+
+        def work(begin: int, end: int) -> None:
+            kernel.lose(self._blocks, begin, end, unseen, seen, *self._constants)
+
+        run_blocks(work, len(self._blocks), 1, self._threads)
+        self.done += unseen + seen
+        return self._read(kernel.LOST, 1)[:, 0]
+
+    @property
+    def tips(self) -> np.ndarray:
+        """Where the tips are now, (start, leg) [mm]."""
+        return self._read(kernel.X)
+
+    @property
+    def standing(self) -> np.ndarray:
+        """Which legs retract now, (start, leg)."""
+        return self._read(kernel.S) == 1.0
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Go on from other tips and states than the network's own, both (start, leg): as measured, or disturbed."""
+        self._write(kernel.X, tips)
+        self._write(kernel.S, standing)
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
+
+        With an acceleration they begin at its V_r(0) again.
+        """
+        legs = {kernel.X: tips, kernel.S: 1.0, kernel.S_OLD: 1.0, kernel.AEP: self.stride.aep0}
+        for row, values in (legs | {kernel.PEP_SHIFT: 0.0, kernel.AEP_SHIFT: 0.0}).items():
+            self._write(row, np.where(which[:, None], values, self._read(row)))
+        self.slow_down(which)
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
+        for row, values in {kernel.V: self._restart_velocity, kernel.DONE: 0.0}.items():
+            self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
+
+    def _read(self, row: int, rows: int = 6) -> np.ndarray:
+        """A variable of every start, (start, leg), or (start, 1) with one row."""
+        return self._rows(row, rows).transpose(0, 2, 1).reshape(-1, rows)[: len(self.starts)]
+
+    def _write(self, row: int, values: np.ndarray, rows: int = 6) -> None:
+        padded = np.concatenate([values, np.repeat(values[-1:], -len(values) % kernel.LANES, axis=0)])
+        self._rows(row, rows)[:] = padded.reshape(-1, kernel.LANES, rows).transpose(0, 2, 1)
+
+    def _rows(self, row: int, rows: int) -> np.ndarray:
+        return self._blocks.reshape(len(self._blocks), kernel.ROWS, kernel.LANES)[:, row : row + rows]
+
+
+def _first_velocity(velocity: np.ndarray, acceleration: Acceleration | None) -> np.ndarray:
+    """V_r(0) of each start, (start,)."""
+    return np.full(len(velocity), acceleration.start) if acceleration else velocity

@@ -1,0 +1,94 @@
+"""Sets of weights by name: those of the paper and our own, and parameter files (TOML)."""
+
+import tomllib
+from dataclasses import asdict, fields
+from pathlib import Path
+
+import numpy as np
+
+from hexmj.controllers.cruse1998.network import Cruse1998
+from hexmj.controllers.cruse1998.weights import (
+    HWS_WEIGHTS,
+    LDVS_WEIGHTS,
+    NEIGHBOURS,
+    NO_WEIGHTS,
+    AnyWeights,
+    Symmetric,
+    Weights,
+    pairs,
+)
+from hexmj.errors import InputError
+
+OWN = Path(__file__).with_name("own.toml")
+"""Sets of our own, with the commands that found or built them."""
+
+
+def read_weights(path: Path) -> AnyWeights:
+    """The weights in a TOML file.
+
+    It holds either a table ``[symmetric]`` with fields of `Symmetric`, or tables
+    ``[weights.p1]`` ... ``[weights.p4]`` with keys ``"d,e"`` (the paper's leg numbers).
+
+    Raises:
+        InputError: a file that cannot be read, or a key, type or value that makes no sense.
+    """
+    try:
+        table = tomllib.loads(path.read_text())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path} cannot be read as TOML: {error}") from None
+    if list(table) == ["symmetric"]:
+        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{path} [symmetric]"))
+    if list(table) == ["weights"] and isinstance(table["weights"], dict):
+        return _read_weights(table["weights"], str(path))
+    raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
+
+
+def weights_toml(weights: AnyWeights) -> str:
+    """The text of a TOML file that `read_weights` reads to the same bits; general weights that are 0 are left out."""
+    if isinstance(weights, Symmetric):
+        return "\n".join(["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(weights).items())]) + "\n"
+    lines = []
+    for kind in NEIGHBOURS:
+        matrix = getattr(weights, kind)
+        lines += ["", f"[weights.{kind}]"]
+        lines += [f'"{d + 1},{e + 1}" = {matrix[d, e].item()!r}' for d, e in pairs(kind) if matrix[d, e]]
+    return "\n".join(lines[1:]) + "\n"
+
+
+def _read_weights(table: dict[str, object], where: str) -> Weights:
+    if unknown := set(table) - set(NEIGHBOURS):
+        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
+    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+    for kind, entries in table.items():
+        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
+        for key, value in _numbers(entries, list(keys), f"{where} [weights.{kind}]").items():
+            matrices[kind][keys[key]] = value
+    return Weights(**matrices)
+
+
+def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
+    """The entries of a TOML table, all of which must be numbers with valid keys."""
+    if not isinstance(table, dict):
+        raise InputError(f"{where} is {table!r}; expected a table with the keys {', '.join(valid)}")
+    for key, value in table.items():
+        if key not in valid:
+            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
+            raise InputError(f"{where}: {key} = {str(value)[:40]!r}; expected a number, finite and below 1e100")
+    return {key: float(value) for key, value in table.items()}
+
+
+def _own() -> dict[str, Weights]:
+    """The sets of `OWN` by their names."""
+    table = tomllib.loads(OWN.read_text(encoding="utf-8"))
+    return {name: _read_weights(entry["weights"], f"{OWN.name} [{name}]") for name, entry in table.items()}
+
+
+PRESETS: dict[str, Cruse1998] = {
+    name: Cruse1998(weights, name=name)
+    for name, weights in {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS, **_own()}.items()
+}
+"""The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once."""
+
+HWS, LDVS, UNCOORDINATED = (PRESETS[name] for name in ("hws", "ldvs", "uncoordinated"))
+"""The paper's hard-wired and linearly velocity-dependent systems, and none (Section 5.1)."""

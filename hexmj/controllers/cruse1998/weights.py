@@ -1,0 +1,179 @@
+"""Coupling weights of the 1998 network (paper, Section 2 and Appendix A), and the published sets.
+
+Letters follow the paper: ``p1`` is P^1 up to ``p4`` for P^4, ``p31`` ... ``p34`` are
+P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Literal
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.legs import N1, N2, N3, N4
+
+NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
+"""Kind of weight -> for each destination leg the legs that act on it."""
+
+BINARY = ("p2", "p4")
+
+
+def pairs(kind: str) -> list[tuple[int, int]]:
+    """All (destination, source) pairs of one kind of weight, in the paper's order."""
+    return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
+
+
+def _kinds(size: int, with_velocity: int) -> list[str]:
+    """Kinds of weight in a vector of `size` numbers; the short form leaves out P^{3,4}."""
+    return [kind for kind in NEIGHBOURS if kind != "p34" or size == with_velocity]
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """General weights P_{d,e} of each destination leg d and source leg e: 58 numbers, 48 where p34 = 0.
+
+    Every field is a (destination leg, source leg) array that is zero off the paper's
+    neighbour sets N^1 ... N^4.
+    """
+
+    p1: np.ndarray
+    """Mechanism 1: shift of the PEP while the source protracts [mm]."""
+    p2: np.ndarray
+    """Mechanism 2: 0 or 1."""
+    p31: np.ndarray
+    """Mechanism 3: neutral position at V_r = 0 [mm]."""
+    p32: np.ndarray
+    """Mechanism 3: weight behind the neutral position."""
+    p33: np.ndarray
+    """Mechanism 3: weight ahead of the neutral position."""
+    p34: np.ndarray
+    """Mechanism 3: change of the neutral position with V_r [mm]."""
+    p4: np.ndarray
+    """Mechanism 4: 0 or 1."""
+
+    def __post_init__(self) -> None:
+        for kind in NEIGHBOURS:
+            matrix = np.array(getattr(self, kind), dtype=float)
+            if matrix.shape != (6, 6):
+                raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
+            if not np.isfinite(matrix).all():
+                raise InputError(f"{kind} holds a number that is not finite; expected finite weights")
+            allowed = np.zeros((6, 6), dtype=bool)
+            allowed[tuple(np.transpose(pairs(kind)))] = True
+            if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
+                d, e = stray[0] + 1
+                raise InputError(f"{kind} of leg {d} from leg {e} is not 0, but leg {e} is no neighbour there")
+            if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
+                raise InputError(f"{kind} is binary in the paper: expected only 0 or 1")
+            matrix.setflags(write=False)
+            object.__setattr__(self, kind, matrix)
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
+        """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
+        size = len(vector)
+        if size not in (48, 58):
+            raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
+        values = iter(vector)
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for kind in _kinds(size, 58):
+            for pair in pairs(kind):
+                matrices[kind][pair] = next(values)
+        return cls(**matrices)
+
+    def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
+        """The inverse of `from_vector`."""
+        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in pairs(kind)])
+
+
+@dataclass(frozen=True)
+class Symmetric:
+    """Weights with the symmetries of Appendix A: ten numbers (LDVS), nine where p34_i = 0 (HWS)."""
+
+    p1_i: float = 0.0
+    """P_i^1: shift of the PEP while the ipsilateral rear leg protracts [mm]."""
+    p1_c: float = 0.0
+    """P_c^1: shift of the PEP while the contralateral leg protracts [mm]."""
+    p2: float = 0.0
+    """P^2: mechanism 2 off (0) or on (1)."""
+    p31_i: float = 0.0
+    """P_i^{3,1}: ipsilateral neutral position at V_r = 0 [mm]."""
+    p32_i: float = 0.0
+    """P_i^{3,2}: ipsilateral weight behind the neutral position."""
+    p33_i: float = 0.0
+    """P_i^{3,3}: ipsilateral weight ahead of the neutral position."""
+    p34_i: float = 0.0
+    """P_i^{3,4}: change of the ipsilateral neutral position with V_r [mm]."""
+    p31_c: float = 0.0
+    """P_c^{3,1}: contralateral neutral position [mm]."""
+    p32_c: float = 0.0
+    """P_c^{3,2} = P_c^{3,3}: contralateral weight of mechanism 3."""
+    p4_i: float = 0.0
+    """P_i^4: mechanism 4 off (0) or on (1)."""
+
+    def __post_init__(self) -> None:
+        for key, value in asdict(self).items():
+            if not math.isfinite(value):
+                raise InputError(f"{key} = {value}; expected a finite number")
+            if key in ("p2", "p4_i") and value not in (0, 1):
+                raise InputError(f"{key} = {value}; it is binary in the paper: expected 0 or 1")
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
+        """Read ten numbers in the order of the fields, or nine without p34_i."""
+        names = [f.name for f in fields(cls)]
+        if len(vector) == 9:
+            names.remove("p34_i")
+        elif len(vector) != 10:
+            raise InputError(f"{len(vector)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
+        return cls(**{name: float(value) for name, value in zip(names, vector, strict=True)})
+
+    def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
+        """The inverse of `from_vector`."""
+        return np.array([v for key, v in asdict(self).items() if key != "p34_i" or size == 10])
+
+    def expand(self) -> Weights:
+        """Appendix A: the general weights, equal on both sides and along each side."""
+        by_kind = {
+            "p1": (self.p1_i, self.p1_c),
+            "p2": (self.p2, 0.0),
+            "p31": (self.p31_i, self.p31_c),
+            "p32": (self.p32_i, self.p32_c),
+            "p33": (self.p33_i, self.p32_c),
+            "p34": (self.p34_i, 0.0),
+            "p4": (self.p4_i, 0.0),
+        }
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for kind, (ipsilateral, contralateral) in by_kind.items():
+            for d, e in pairs(kind):
+                matrices[kind][d, e] = contralateral if abs(d - e) == 3 else ipsilateral
+        return Weights(**matrices)
+
+
+AnyWeights = Symmetric | Weights
+
+HWS_WEIGHTS = Symmetric(p1_i=10.85, p1_c=6.73, p31_i=-2.48, p32_i=4.75, p33_i=0.191, p31_c=-0.34, p32_c=0.09, p4_i=1.0)
+"""The hard-wired system: printed in the caption of Fig. 3; P^2 and P^4 from Section 5.1.1."""
+
+LDVS_WEIGHTS = Symmetric(
+    p1_i=11.998, p1_c=5.999, p31_i=-9.32, p32_i=6.23, p33_i=0.083, p34_i=16.058, p31_c=-2.063, p32_c=0.081, p4_i=1.0
+)
+"""The linearly velocity-dependent system: printed in the caption of Fig. 4."""
+
+NO_WEIGHTS = Symmetric()
+"""No coordinating mechanism."""
+
+
+def general(weights: AnyWeights) -> Weights:
+    """The general weights of either form.
+
+    Raises:
+        InputError: no weights.
+    """
+    if isinstance(weights, Symmetric):
+        return weights.expand()
+    if isinstance(weights, Weights):
+        return weights
+    raise InputError(f"weights = {weights!r:.200}; expected Symmetric or Weights")

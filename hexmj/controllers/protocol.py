@@ -1,0 +1,205 @@
+"""What a controller is, what its plans say, and what a plan that reads the legs is told.
+
+Data goes one way: a controller begins a plan for many starts at once; the plan is advanced step by step and says where
+the tips shall be; on paper nothing comes back, in physics a plan that has a method `sense` is told before each step
+what a robot would know.
+"""
+
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk
+
+
+@runtime_checkable
+class Plan(Protocol):
+    """A walk of many starts, planned as far as asked for.  The starts do not know of each other."""
+
+    @property
+    def starts(self) -> np.ndarray:
+        """(start, leg) tips at time 0 on their own axes [mm]; all stand."""
+        ...
+
+    @property
+    def stride(self) -> Stride:
+        """The time step and the lines of the tips."""
+        ...
+
+    @property
+    def done(self) -> int:
+        """Steps planned so far."""
+        ...
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """The next `steps` steps of all starts; divided into calls anyhow, they are the same walk."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a robot knows of itself at the end of a step, for the starts that still walk."""
+
+    ids: np.ndarray
+    """(n,) which starts these are: rows of the plan's own arrays."""
+    tips: np.ndarray
+    """(n, leg, axis) where the joint angles put the tips in the root frame: forward, left, up of O [mm]."""
+    contact: np.ndarray
+    """(n, leg) whether the ground carried the foot within the last `Numerics.contact_gap`."""
+    gained: np.ndarray
+    """(n, leg) contact now, and none a step before."""
+    lost: np.ndarray
+    """(n, leg) contact a step before, and none now."""
+    load: np.ndarray
+    """(n, leg) force of the ground along its normal [g mm/s^2]; an insect of 1 g weighs 9810."""
+    joints: np.ndarray
+    """(n, leg, joint) angles [rad]."""
+    torques: np.ndarray
+    """(n, leg, joint) of the servos [g mm^2/s^2]."""
+    tilt: np.ndarray
+    """(n, 2) how far the root's vertical leans ahead and to the left [rad]."""
+    velocity: np.ndarray
+    """(n, 3) of the root, ahead, to the left and up as seen from its heading [mm/s]."""
+    turning: np.ndarray
+    """(n, 3) angular velocity of the root in its own frame [rad/s]."""
+
+
+@runtime_checkable
+class ReadingPlan(Plan, Protocol):
+    """A plan that reads the legs.  On paper nobody tells it anything, and it takes everything to be as ordered."""
+
+    def sense(self, sensed: Sensed) -> None:
+        """Take in what is known before the next step is planned."""
+        ...
+
+
+@runtime_checkable
+class SteerablePlan(Plan, Protocol):
+    """A plan that can go on from other legs than its own, and begin anew."""
+
+    @property
+    def tips(self) -> np.ndarray:
+        """(start, leg) where the tips are now, on their own axes [mm]."""
+        ...
+
+    @property
+    def standing(self) -> np.ndarray:
+        """(start, leg) which legs retract now."""
+        ...
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Go on from these tips [mm] and states, both (start, leg)."""
+        ...
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm]."""
+        ...
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
+        ...
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """A frozen dataclass: its fields are its settings, plain data that tell two controllers apart.
+
+    One that says `mirrored`, an attribute or property of its own that is True, claims that starts mirrored in the body
+    axis give mirrored walks to the last bit; `conformance` holds it to that.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables and titles."""
+        ...
+
+    def begin(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> Plan:
+        """A new plan, as often as asked for; what it plans depends on nothing but these arguments.
+
+        Args:
+            starts: tips at time 0 on their own axes, all standing, (start, leg) [mm].
+            velocity: V_r, or its final value when accelerating, (start,), 0 <= V_r < 1: a standing tip moves V_r mm to
+                the rear, and a swinging one 1 mm ahead, in a time unit.
+            stride: step range, lines of the tips and time step.
+            acceleration: Eq. 11; `timing.commanded_velocities` gives V_r at each step.
+            threads: one per core unless given; the plan does not depend on it.
+        """
+        ...
+
+
+@runtime_checkable
+class FastLosses(Protocol):
+    """A controller with a faster way to its first losses of static stability than planning the walk."""
+
+    def first_losses(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        steps: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> np.ndarray:
+        """The first of each start's `steps`, (start,), that is statically unstable, counted from 1; 0 where none is.
+
+        The same bits as `losses.planned_losses` finds in the plan.
+        """
+        ...
+
+
+@runtime_checkable
+class SteerableController(Controller, Protocol):
+    """A controller whose plans are `SteerablePlan`s, which feedback and disturbances need."""
+
+    def begin_at_speed(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> SteerablePlan:
+        """A plan that walks at its final velocity at once; an acceleration takes place only after `slow_down`."""
+        ...
+
+
+def check_controller_type(controller: object) -> None:
+    """Refuse what is no controller.
+
+    Raises:
+        InputError: no frozen dataclass with a name and a method `begin`.
+    """
+    if not (is_dataclass(controller) and not isinstance(controller, type) and isinstance(controller, Controller)):
+        raise InputError(
+            f"controller = {controller!r:.200}; expected a controller, a frozen dataclass with a name and a method"
+            " begin, as a preset or hexmj.load_controller gives one"
+        )
+
+
+def claims_mirrored(controller: Controller) -> bool:
+    """Whether a controller claims that mirrored starts give mirrored walks, see `Controller`."""
+    return bool(getattr(controller, "mirrored", False))
+
+
+def settings_of(controller: Controller) -> dict[str, Any]:
+    """A controller's settings as plain data: numbers, texts, lists and dicts."""
+    check_controller_type(controller)
+    return _plain(asdict(controller))  # pyright: ignore[reportArgumentType]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,73 @@
+"""Python files of a user's own, such as `mine.py`, imported from where they lie.
+
+Such a file becomes the module `hexmj.loaded.<its path, quoted>@<digest of its source>`.  The name says where it lies,
+so pickle, which knows classes and functions by the names of their modules, finds them in any process that sees the
+same file; and an edited file is another module, never mistaken for the one that is already loaded.
+"""
+
+import hashlib
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.abc import MetaPathFinder, SourceLoader
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from urllib.parse import quote_from_bytes, unquote_to_bytes
+
+from hexmj.errors import InputError
+
+__path__: list[str] = []
+"""Makes this module a package: its modules are the loaded files."""
+
+
+def importable(path: str | Path) -> ModuleType:
+    """The module of a file; the same one as long as the file is not edited.
+
+    Raises:
+        InputError: the file cannot be read or does not run.
+    """
+    path = Path(path).absolute()
+    try:
+        name = f"{__name__}.{quote_from_bytes(os.fsencode(path), safe='').replace('.', '%2E')}@{_digest(path)}"
+        return import_module(name)
+    except OSError as error:
+        raise InputError(f"{path} cannot be loaded: {error.strerror or error}") from None
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
+class _Source(SourceLoader):
+    """Runs a file as it is named; writes no bytecode beside it."""
+
+    def get_filename(self, fullname: str) -> str:
+        return os.fsdecode(unquote_to_bytes(fullname.removeprefix(f"{__name__}.").rpartition("@")[0]))
+
+    def get_data(self, path: str | bytes) -> bytes:
+        return Path(os.fsdecode(path)).read_bytes()
+
+    def exec_module(self, module: ModuleType) -> None:
+        if not module.__name__.endswith(f"@{_digest(Path(self.get_filename(module.__name__)))}"):
+            raise InputError(f"{self.get_filename(module.__name__)} was edited while it was in use; start again")
+        super().exec_module(module)
+
+
+class _Finder(MetaPathFinder):
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if not fullname.startswith(f"{__name__}."):
+            return None
+        loader = _Source()
+        return spec_from_file_location(fullname, loader.get_filename(fullname), loader=loader)
+
+
+sys.meta_path.append(_Finder())

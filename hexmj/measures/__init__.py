@@ -1,0 +1,1 @@
+"""The measures of stability: kinematic, measured and physical, and their comparison."""

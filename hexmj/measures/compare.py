@@ -1,0 +1,189 @@
+"""The two measures of stability on the same starts: polygon on paper, polygon under the body, body on the ground."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.errors import InputError
+from hexmj.intervals import wilson_intervals
+from hexmj.legs import LEGS
+from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.starts import check_draw, draw_starts
+from hexmj.sweeps import Cell, How, along, conduct
+from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical": "fall"}
+"""Measure of FLSS -> the outcome whose frequency it is."""
+
+AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
+"""What a start can do: lose stability on paper, touch the ground, both or none."""
+
+REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturation", "unreachable")
+"""Outcomes that tell how far the bodies did what they were told."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Controllers on the same starts at every velocity, a cell for each controller and velocity."""
+
+    controllers: Mapping[str, Controller]
+    """By the names under which they stand in the result."""
+    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
+    """V_r (when accelerating, its final value), each 0 <= V < 1."""
+    n_starts: int = 60
+    """Number of starts, the same for every controller and velocity."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]."""
+    seed: int = 0
+    """Of the starts."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """Of the physical walks."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+
+    def __post_init__(self) -> None:
+        if not self.controllers:
+            raise InputError("no controller was given; expected at least one")
+        for controller in self.controllers.values():
+            check_controller_type(controller)
+        check_draw(self.n_starts, self.seed)
+        _ = self.observed
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocities and observation times [time units], both (velocity,)."""
+        return observed(self.velocities, self.window, self.stride, self.acceleration)
+
+    def cells(self) -> list[Cell]:
+        """See `sweeps.Study`."""
+        from hexmj.measures.outcome_table import outcome_table
+
+        same = {name: getattr(self, name) for name in ("n_starts", "seed", "conditions", "stride", "acceleration")}
+
+        def cell(name: str, velocity: float, time: float) -> Cell:
+            own = {"controller": self.controllers[name], "velocity": velocity, "duration": time}
+            return Cell(f"{name}-V-{velocity:g}", outcome_table, own | same, work=time)
+
+        return [cell(name, v, time) for name in self.controllers for v, time in zip(*self.observed, strict=True)]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """As `compare` gives it."""
+        from hexmj.measures.kinematic import settings
+
+        starts = draw_starts(self.n_starts, self.seed, self.stride)
+        table = along({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
+            **velocity_axis(*self.observed),
+            controller=list(self.controllers),
+            leg=list(LEGS),
+            starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
+        )
+        table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
+        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        attributes = settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
+        return _with_answers(with_flss(table)).assign_attrs(attributes)
+
+
+def compare(
+    controllers: Controller | Mapping[str, Controller],
+    velocities: Sequence[float],
+    *,
+    n_starts: int = Comparison.n_starts,
+    window: str | float = Comparison.window,
+    seed: int = Comparison.seed,
+    conditions: Conditions | None = None,
+    stride: Stride | None = None,
+    acceleration: Acceleration | None = None,
+    folder: Path | None = None,
+    **how: Unpack[How],
+) -> "xr.Dataset":
+    """Kinematic, measured and physical FLSS of one or more controllers over velocities, on the same starts.
+
+    Args:
+        controllers: one, or several by name.
+        velocities: as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride` and
+            `acceleration`.
+        n_starts: number of starts.
+        window: observation time.
+        seed: of the starts.
+        conditions: of the physical walks.
+        stride: of the plans.
+        acceleration: of Eq. 11.
+        folder: keeps what is finished, for a run that was stopped; None keeps nothing.
+        how: executor, threads and progress, see `sweeps.How`; the result does not depend on it.
+
+    Returns:
+        Over (controller, velocity): the three FLSS with their 95 % Wilson intervals (`kinematic`,
+        `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
+        fraction of starts for which kinematic and physical answer are the same; over (controller, velocity,
+        start) every field of `Outcomes`.
+
+    Raises:
+        InputError, SimulationError: see `settling.settle` and `physics.drive`.
+    """
+    if not isinstance(controllers, Mapping):
+        check_controller_type(controllers)
+        controllers = {controllers.name: controllers}
+    whole = conditions or Conditions(), stride or Stride(), acceleration
+    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *whole), folder, **how)
+
+
+def physical_flss(
+    controller: Controller,
+    velocities: Sequence[float],
+    *,
+    n_starts: int = 200,
+    window: str | float = Comparison.window,
+    seed: int = Comparison.seed,
+    conditions: Conditions | None = None,
+    stride: Stride | None = None,
+    acceleration: Acceleration | None = None,
+    folder: Path | None = None,
+    **how: Unpack[How],
+) -> "xr.Dataset":
+    """Physical FLSS: the frequency with which the trunk touches the ground; arguments and errors as of `compare`.
+
+    Returns:
+        The table of `kinematic.flss`, and the time of the fall and the outcomes `REPORTED` of every start.
+    """
+    from hexmj.measures.kinematic import frequency_table, losses_by_sample
+
+    result = compare(
+        controller, velocities, n_starts=n_starts, window=window, seed=seed, conditions=conditions, stride=stride,
+        acceleration=acceleration, folder=folder, **how,
+    )  # fmt: skip
+    fell = losses_by_sample(np.isfinite(result.fall.values[0]))
+    table = frequency_table(fell, n_starts, result.velocity.values, result.duration.values)
+    reported = result.isel(controller=0, drop=True)[["fall", *REPORTED]].drop_vars("duration")
+    return table.assign(reported.data_vars).assign_attrs(result.attrs)
+
+
+def with_flss(data: "xr.Dataset") -> "xr.Dataset":
+    """The FLSS of `MEASURES` with 95 % Wilson intervals, and `agreement`, beside outcomes over (..., start)."""
+    new: dict[str, xr.DataArray] = {}
+    for measure, outcome in MEASURES.items():
+        lost = data[outcome] < np.inf
+        new[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
+        ends = wilson_intervals(lost.sum("start").values, data.sizes["start"])
+        for end, values in zip(("_low", "_high"), ends, strict=True):
+            new[measure + end] = new[measure].copy(data=values).drop_attrs().assign_attrs(units="1")
+    same = (data.planned_loss < np.inf) == (data.fall < np.inf)
+    new["agreement"] = same.mean("start").assign_attrs(units="1", long_name="kinematic and physical answer agree")
+    return data.assign(new)
+
+
+def _with_answers(data: "xr.Dataset") -> "xr.Dataset":
+    """The numbers of starts in each case of `AGREEMENT` beside their outcomes."""
+    lost, fell = data.planned_loss < np.inf, data.fall < np.inf
+    answers = dict(zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True))
+    attributes = {"units": "1", "long_name": "number of starts"}
+    return data.assign({name: true.sum("start").assign_attrs(attributes) for name, true in answers.items()})

@@ -1,0 +1,155 @@
+"""Physical walks from start to end: `physical_walk` keeps them whole, `physical_outcomes` only how they went."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.losses import begin
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
+from hexmj.measures.kinematic import first_loss, walk
+from hexmj.physics.drive import Push, drive
+from hexmj.physics.outcomes import Outcomes, Tally, measured_walk
+from hexmj.physics.settling import Settled, settle
+from hexmj.progress import Progress
+from hexmj.stability import loss_time
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk, Walk, joined, part_of
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalWalk:
+    """Physical walks kept whole.  After a fall everything measured is NaN, and no foot stands."""
+
+    planned: PlannedWalk
+    """What was planned; by a plan that reads the legs, what it plans on paper."""
+    ordered: PlannedWalk
+    """What the legs were told; another walk than `planned` only if the plan reads them."""
+    measured: Walk
+    """What the insect did: feet in contact, seen from its own centre of mass and heading."""
+    outcomes: Outcomes
+    """How every start went."""
+    qpos: np.ndarray
+    """(step, start, position) MuJoCo's positions at the end of each step of the plan."""
+    centre_of_mass: np.ndarray
+    """(step, start, 3) in the world [mm]."""
+    conditions: Conditions
+    """Of the walk."""
+    stride: Stride
+    """Of the plan."""
+
+
+def physical_outcomes(
+    settled: Settled,
+    controller: Controller,
+    velocity: ArrayLike,
+    duration: float,
+    *,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Outcomes:
+    """How every settled start goes; only outcomes are kept.
+
+    The planned loss is always that on paper, where a plan that reads the legs is told nothing: it stays the paper's
+    measure, and the same with and without feedback.
+
+    Args:
+        settled: starts at rest, see `settling.settle`.
+        controller: plans the walks.
+        velocity: V_r, or its final value; one number or (start,).
+        duration: observation time [time units].
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
+
+    Raises:
+        InputError, SimulationError: see `drive.drive`.
+    """
+    how: Any = {"stride": settled.stride, "acceleration": acceleration}
+    plan = begin(controller, settled.starts, velocity, **how, threads=1)
+    planned_loss = first_loss(settled.starts, controller, velocity, duration, **how, threads=threads)
+    return outcomes_of_plan(settled, plan, duration, planned_loss, threads=threads, progress=progress)
+
+
+def outcomes_of_plan(
+    settled: Settled,
+    plan: Plan,
+    duration: float,
+    planned_loss: np.ndarray,
+    *,
+    push: Push | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Outcomes:
+    """The same for any plan that is at time 0, whose own losses, (start,) [time units], are known."""
+    tally = Tally(settled, planned_loss)
+    for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
+        tally.add(chunk)
+    return tally.outcomes()
+
+
+def physical_walk(
+    starts: ArrayLike,
+    controller: Controller,
+    velocity: ArrayLike,
+    duration: float,
+    *,
+    conditions: Conditions | None = None,
+    stride: Stride | None = None,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> PhysicalWalk:
+    """The physical walk of every start, kept whole.
+
+    Args:
+        starts: tips at time 0, (start, leg) [mm]; all feet stand.
+        controller: plans the walks.
+        velocity: V_r, or its final value; one number or (start,).
+        duration: observation time [time units].
+        conditions: of the walk.
+        stride: of the plan.
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the result does not depend on it.
+        progress: told the fraction done since it was last called.
+
+    Raises:
+        InputError, SimulationError: see `settling.settle` and `drive.drive`.
+    """
+    stride = stride or Stride()
+    planned = walk(starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
+    plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
+    settled = settle(starts, conditions, stride, threads)
+    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress)
+
+
+def physical_walk_of_plan(
+    settled: Settled,
+    plan: Plan,
+    planned: PlannedWalk,
+    *,
+    push: Push | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> PhysicalWalk:
+    """The same for any plan that is at time 0, which goes as `planned`."""
+    conditions, stride = settled.conditions, settled.stride
+    tally = Tally(settled, loss_time(planned, threads=threads))
+    shape = planned.stance.shape
+    x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+    qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
+    told: list[PlannedWalk] = []
+    for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
+        tally.add(chunk)
+        told += [chunk.plan] if isinstance(plan, ReadingPlan) else []
+        columns, seen, seen_centre = measured_walk(chunk, settled)
+        at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
+        x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre
+        over = (columns[:, None] >= chunk.valid)[..., None]
+        qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
+    measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
+    ordered = joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]) if told else planned
+    return PhysicalWalk(planned, ordered, measured, tally.outcomes(), qpos, centre, conditions, stride)

@@ -1,0 +1,32 @@
+"""The axis of velocities that tables lie along, with the observation time of each."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hexmj.starts import checked_list, checked_velocities
+from hexmj.timing import Acceleration, Stride, observation_time, steps_within
+
+
+def observed(
+    velocities: Sequence[float], window: str | float, stride: Stride, acceleration: Acceleration | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The velocities of a table and their observation times [time units], both (velocity,), if they make sense.
+
+    Raises:
+        InputError: a velocity that is none or comes twice, or a time without steps.
+    """
+    v = checked_list(velocities)
+    checked_velocities(v, len(v), acceleration)
+    duration = observation_time(window, v, stride, acceleration)
+    steps_within(duration, stride)
+    return v, duration
+
+
+def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
+    """The coordinates `velocity` and `duration`, of both (velocity,)."""
+    return {
+        "velocity": ("velocity", v, {"units": "V_p", "long_name": "velocity V_r"}),
+        "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
+    }

@@ -1,0 +1,126 @@
+"""What Section 5 measures at one velocity: losses of stability, limit regimes, footfalls.
+
+The outcome of every start is kept, so that curves can be compared on the same starts and samples of 1000 can be formed
+afterwards.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.controllers.losses import begin
+from hexmj.gaits import PAIRS, limit_gait
+from hexmj.legs import LEGS
+from hexmj.measures.kinematic import first_loss
+from hexmj.paper.late_losses import lost_after
+from hexmj.starts import draw_starts
+from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NO_SET = -1
+"""Stands for the outcome where no set has been searched yet."""
+
+LATE_PERIODS = 5
+"""Periods of a single leg oscillator, (AEP_0 - PEP_0) (1 + 1/V), after which Section 5.2 looks again."""
+
+MOMENTS = 1201
+"""Of a footfall diagram."""
+
+
+def losses(
+    velocity: float,
+    sets: tuple[Cruse1998 | None, ...],
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None,
+    late: bool,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Which starts lose static stability under both windows, (window, start): 1 lost, 0 not, -1 where there is no set.
+
+    Args:
+        velocity: V_r.
+        sets: the network for each of `WINDOWS`.
+        n_starts: number of starts.
+        seed: of the starts.
+        stride: of the walks.
+        acceleration: Eq. 11.
+        late: look only after `LATE_PERIODS`.
+        threads: one per core unless given.
+    """
+    import xarray as xr
+
+    starts = draw_starts(n_starts, seed, stride)
+    lost = np.full((len(WINDOWS), n_starts), NO_SET, dtype=np.int8)
+    for one in dict.fromkeys(sets):
+        if one is not None:
+            rows = [row for row, other in enumerate(sets) if other == one]
+            times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
+            durations = np.array(times)
+            if late:
+                wait = stride.periods(velocity, LATE_PERIODS)
+                lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
+            else:
+                how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+                first = first_loss(starts, one, velocity, durations.max(), **how)
+                lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
+    return xr.Dataset({"lost": (("window", "start"), lost)}, {"window": list(WINDOWS)})
+
+
+def limit_regimes(
+    velocity: float,
+    controller: Cruse1998,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Phases (start, pair), periods (start, leg) and what is true of each start's limit regime."""
+    import xarray as xr
+
+    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+    starts = draw_starts(n_starts, seed, stride)
+    duration = observation_time("walk", np.array(velocity), stride, acceleration)
+    times = first_loss(starts, controller, velocity, duration, **how)
+    gait = limit_gait(controller, velocity, n_starts=n_starts, seed=seed, **how)
+    return xr.Dataset(
+        {
+            "phase": (("start", "pair"), gait.phase, {"units": "1"}),
+            "periods": (("start", "leg"), gait.periods, {"units": "time unit"}),
+            "duty_factor": (("start", "leg"), gait.duty_factor, {"units": "1"}),
+            "reached": ("start", gait.reached, {"units": "time unit"}),
+            "periodic": ("start", gait.periodic),
+            "stable": ("start", gait.stable),
+            "lost": ("start", np.isfinite(times), {"long_name": "static stability lost on the way"}),
+        },
+        {"pair": list(PAIRS), "leg": list(LEGS)},
+    )
+
+
+def footfalls(
+    velocity: float,
+    controller: Cruse1998,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Stance (time, leg) of one start over three periods of its limit regime; time in periods of a single leg."""
+    import xarray as xr
+
+    start, period = draw_starts(1, seed, stride), stride.periods(velocity)
+    plan = begin(controller, start, velocity, stride, acceleration, threads)
+    settled = int(steps_within(acceleration.duration(velocity) + 10 * period, stride))
+    while plan.done < settled:
+        plan.advance(min(20_000, settled - plan.done))
+    seen = plan.advance(int(steps_within(3 * period, stride))).stance[:, 0]
+    time = np.linspace(0, 3, MOMENTS)
+    return xr.Dataset(
+        {"stance": (("time", "leg"), seen[np.round(time / 3 * (len(seen) - 1)).astype(int)])},
+        {"time": ("time", time, {"units": "periods of a single leg"}), "leg": list(LEGS)},
+    )

@@ -1,0 +1,148 @@
+"""MuJoCo's batch: many bodies side by side on a pool of threads.  The only module that steps MuJoCo in bulk.
+
+Another engine is another module with an `Engine` in it.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.physics.clock import stopped_clock
+from hexmj.threads import thread_count
+
+STATE = ("qpos", "qvel", "qacc_warmstart")
+"""What a body goes on from."""
+
+AFTER = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
+"""The same as MuJoCo records it, in one array."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rolled:
+    """What some bodies have shown over physics steps."""
+
+    feet: np.ndarray
+    """(n, 1 + step, leg, 3) before the first and after each step, in the world [mm]."""
+    sensors: np.ndarray
+    """(n, step, column) as each step begins."""
+    force: np.ndarray
+    """(n, step, actuator) as each step begins [g mm^2/s^2]."""
+    after: np.ndarray
+    """(n, step, state) after each step; what `Engine.put` takes."""
+
+
+class Engine(Protocol):
+    """Bodies that step side by side, none of which knows of another."""
+
+    def states(self, ids: np.ndarray) -> np.ndarray:
+        """What some bodies go on from, (n, state)."""
+        ...
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        """Put some bodies where they shall go on from, (n, state)."""
+        ...
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
+        """Step some bodies with these controls, (n, step, actuator).
+
+        With `parts` above 1 each row of the controls is a part of a step, and contacts are as hard as it allows: of
+        two parts.
+
+        Raises:
+            Diverged: a body of which nothing can be made any more.
+        """
+        ...
+
+
+class Diverged(Exception):
+    """One body that diverged; `physics.divergence` makes a sentence of it."""
+
+    def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray]) -> None:
+        """`start` is its index, `kinds` names what MuJoCo warned of, `state` replays it."""
+        super().__init__(start, kinds)
+        self.start, self.kinds, self.state, self.substep = start, kinds, state, 0
+
+
+class MujocoBatch:
+    """An `Engine`: MuJoCo's batch of one compiled body."""
+
+    qpos: np.ndarray
+    """(start, position), as they are now."""
+    qvel: np.ndarray
+    """(start, velocity), as they are now."""
+    push: np.ndarray
+    """(start,) force on the root to the left [g mm/s^2], 0 unless the caller sets it."""
+
+    def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
+        """As many bodies; `threads` step them, one per core unless given."""
+        self._model = model = compiled.model
+        self._batch = Batch(model, count, thread_count(threads))
+        self._timestep, self._contact = self._batch.expand("opt.timestep"), self._batch.expand("pair_solref")
+        self._state = [self._batch.bind(name) for name in STATE]
+        self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]
+        self.qpos, self.qvel = self._state[:2]
+        self._replayed = {name: self._batch.bind(name) for name in (*STATE, "xfrc_applied")}
+        self.push = self._replayed["xfrc_applied"][:, compiled.root, 1]
+        self.sensors, self._foot = self._batch.bind("sensordata"), compiled.columns.foot
+        self.force = self._batch.bind("actuator_force")
+
+    def states(self, ids: np.ndarray) -> np.ndarray:
+        """See `Engine.states`."""
+        return np.concatenate([values[ids] for values in self._state], axis=1)
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        """See `Engine.put`."""
+        for values, now in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
+            now[ids] = values
+
+    def rest(self, control: np.ndarray, steps: int) -> None:
+        """Step all bodies with one control, (start, actuator), and make everything that they show current.
+
+        Raises:
+            Diverged: see `Engine.roll`.
+        """
+        ids = np.arange(len(control))
+        before = self._before(ids)
+        self._batch.bind("ctrl")[:] = control
+        with stopped_clock():
+            self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
+        self._check(ids, before, control[:, np.newaxis])
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
+        """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
+        model, before = self._model, self._before(ids)
+        if parts > 1:
+            timestep = model.opt.timestep / parts
+            self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
+        record = (AFTER, "sensordata", "actuator_force")
+        with stopped_clock():
+            seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
+            self._check(ids, before, control)
+            self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end
+        if parts > 1:
+            self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
+        feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
+        places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
+        return Rolled(places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
+
+    def _before(self, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """What replays some bodies; MuJoCo takes back states and pushes of one that diverges."""
+        return {name: values[ids] for name, values in self._replayed.items()}
+
+    def _check(self, ids: np.ndarray, before: dict[str, np.ndarray], control: np.ndarray) -> None:
+        """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""
+        warned = self._batch.warning[ids, :, 1] > 0
+        broken = ~np.isfinite(self.qpos[ids]).all(axis=1)
+        failed = np.flatnonzero(warned.any(axis=1) | broken)
+        if len(failed) == 0:
+            return
+        i = int(failed[0])
+        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
+        model = self._batch.get_model(ids[i])
+        state = {name: values[i] for name, values in before.items()} | {"ctrl": control[i]}
+        state |= {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep)}
+        raise Diverged(int(ids[i]), ", ".join(kinds), state)

@@ -1,0 +1,144 @@
+"""Feet that strike the ground: a step of the plan in which one would sink in is taken again, more finely.
+
+A body that tips, or a swing that ends early, brings a foot down at 0.4 m/s and more.  One physics step takes it
+0.25 mm into the ground before any contact can act, so it needs shorter steps and a contact as hard as they allow.  Few
+of a plan's steps need it, and only those are divided; `docs/feet_that_land.md` has the figures.
+
+Whether a step is taken again depends on nothing but its own body, so results do not depend on the batch.  A body that
+diverges ends everything even in steps that would have been taken again.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hexmj.physics.backend import Diverged, Engine
+
+Shown = dict[str, np.ndarray]
+"""What is shown of some bodies by its name, each (n, substep, ...): sensors, force, depth, and the states after."""
+
+SINK = 0.02
+"""How deep a foot may be in the ground, as a share of the standing height."""
+
+FINER, FINEST = 4, 64
+"""Into how many parts a physics step is divided, again and again while a foot sinks in; and into how many at most."""
+
+BRAKED = 0.5
+"""Share of its speed that a foot in the ground is taken to keep over a physics step; measured are 0.2 to 0.7."""
+
+
+class FineSteps:
+    """The loop that takes whole steps of a plan, and those again, more finely, in which a foot strikes."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        substeps: int,
+        depth_of: Callable[[np.ndarray], np.ndarray],
+        allowed: float,
+        touch: slice,
+    ) -> None:
+        """Args:
+        engine: steps the bodies.
+        substeps: physics steps in one of the plan.
+        depth_of: how deep feet in the world are in the ground, (..., 3) -> (...) [mm].
+        allowed: how deep a foot may be [mm].
+        touch: columns of the sensors that hold forces.
+        """
+        self._engine, self._substeps = engine, substeps
+        self._depth_of, self._allowed, self._touch = depth_of, allowed, touch
+
+    def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
+        """What some bodies show while they take the substeps of these controls, (n, substep, actuator).
+
+        What strikes the ground is put back to where that step of the plan began, takes it finely, and goes on.
+
+        Raises:
+            Diverged: a body that diverged.
+        """
+        m, end, before = self._substeps, control.shape[1], self._engine.states(ids)
+        shown, struck = self._roll(ids, control, 0, end)
+        for begin in range(0, end, m):
+            if (again := np.flatnonzero(struck == begin)).size:
+                few, then = ids[again], min(begin + m, end)
+                self._engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
+                _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
+                if then < end:
+                    rest, struck[again] = self._roll(few, control[again], then, end)
+                    _show(shown, again, then, rest)
+        return shown
+
+    def _roll(
+        self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int = 1
+    ) -> tuple[Shown, np.ndarray]:
+        """Every part of some substeps; and where the first step begins in which a foot strikes, (n,), or `end`."""
+        try:
+            seen = self._engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
+        except Diverged as error:
+            error.substep = begin
+            raise
+        depth, m = self._depth_of(seen.feet), self._substeps
+        strike = strikes(depth, parts * m, self._allowed)
+        shown = {"sensors": seen.sensors, "force": seen.force, "depth": depth[:, 1:].max(axis=2), "after": seen.after}
+        return shown, np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
+
+    def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
+        """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""
+        before = self._engine.states(ids)
+        every, struck = self._roll(ids, control, begin, end, parts)
+        shown = {
+            "sensors": in_whole_steps(every["sensors"], parts, self._touch),
+            "force": every["force"][:, ::parts],
+            "depth": every["depth"].reshape(len(ids), -1, parts).max(axis=2),
+            "after": every["after"][:, parts - 1 :: parts],
+        }
+        if parts < FINEST and (again := np.flatnonzero(struck < end)).size:
+            self._engine.put(ids[again], before[again])
+            finer = self._roll_finely(ids[again], control[again], begin, end, FINER * parts)
+            _show(shown, again, 0, finer)
+        return shown
+
+
+def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:
+    """Show something else of some rows, from a substep on."""
+    for name, values in instead.items():
+        shown[name][rows, begin : begin + values.shape[1]] = values
+
+
+def strikes(depth: np.ndarray, substeps: int, allowed: float) -> np.ndarray:
+    """In which physics steps a foot gets too deep, or will be too deep one step later.
+
+    The latter is asked only where a step of the plan ends: the next one can be taken again from there, not from
+    before, and then it would begin with a foot that is too deep and too fast.
+
+    Args:
+        depth: of the feet before the first and after each physics step, (..., 1 + step, leg) [mm]; negative above
+            ground.  It begins where a step of the plan begins.
+        substeps: physics steps in one of the plan.
+        allowed: how deep a foot may be [mm].
+
+    Returns:
+        (..., step)
+    """
+    after, before, last = depth[..., 1:, :], depth[..., :-1, :], slice(substeps - 1, None, substeps)
+    one_later = after + np.where(after > 0, BRAKED, 1.0) * (after - before)
+    deepest = after.copy()
+    deepest[..., last, :] = np.maximum(after, one_later)[..., last, :]
+    return deepest.max(axis=-1) > allowed
+
+
+def in_whole_steps(sensors: np.ndarray, fine: int, touch: slice) -> np.ndarray:
+    """What sensors show as each step begins that was taken in `fine` parts; forces are the means over its parts.
+
+    Args:
+        sensors: before each part, (..., step * part, column).
+        fine: parts in a step.
+        touch: columns of the forces.
+
+    Returns:
+        (..., step, column)
+    """
+    parts = sensors.reshape(*sensors.shape[:-2], -1, fine, sensors.shape[-1])
+    whole = parts[..., 0, :].copy()
+    whole[..., touch] = parts[..., touch].mean(axis=-2)
+    return whole

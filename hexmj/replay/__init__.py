@@ -1,0 +1,1 @@
+"""What a walk leaves behind: recordings, their figures and films."""

@@ -1,0 +1,85 @@
+"""How films are rendered: settled when something is drawn, never by importing this package.
+
+MuJoCo settles it when it is imported, by MUJOCO_GL, and takes a screen unless told.  Where nobody has told it and there
+is no screen, its renderers are handed contexts of EGL, which needs none.
+"""
+
+import ctypes
+import os
+import sys
+import textwrap
+import warnings
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import mujoco
+
+LIBRARIES = ("libEGL.so.1", "libOpenGL.so.0")
+PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
+"""Packages of Debian and Ubuntu that bring the libraries and a software renderer."""
+
+WISHES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+"""Variables of the environment by which a GL has been chosen, or a screen is there."""
+
+
+def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Renderer":
+    """A renderer for frames of this many pixels, with a context of `context_type`."""
+    import mujoco
+    from mujoco.rendering.classic import gl_context
+
+    usual, gl_context.GLContext = gl_context.GLContext, context_type()
+    try:
+        return mujoco.Renderer(model, height, width)
+    finally:
+        gl_context.GLContext = usual
+
+
+def context_type() -> Any:
+    """What GL contexts are made by: MuJoCo's choice, or EGL where nothing was chosen and there is no screen.
+
+    Raises:
+        OSError, AttributeError and others, of each library: nothing can be rendered.
+    """
+    if sys.platform != "linux" or any(os.environ.get(name) for name in WISHES):
+        import mujoco
+
+        return mujoco.GLContext
+    _load_libraries()
+    from mujoco.egl import GLContext
+
+    return GLContext
+
+
+def drop_vain_wish() -> None:
+    """Let a command that draws nothing go on where EGL is asked for and missing: MuJoCo cannot be imported there.
+
+    For a program of our own only, before MuJoCo is imported; `missing` then says what to install.
+    """
+    if os.environ.get("MUJOCO_GL") == "egl":
+        try:
+            _load_libraries()
+        except OSError:
+            del os.environ["MUJOCO_GL"]
+
+
+def missing() -> str | None:
+    """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context
+            context = context_type()(16, 16)
+            made = bool(context._context)
+            context.free()
+    except Exception as error:  # each library and driver raises another type of its own
+        return _sentence(textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip("."))
+    wanted = os.environ.get("MUJOCO_GL")
+    return None if made else _sentence(f"MUJOCO_GL = {wanted}" if wanted else "the screen gives no context")
+
+
+def _load_libraries() -> None:
+    for library in LIBRARIES:
+        ctypes.CDLL(library)
+
+
+def _sentence(reason: str) -> str:
+    return f"Nothing can be rendered here ({reason}); on Debian and Ubuntu rendering takes the packages {PACKAGES}."

@@ -1,0 +1,151 @@
+"""What is drawn on the frames of a film: a caption above, and a footfall diagram that grows below."""
+
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from hexmj.legs import LEGS
+from hexmj.replay.take import Take
+
+INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
+GREEN, RED = (22, 122, 56), (192, 28, 22)
+
+MINUS = "\N{MINUS SIGN}"
+
+CAPTION, DIAGRAM = 48, 80
+"""Heights on a frame of 640 x 480 pixels, to which all sizes here refer.  The insect's cameras leave them free."""
+
+
+class Overlay:
+    """Caption and diagram of one take, for frames of one size."""
+
+    def __init__(self, take: Take, width: int, height: int, duration: float) -> None:
+        """Draw the whole diagram once.
+
+        Args:
+            take: what is shown.
+            width: of the frames [pixels].
+            height: of the frames [pixels].
+            duration: time that the diagram's axis spans [s].
+        """
+        self._take, self._duration = take, duration
+        self._scale = min(width / 640, height / 480)
+        self._top, self._bottom = self._pixels(CAPTION), height - self._pixels(DIAGRAM)
+        self._left, self._right = self._pixels(30), width - self._pixels(12)
+        self._blank = self._axes(width, height - self._bottom)
+        self._full = self._bars(self._blank.copy())
+
+    def draw(self, frame: np.ndarray, row: int, seconds: float) -> None:
+        """Draw on a frame, (height, width, 3), the state at the end of step `row` and the clock."""
+        now = self._column(seconds)
+        diagram = frame[self._bottom :]
+        diagram[:] = self._blank
+        diagram[:, :now] = self._full[:, :now]
+        cursor = self._pixels(1)
+        diagram[: self._row(6), now : now + cursor] = INK
+        frame[: self._top] = self._caption(frame[: self._top], row, seconds)
+
+    def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
+        take, size, edge = self._take, self._pixels(15), self._pixels(10)
+        image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
+        draw = ImageDraw.Draw(image)
+        first, second = round(0.29 * self._top), round(0.75 * self._top)
+        state, colour = self._state(seconds)
+        bold = _font(size, bold=True)
+        free = image.width - 3 * edge - draw.textlength(state, bold)
+        draw.text((edge, first), _shortened(take.title, bold, free), INK, bold, anchor="lm")
+        draw.text((image.width - edge, first), state, colour, bold, anchor="rm")
+        margin = f"{take.margin[row]:+.1f} mm".replace("-", MINUS) if seconds < take.fell else "unknown"
+        fields = (
+            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units",
+            f"V = {take.velocity[row]:.2f}",
+            f"Vₚ = {take.conditions.time.vp:g} mm/s",
+            f"margin {margin}",
+        )
+        for place, text in zip((0.0, 0.42, 0.57, 0.77), fields, strict=True):
+            x = edge + place * (image.width - 2 * edge)
+            draw.text((x, second), text, INK, _font(self._pixels(13)), anchor="lm")
+        return np.asarray(image)
+
+    def _state(self, seconds: float) -> tuple[str, tuple[int, int, int]]:
+        take = self._take
+        if seconds >= take.fell:
+            return f"fell on {take.part} at {1000 * take.fell:.0f} ms", RED
+        if seconds >= take.lost:
+            return f"stability lost at {1000 * take.lost:.0f} ms", RED
+        return "stable", GREEN
+
+    def _axes(self, width: int, height: int) -> np.ndarray:
+        """The diagram without bars, (height, width, 3)."""
+        image = Image.new("RGB", (width, height), PAPER)
+        draw = ImageDraw.Draw(image)
+        font = _font(self._pixels(10))
+        for leg, name in enumerate(LEGS):
+            middle = (self._row(leg) + self._row(leg + 1)) / 2
+            draw.text((self._left - self._pixels(6), middle), name, INK, font, anchor="rm")
+            draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
+        legend = "black: foot off ground" if self._take.physical else "black: protraction"
+        baseline = (self._row(6) + height) / 2
+        draw.text((self._left - self._pixels(6), baseline), "ms", FAINT, font, anchor="rm")
+        draw.text((self._right, baseline), legend, INK, font, anchor="rm")
+        free = self._right - draw.textlength(f"{legend} 0000", font)
+        for milliseconds in _ticks(1000 * self._duration):
+            x = self._column(milliseconds / 1000)
+            draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
+            if x < free:
+                draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
+        return np.asarray(image)
+
+    def _bars(self, axes: np.ndarray) -> np.ndarray:
+        """The whole diagram, on its axes."""
+        take = self._take
+        columns = np.arange(self._left, self._right)
+        seconds = (columns - self._left + 0.5) / (self._right - self._left) * self._duration
+        over = seconds > len(take.qpos) * take.step
+        steps = np.clip(np.rint(seconds / take.step).astype(int) - 1, 0, len(take.qpos) - 1)
+        gap = self._pixels(1.5)
+        axes[: self._row(6), columns[over]] = SHADE
+        for leg in range(6):
+            swing = columns[~take.stance[steps, leg] & ~over]
+            axes[self._row(leg) + gap : self._row(leg + 1) - gap + 1, swing] = INK
+        if take.lost <= self._duration:
+            x = self._column(take.lost)
+            axes[: self._row(6), x : x + self._pixels(1.5)] = RED
+        return axes
+
+    def _column(self, seconds: float) -> int:
+        """Pixel column of a time."""
+        return self._left + round(seconds / self._duration * (self._right - self._left - 1))
+
+    def _row(self, leg: int) -> int:
+        """Upper pixel row of a leg within the diagram."""
+        return self._pixels(3 + 10 * leg)
+
+    def _pixels(self, size: float) -> int:
+        """A length on a frame of 640 x 480, in pixels of this one."""
+        return max(1, round(size * self._scale))
+
+
+def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
+    """As much of a text as fits into a width [pixels]."""
+    if font.getlength(text) <= width:
+        return text
+    while text and font.getlength(f"{text}…") > width:
+        text = text[:-1]
+    return f"{text}…"
+
+
+def _ticks(end: float) -> np.ndarray:
+    """Round numbers from 0 to `end`, five to twelve of them."""
+    power = 10.0 ** np.floor(np.log10(end))
+    step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if end <= 11 * power * part)
+    return np.arange(0.0, end + 1e-9 * end, step)
+
+
+@cache
+def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)

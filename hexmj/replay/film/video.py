@@ -1,0 +1,127 @@
+"""Films of recordings, rendered without a screen: the insect, its support polygon, caption and footfall diagram."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import imageio_ffmpeg
+import mediapy
+import mujoco
+import numpy as np
+import xarray as xr
+
+from hexmj.bodies.description import Body
+from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError, RenderingError
+from hexmj.progress import Progress
+from hexmj.replay.film import gl
+from hexmj.replay.film.film import Film
+from hexmj.replay.film.overlay import Overlay
+from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.replay.take import Take
+from hexmj.results import write_whole
+from hexmj.stability import support_polygon
+
+BRIGHTER = 1.2
+"""Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
+
+
+def render(
+    recordings: Sequence[xr.Dataset],
+    path: Path | str,
+    film: Film | None = None,
+    progress: Progress | None = None,
+    *,
+    body: Body = STICK_INSECT,
+) -> int:
+    """Film one recording, or two side by side with one clock; a body that fell stays as it was last seen.
+
+    Args:
+        recordings: one or two.
+        path: of the film, an MP4 file; it appears whole or not at all.
+        film: how it is filmed.
+        progress: told the fraction done since it was last called.
+        body: the description of what was recorded.
+
+    Returns:
+        The number of frames: the walk's duration, the longer one's of two, at `Film.fps`.
+
+    Raises:
+        InputError: not one or two recordings, no MP4 file in a folder that exists, or a recording without a pose.
+        RenderingError: nothing can be rendered here; says what brings it.
+    """
+    film, path = film or Film(), Path(path)
+    if len(recordings) not in (1, 2):
+        raise InputError(f"{len(recordings)} recordings were given; expected one, or two for side by side")
+    if path.suffix != ".mp4" or not path.parent.is_dir():
+        raise InputError(f"the film cannot be written to {path}; expected a name with .mp4 in a folder that exists")
+    if reason := gl.missing():
+        raise RenderingError(reason)
+    try:
+        takes = [Take.of(recording, body) for recording in recordings]
+    except (KeyError, IndexError, TypeError, ValueError, OSError, RuntimeError) as error:
+        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
+    frames = max(1, round(max(take.duration for take in takes) * film.slow_motion * film.fps))
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    write_whole(path, lambda part: _write(takes, part, frames, film, progress))
+    return frames
+
+
+def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress: Progress | None) -> None:
+    """Film the takes side by side."""
+    duration = max(take.duration for take in takes)
+    overlays = [Overlay(take, film.width, film.height, duration) for take in takes]
+    picture = np.empty((film.height, film.width * len(takes), 3), dtype=np.uint8)
+    panels = np.split(picture, len(takes), axis=1)
+    encoder = {"fps": film.fps, "crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"}
+    with ExitStack() as opened:
+        worlds = {take.conditions: _filmed_insect(film, take.conditions) for take in takes}
+        stages = {
+            conditions: (opened.enter_context(gl.renderer(model, film.height, film.width)), mujoco.MjData(model))
+            for conditions, model in worlds.items()
+        }
+        writer = opened.enter_context(mediapy.VideoWriter(path, picture.shape[:2], **encoder))
+        for frame in range(frames):
+            seconds = frame / (film.fps * film.slow_motion)
+            for take, overlay, panel in zip(takes, overlays, panels, strict=True):
+                row = take.row(seconds)
+                panel[:] = _view(*stages[take.conditions], film.camera, take, row)
+                overlay.draw(panel, row, seconds)
+            writer.add_image(picture)
+            if progress:
+                progress(1 / frames)
+
+
+def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:
+    """The insect on its ground, with the looks and the buffer that a film needs."""
+    model = compile_body(conditions).model
+    model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
+    if film.quality == "high":
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = 4096, 4
+        return model
+    model.vis.quality.offsamples = 0
+    model.light_castshadow[:] = False
+    ground = model.texture("ground")
+    begin = int(ground.adr[0])
+    colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
+    colours[:] = np.minimum(BRIGHTER * colours, 255)
+    return model
+
+
+def _view(renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Take, row: int) -> np.ndarray:
+    """The scene at the end of step `row`, (height, width, 3)."""
+    data.qpos[:] = take.qpos[row]
+    mujoco.mj_kinematics(renderer.model, data)
+    mujoco.mj_comPos(renderer.model, data)
+    mujoco.mj_camlight(renderer.model, data)
+    renderer.update_scene(data, camera)
+    stable, body = bool(take.margin[row] > 0.0), take.conditions.body
+    corners, centre = support_polygon(take.feet[row], take.stance[row]), take.centre_of_mass[row]
+    level = float(ground_level(take.conditions.ground, body.lengths, np.vstack([corners, centre[:2]])).max())
+    mark_support(renderer.scene, body.marks, corners, level, stable)
+    mark_centre_of_mass(renderer.scene, body.marks, centre, level, stable)
+    mark_planned_tips(renderer.scene, body.marks, take.planned_tip[row])
+    return renderer.render()

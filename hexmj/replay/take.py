@@ -1,0 +1,89 @@
+"""What a film shows of a recording: the measured walk of a physical insect, or the plan that a puppet shows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from hexmj.bodies.description import Body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError
+from hexmj.replay.recording import recorded_conditions
+from hexmj.rotations import heading, turned
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """The numbers of one recording, in memory; only steps with a pose, so none after a fall."""
+
+    title: str
+    physical: bool
+    """Whether a physical insect was recorded, or a puppet."""
+    conditions: Conditions
+    """Of the walk."""
+    step: float
+    """Duration of a step [s]."""
+    duration: float
+    """Time recorded [s], also beyond a fall."""
+    velocity: np.ndarray
+    """(step,) V_r as a fraction of V_p."""
+    margin: np.ndarray
+    """(step,) stability margin [mm]."""
+    stance: np.ndarray
+    """(step, leg) which feet stand."""
+    feet: np.ndarray
+    """(step, leg, 2) feet in the world [mm]."""
+    planned_tip: np.ndarray
+    """(step, leg, 3) planned tips in the world [mm]."""
+    centre_of_mass: np.ndarray
+    """(step, 3) in the world [mm]."""
+    qpos: np.ndarray
+    """(step, position) of the insect."""
+    lost: float
+    """First loss of static stability [s], inf for none."""
+    fell: float
+    """Fall [s], inf for none."""
+    part: str
+    """Part of the trunk that touched the ground first, where `fell` is finite."""
+
+    @classmethod
+    def of(cls, recording: xr.Dataset, body: Body = STICK_INSECT) -> "Take":
+        """Read a recording of a body."""
+        qpos = recording["qpos"].values
+        shown = slice(np.isfinite(qpos).all(axis=1).sum())
+        if shown.stop == 0:
+            raise InputError(f"the recording {recording.attrs['title']!r} holds no pose; expected at least one")
+        physical = "measured_stance" in recording
+        kind = "measured" if physical else "planned"
+        centre, tips = recording["centre_of_mass"].values[shown], recording["planned_tip"].values[shown]
+        seen = np.stack(
+            [
+                recording[f"{kind}_x"].values[shown] + np.tile(recording.attrs["origins"], 2),
+                recording[f"{kind}_y"].values[shown],
+            ],
+            axis=-1,
+        )
+        seconds, conditions = recording["seconds"].values, recorded_conditions(recording, body)
+        vp = conditions.time.vp
+        return cls(
+            title=recording.attrs["title"],
+            physical=physical,
+            conditions=conditions,
+            step=float(recording.attrs["dt"]) / vp,
+            duration=float(seconds[-1]),
+            velocity=recording["velocity"].values[shown],
+            margin=recording[f"{kind}_margin"].values[shown],
+            stance=recording[f"{kind}_stance"].values[shown].astype(bool),
+            feet=centre[:, None, :2] + turned(seen, heading(qpos[shown, 3:7])),
+            planned_tip=tips,
+            centre_of_mass=centre,
+            qpos=qpos[shown],
+            lost=float(recording[f"{kind}_loss_time"]) / vp,
+            fell=float(recording["fall_time"]) / vp if physical else np.inf,
+            part=conditions.body.trunk[int(recording["fall_part"])] if physical else "",
+        )
+
+    def row(self, seconds: float) -> int:
+        """The step whose end is nearest to a time; the last one after the end."""
+        return int(np.clip(round(seconds / self.step) - 1, 0, len(self.qpos) - 1))

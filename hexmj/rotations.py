@@ -1,0 +1,42 @@
+"""Unit quaternions (w, x, y, z) of a root: vectors turned, its heading, and how far its vertical leans."""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+
+def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors, (..., 3), turned by unit quaternions, (..., 4)."""
+    w, axis = quaternion[..., :1], quaternion[..., 1:]
+    return vector + 2.0 * np.cross(axis, np.cross(axis, vector) + w * vector)
+
+
+def heading(quaternion: np.ndarray) -> np.ndarray:
+    """Direction in which the root points, (...) [rad], counter-clockwise from the world's x axis."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def turned(points: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Points on the plane, (..., point, 2), turned counter-clockwise by angles, (...) [rad]."""
+    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    ahead, left = points[..., 0], points[..., 1]
+    return np.stack([cos * ahead - sin * left, sin * ahead + cos * left], axis=-1)
+
+
+def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far the root's vertical leans ahead and to the left, (..., 2) [sine], and its tilt, (...) [rad]."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    leans = np.stack([2.0 * (w * y - x * z), -2.0 * (w * x + y * z)], axis=-1)
+    return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))
+
+
+@njit(nogil=True, forceinline=True)
+def matrix(w: float, x: float, y: float, z: float) -> Any:
+    """The rotation of one quaternion, row by row: nine numbers, for compiled code."""
+    return (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip

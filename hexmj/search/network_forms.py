@@ -1,0 +1,115 @@
+"""Forms of the 1998 network's weights.
+
+Appendix A makes all legs of a side alike: nine numbers, or ten.  In the form 'mirrored' only the two sides are alike,
+and each leg's neighbours have weights of their own: 29 of the 58 general weights of Section 2.  In the form 'general'
+all 58 are free.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+
+from hexmj.controllers.cruse1998 import Cruse1998, Order
+from hexmj.controllers.cruse1998.weights import BINARY, NEIGHBOURS, AnyWeights, Symmetric, Weights, general
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.legs import MIRROR
+
+FormName = Literal["hws", "ldvs", "mirrored", "general"]
+
+_ALL = [(kind, d, e) for kind, neighbours in NEIGHBOURS.items() for d in range(6) for e in neighbours[d]]
+_LEFT = [(kind, d, e) for kind, d, e in _ALL if d < 3]
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What a form's vector means."""
+
+    names: tuple[str, ...]
+    """In the order of the vector; of general weights with destination and source leg."""
+    weights: Callable[[np.ndarray], AnyWeights]
+    """From a vector, (parameter,)."""
+    vector: Callable[[AnyWeights], np.ndarray]
+    """The parameters of weights of another form too, for comparison; NaN where those have none of a name."""
+
+
+def _symmetric(size: Literal[9, 10]) -> Parameters:
+    names = [f.name for f in fields(Symmetric) if f.name != "p34_i" or size == 10]
+
+    def vector(weights: AnyWeights) -> np.ndarray:
+        return np.array([getattr(weights, name, np.nan) for name in names])
+
+    return Parameters(tuple(names), Symmetric.from_vector, vector)
+
+
+def _names(places: list[tuple[str, int, int]]) -> tuple[str, ...]:
+    return tuple(f"{kind} {d + 1},{e + 1}" for kind, d, e in places)
+
+
+def _mirrored(vector: np.ndarray) -> Weights:
+    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+    for (kind, d, e), value in zip(_LEFT, vector, strict=True):
+        matrices[kind][d, e] = matrices[kind][MIRROR[d], MIRROR[e]] = value
+    return Weights(**matrices)
+
+
+def _left(weights: AnyWeights) -> np.ndarray:
+    every = general(weights)
+    return np.array([getattr(every, kind)[d, e] for kind, d, e in _LEFT])
+
+
+FORMS: dict[FormName, Parameters] = {
+    "hws": _symmetric(9),
+    "ldvs": _symmetric(10),
+    "mirrored": Parameters(_names(_LEFT), _mirrored, _left),
+    "general": Parameters(_names(_ALL), Weights.from_vector, lambda weights: general(weights).to_vector()),
+}
+"""Forms by their names."""
+
+
+@dataclass(frozen=True)
+class NetworkForm:
+    """Weights of the 1998 network, with its order of updates."""
+
+    name: FormName = "ldvs"
+    """Which weights are free."""
+    order: Order = "printed"
+    """See `Cruse1998.order`."""
+
+    def __post_init__(self) -> None:
+        if self.name not in FORMS:
+            raise InputError(f"form = {self.name!r}; valid names: {', '.join(FORMS)}")
+        Cruse1998(Symmetric(), self.order)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See `Form.names`."""
+        return FORMS[self.name].names
+
+    @property
+    def binary(self) -> np.ndarray:
+        """P^2 and P^4."""
+        return np.array([name.startswith(BINARY) for name in self.names])
+
+    @property
+    def begin(self) -> None:
+        """The paper's '0'-individual, or the middle of the box."""
+        return None
+
+    def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Not printed in the paper: -reach to reach for the neutral positions and their change with velocity [mm], 0 to
+        reach for shifts [mm] and weights (the signs of the printed sets), 0 to 1 for the binary ones."""
+        neutral = np.array([name.startswith(("p31", "p34")) for name in self.names])
+        return np.where(neutral, -reach, 0.0), np.where(self.binary, 1.0, reach)
+
+    def controller(self, vector: np.ndarray) -> Cruse1998:
+        """See `Form.controller`."""
+        return Cruse1998(FORMS[self.name].weights(vector), self.order)
+
+    def vector(self, controller: Controller) -> np.ndarray:
+        """See `Form.vector`."""
+        if not isinstance(controller, Cruse1998):
+            raise InputError(f"{controller.name} has no weights; expected a set of the 1998 network")
+        return FORMS[self.name].vector(controller.weights)

@@ -1,0 +1,86 @@
+"""Random starts of walks, all standing (paper, Section 3), and what is checked of starts and velocities."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.errors import InputError
+from hexmj.timing import Acceleration, Stride
+
+SAMPLE = 1000
+"""Starts of one sample of the paper's protocol; it takes seven of them."""
+
+SLAB = 64 * SAMPLE
+"""Starts that are drawn and held in memory at a time where only counts are kept of them."""
+
+MOST_STARTS = 10**10
+"""Most starts of one FLSS; on two cores they take hours to days."""
+
+MOST_DRAWN = 10**8
+"""Most starts in one array; their tips take 5 GB."""
+
+
+def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.ndarray:
+    """Starts drawn uniformly from S: all legs stand between PEP_0 and AEP_0 (Section 3).
+
+    Returns:
+        (start, leg) [mm].  The first k of n starts are the same for every n.
+
+    Raises:
+        InputError: a number of starts or a seed that makes no sense.
+    """
+    check_draw(n_starts, seed)
+    if n_starts > MOST_DRAWN:
+        raise InputError(f"starts = {n_starts}; expected at most {MOST_DRAWN} in one array")
+    return np.concatenate(list(draw_slabs(n_starts, seed, stride or Stride())))
+
+
+def draw_slabs(n_starts: int, seed: int, stride: Stride) -> Iterator[np.ndarray]:
+    """The starts of `draw_starts`, (start, leg) [mm], `SLAB` at a time."""
+    rng = np.random.default_rng(seed)
+    for first in range(0, n_starts, SLAB):
+        yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - first), 6))
+
+
+def check_draw(n_starts: int, seed: int) -> None:
+    """Refuse a number of starts or a seed that makes no sense."""
+    if not (isinstance(n_starts, int) and 1 <= n_starts <= MOST_STARTS):
+        raise InputError(f"starts = {n_starts}; expected a whole number of at least 1 and at most {MOST_STARTS}")
+    if not (isinstance(seed, int) and seed >= 0):
+        raise InputError(f"seed = {seed}; expected an integer of at least 0")
+
+
+def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
+    """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0."""
+    x = np.array(starts, dtype=float)
+    if x.ndim != 2 or x.shape[1] != 6 or len(x) == 0:
+        raise InputError(f"starts have the shape {x.shape}; expected (start, leg) with at least one start and 6 legs")
+    if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
+        raise InputError(f"a start lies outside the step range, {stride.pep_min} to {stride.aep0} mm")
+    return x
+
+
+def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:
+    """A copy of V_r for each start, (start,), if it lies in [0, 1[ and an acceleration can reach it."""
+    v = np.array(velocity, dtype=float)
+    if not ((v >= 0) & (v < 1)).all():
+        raise InputError(f"velocity = {velocity}; expected 0 <= V < 1, a fraction of the protraction velocity V_p")
+    if acceleration and not (v >= acceleration.start).all():
+        raise InputError(f"velocity = {velocity}; expected at least V_r(0) = {acceleration.start} when accelerating")
+    if v.shape not in ((), (n_starts,)):
+        raise InputError(f"velocities have the shape {v.shape}; expected one number or ({n_starts},), one a start")
+    return np.broadcast_to(v, n_starts).copy()
+
+
+def checked_list(velocities: Sequence[float]) -> np.ndarray:
+    """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
+    try:
+        v = np.array(velocities, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"velocities = {velocities!r}; expected a list of numbers") from None
+    if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
+        raise InputError(f"velocities = {velocities}; expected a list of at least one, and none of them twice")
+    if not ((v >= 0) & (v < 1)).all():
+        raise InputError(f"velocities = {v.tolist()}; expected 0 <= V < 1, fractions of V_p")
+    return v

@@ -1,0 +1,135 @@
+"""Disturbed walks on paper and in physics: what a halt, a stopped leg or a push does, and what three strategies buy.
+
+At every velocity the same starts meet the same disturbances at the same times, whatever the strategy.  They are the
+seed's first starts whose plan is stable until then.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.starts import check_draw, checked_list
+from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
+from hexmj.sweeps import Cell, along
+from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+RECOVERY = Acceleration(rate=0.002)
+"""After slowing down.  The slower, the fewer walks lose stability, but the paper's a = 0.00008 takes thousands of time
+units; `docs/laboratory.md` tells what was tried."""
+
+
+@dataclass(frozen=True)
+class DisturbedWalks:
+    """The same starts in every case, an undisturbed one among them, at every velocity."""
+
+    controller: Controller
+    """Plans the walks: a `SteerableController`, or `ReadsLegs` around one."""
+    velocities: Sequence[float] = (0.3, 0.5, 0.7)
+    """V_r, each 0 < V < 1, and at least V_r(0) of the recovery where a case slows down."""
+    disturbances: Sequence[Kind] = ("halt", "leg", "push")
+    """The body is halted, one protracting leg is stopped, or the body is pushed from the side; each once."""
+    impulses: Sequence[float] = (40.0, 60.0)
+    """Of the pushes, in multiples of the insect's mass times V_p, each once."""
+    strategies: Sequence[Answer] = ("reorganise", "slow_down", "grasp")
+    """Beside none, each once."""
+    recovery: Acceleration = RECOVERY
+    """Of the strategy 'slow_down', from its low velocity to V."""
+    adhesion: float = 1.0
+    """As `FootContact.grasp`, of the strategy 'grasp'."""
+    physical: bool = True
+    """Walk in MuJoCo too."""
+    n_starts: int = 40
+    """Number of starts that reach their disturbance, the same in every case."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]; see `frequencies.WINDOWS`."""
+    seed: int = 0
+    """Of starts, times, legs and postures."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """Of the physical walks."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+
+    def __post_init__(self) -> None:
+        check_draw(self.n_starts, self.seed)
+        v, slows = checked_list(self.velocities), "slow_down" in self.strategies
+        low = self.recovery.start if slows else 0.0
+        if not ((v > 0) & (v >= low)).all():
+            raise InputError(
+                f"velocities = {v.tolist()}; expected above 0 and at least V_r(0), {low:g}, if it slows down"
+            )
+        self.conditions.but(grasp=self.adhesion)
+        _ = self.cells()
+
+    @property
+    def cases(self) -> list[Case]:
+        """The undisturbed walk, then every disturbance without a strategy and with each."""
+        return every_case(self.disturbances, self.impulses, self.strategies, self.physical)
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocities and observation times [time units], both (velocity,)."""
+        return observed(self.velocities, self.window, self.stride)
+
+    @property
+    def grid(self) -> int:
+        """Steps of which every time of a disturbance is a multiple."""
+        from hexmj.physics.orders import steps_in_chunk
+
+        return steps_in_chunk(self.conditions.substeps(self.stride))
+
+    def cells(self) -> list[Cell]:
+        """A cell for each velocity and case; see `sweeps.Study`."""
+        from hexmj.studies.disturbance.walks import StableWalks
+
+        def walks(velocity: float) -> StableWalks:
+            return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, self.grid)
+
+        def cell(walks: StableWalks, case: Case, window: float) -> Cell:
+            grasping = self.conditions.but(grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
+            settings = {
+                "case": case,
+                "window": window,
+                "recovery": self.recovery if case.strategy == "slow_down" else None,
+                "conditions": grasping if self.physical else None,
+            }
+            name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
+            return Cell(name, walks.times, settings, work=window)
+
+        at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
+        return [cell(one, case, time) for one, time in at for case in self.cases]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """When what happened, and how often.
+
+        Returns:
+            Over (velocity, case, start) the `walks.TIMES`; a case has the coordinates `disturbance` and `strategy`, the
+            first is undisturbed.  Over velocity the observation time `duration` [time units] and the number of starts
+            `drawn` to find these.  And the frequencies of `frequencies.with_flss_after`.
+        """
+        from hexmj.measures.kinematic import settings
+        from hexmj.studies.disturbance.frequencies import with_flss_after
+
+        table = along({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
+            **velocity_axis(*self.observed),
+            disturbance=("case", [case.disturbance for case in self.cases]),
+            strategy=("case", [case.strategy for case in self.cases]),
+        )
+        drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
+        named = {self.controller.name: self.controller}
+        attributes = settings(named, self.window, self.n_starts, self.seed, self.stride, None) | {
+            "conditions": self.conditions.settings(),
+            "grid": self.grid,
+            "recovery": asdict(self.recovery),
+            "adhesion": self.adhesion,
+            "physical": self.physical,
+        }
+        return with_flss_after(table.assign(drawn=drawn)).assign_attrs(attributes)

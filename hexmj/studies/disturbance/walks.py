@@ -1,0 +1,114 @@
+"""Walks at one velocity that are disturbed: the same starts at the same times in every case."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.losses import begin, planned_losses
+from hexmj.controllers.protocol import Controller, SteerableController
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.measures.physical import outcomes_of_plan
+from hexmj.physics.drive import Push
+from hexmj.physics.settling import settle
+from hexmj.studies.disturbance.cases import Case
+from hexmj.studies.disturbance.disturbances import StableStarts, disturbance_of, find_stable_starts
+from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan, check_steerable
+from hexmj.studies.disturbance.strategies import Postures, collect_postures
+from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TIMES = {
+    "time": "time of the disturbance",
+    "back": "time from which the walk is at its velocity again",
+    "planned_loss": "first loss of static stability of the plan, or inf",
+    "fall": "first contact of the trunk with the ground, or inf",
+}
+"""What is kept of every start, all in time units."""
+
+
+@dataclass(frozen=True)
+class StableWalks:
+    """Walks at one velocity whose plan is stable until they are disturbed."""
+
+    controller: Controller
+    """Plans the walks: a `SteerableController`, or `ReadsLegs` around one, in physics."""
+    velocity: float
+    """V_r, 0 < V < 1."""
+    n_starts: int
+    """Number of starts that reach their disturbance."""
+    seed: int
+    """Of starts, times, legs and postures."""
+    stride: Stride
+    """Step range, lines of the tips and time step."""
+    grid: int
+    """Steps of which every time of a disturbance is a multiple."""
+
+    def __post_init__(self) -> None:
+        check_steerable(self.planner)
+
+    @property
+    def planner(self) -> SteerableController:
+        """What plans on paper, where no legs are read."""
+        inner = self.controller.controller if isinstance(self.controller, ReadsLegs) else self.controller
+        return inner  # pyright: ignore[reportReturnType]
+
+    @cached_property
+    def found(self) -> StableStarts:
+        """The starts; found once for all cases."""
+        return find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, self.grid)
+
+    @cached_property
+    def postures(self) -> Postures:
+        """Of the strategy 'reorganise'; collected once for all cases."""
+        return collect_postures(self.planner, self.velocity, self.seed, self.stride)
+
+    def times(
+        self,
+        case: Case,
+        window: float,
+        recovery: Acceleration | None,
+        conditions: Conditions | None,
+        threads: int | None = None,
+    ) -> "xr.Dataset":
+        """The `TIMES` of every start in one case, and the number of starts `drawn` to find these.
+
+        Args:
+            case: what they meet, and their strategy.
+            window: how long they walk once they are at V again [time units].
+            recovery: of the strategy 'slow_down'.
+            conditions: of the physical walk; without them there is none, and no fall.
+            threads: one per core unless given; the times do not depend on it.
+        """
+        import xarray as xr
+
+        disturbance = disturbance_of(self.found, case.kind, self.planner, self.velocity, self.stride)
+        postures = self.postures if case.strategy == "reorganise" else None
+        disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
+        time = disturbance.step * self.stride.dt
+        ahead = self._plan(disturbed, recovery, threads)
+        ahead.advance(int(disturbance.step.max()) + 1)
+        back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
+        end = float(back.max() + window)
+        steps = np.array(int(end / self.stride.dt))
+        first = planned_losses(self._plan(disturbed, recovery, threads), steps, threads)
+        lost = np.where(first > 0, first * self.stride.dt, np.inf)
+        times = {"time": time, "back": back, "planned_loss": lost}
+        if conditions:
+            push = Push(np.full(len(time), case.impulse * conditions.body.mass * conditions.time.vp), time)
+            settled = settle(self.found.starts, conditions, self.stride, threads)
+            walks = ReadsLegs(disturbed) if isinstance(self.controller, ReadsLegs) else disturbed
+            plan = begin(walks, self.found.starts, self.velocity, self.stride, recovery, threads=1)
+            times["fall"] = outcomes_of_plan(settled, plan, end, lost, push=push, threads=threads).fall
+        columns = {
+            name: ("start", values, {"units": "time unit", "long_name": TIMES[name]}) for name, values in times.items()
+        }
+        return xr.Dataset(columns).assign(drawn=self.found.drawn)
+
+    def _plan(self, disturbed: Disturbed, recovery: Acceleration | None, threads: int | None) -> DisturbedPlan:
+        plan = begin(disturbed, self.found.starts, self.velocity, self.stride, recovery, threads)
+        return plan  # pyright: ignore[reportReturnType]

@@ -1,0 +1,115 @@
+"""Dynamic stability maps as figures: two heat maps, and the mechanisms as stacked bars."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.studies.stability_map.mechanisms import SAVED
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MECHANISM_COLOURS = {
+    "never_lost": "#e4e4e4",
+    "still_standing": "#cde8c9",
+    "too_short": "#8fce8a",
+    "landed_in_time": "#46a35e",
+    "caught": "#14663a",
+    "tipped_behind": "#f5a25d",
+    "tipped_ahead": "#f6d55c",
+    "thrown": "#b3261e",
+    "unplanned": "#6a4c93",
+}
+"""Grey where nothing happened, greens for the saved, warm colours for falls after a planned loss."""
+
+
+def map_figure(result: "xr.Dataset") -> "Figure":
+    """Physical FLSS above the kinematic one, and how many static losses dynamics saves, from `StabilityMap`."""
+    from matplotlib.figure import Figure
+
+    rows, columns = result.sizes["value"], result.sizes["velocity"]
+    figure = Figure(figsize=(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1)), layout="constrained")
+    physical, saved = figure.subplots(1, 2, sharey=True)
+    numbers = np.concatenate([result.kinematic.values[:1], result.physical.values])
+    words = [[f"{number:.2f}" for number in row] for row in numbers]
+    if result.attrs["over"] == "vp":
+        for row, numbers_of_row in zip(words[1:], result.froude.values, strict=True):
+            row[:] = [f"{word}\nFr {number:.2g}" for word, number in zip(row, numbers_of_row, strict=True)]
+    _heat(physical, numbers, words, "YlOrRd")
+    lost = np.isfinite(result.static_loss.transpose("value", "velocity", "start").values).sum(axis=-1)
+    counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
+    words = [
+        [f"{a} of {b}" if b else "none lost" for a, b in zip(*row, strict=True)]
+        for row in zip(counts, lost, strict=True)
+    ]
+    lost_on_paper = np.isfinite(result.planned_loss.isel(value=0).transpose("velocity", "start").values).sum(axis=-1)
+    words = [[f"{n} lost" for n in lost_on_paper], *words]
+    _heat(saved, np.concatenate([np.full((1, columns), np.nan), result.saved.values]), words, "YlGn")
+    physical.set_yticks(range(rows + 1), ["on paper", *(f"{value:g}" for value in result.value.values)])
+    physical.set_ylabel(_label(result))
+    titles = {physical: "physical FLSS", saved: "saved by dynamics, of the static losses"}
+    for axes, title in titles.items():
+        axes.axhline(0.5, color="white", linewidth=9.0)
+        axes.set_title(title, fontsize=11)
+        axes.set_xticks(range(columns), [f"{v:g}" for v in result.velocity.values])
+        axes.set_xlabel("velocity $V_r / V_p$")
+    figure.suptitle(_title(result), fontsize=10)
+    return figure
+
+
+def mechanisms_figure(result: "xr.Dataset") -> "Figure":
+    """What happened to every start, a panel for each velocity, from `StabilityMap`."""
+    from matplotlib.figure import Figure
+
+    columns, total = result.sizes["velocity"], result.sizes["start"]
+    figure = Figure(figsize=(max(8.0, 2.6 + 2.3 * columns), 4.6), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
+    values = [f"{value:g}" for value in result.value.values]
+    for panel, v in zip(panels, result.velocity.values, strict=True):
+        bottom = np.zeros(len(values))
+        for name, colour in MECHANISM_COLOURS.items():
+            share = result["count"].sel(velocity=v, mechanism_name=name).values / total
+            panel.bar(values, share, 0.82, bottom, color=colour, label=name.replace("_", " "))
+            bottom = bottom + share
+        fell = result.physical.sel(velocity=v).values
+        panel.plot(values, 1.0 - fell, color="0.1", marker="_", markersize=22, linestyle="none", markeredgewidth=1.8)
+        panel.set_title(f"V = {v:g}", fontsize=11)
+        panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
+        panel.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("starts (above the mark: fell)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
+    figure.suptitle(_title(result), fontsize=10)
+    return figure
+
+
+def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:
+    """Fractions as colours with words in every cell, the first row at the bottom."""
+    axes.imshow(numbers, cmap=colours, vmin=0.0, vmax=1.0, origin="lower", aspect="auto")
+    for row, column in np.ndindex(numbers.shape):
+        colour = "white" if numbers[row, column] > 0.6 else "0.1"
+        axes.text(column, row, words[row][column], ha="center", va="center", color=colour, fontsize=10, linespacing=1.1)
+    axes.set_xticks(np.arange(numbers.shape[1] - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(numbers.shape[0] - 1) + 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=2.0)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+
+
+def _label(result: "xr.Dataset") -> str:
+    name, unit = result.value.attrs["long_name"], result.value.attrs["units"]
+    return name.replace("V_p", "$V_p$") + (f" [{unit}]" if unit != "1" else "")
+
+
+def _title(result: "xr.Dataset") -> str:
+    conditions, over = result.attrs["conditions"], result.attrs["over"]
+    named = {
+        "vp": "$V_p$ = {:g} mm/s",
+        "step_height": "step height {:g} mm",
+        "standing_height": "standing height {:g} mm",
+        "friction": "friction {:g}",
+    }
+    others = ", ".join(words.format(conditions[name]) for name, words in named.items() if name != over)
+    return f"{result.sizes['start']} starts at every cell, window {result.attrs['window']}; {others}"

@@ -1,0 +1,160 @@
+"""Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type
+from hexmj.errors import InputError, check_distinct
+from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.starts import check_draw, draw_starts
+from hexmj.sweeps import Cell, along
+from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Over = Literal["vp", "step_height", "standing_height", "friction", "load", "centre_of_mass"]
+"""Conditions that a map can vary."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition that a map can vary."""
+
+    values: tuple[float, ...]
+    """Those of a map unless others are given."""
+    unit: str
+    name: str
+
+
+CONDITIONS: dict[Over, Condition] = {
+    "vp": Condition((20.0, 40.0, 80.0, 160.0, 320.0), "mm/s", "swing velocity V_p"),
+    "step_height": Condition((4.0, 6.0, 8.0, 10.0, 12.0), "mm", "step height"),
+    "standing_height": Condition((6.0, 8.0, 10.0, 12.0, 14.0), "mm", "standing height"),
+    "friction": Condition((0.05, 0.2, 0.5, 1.0, 2.0), "1", "friction"),
+    "load": Condition((0.0, 0.5, 1.0, 1.5, 2.0), "insect's weight", "load"),
+    "centre_of_mass": Condition((-9.4, -5.0, 0.0, 5.0, 10.0), "mm", "centre of mass ahead of O"),
+}
+"""Name of a condition -> its values, unit and name; the animal's own centre of mass lies at -9.4 mm."""
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """The same starts at every value of a condition and every velocity."""
+
+    controller: Controller
+    """Plans the walks; none that reads the legs, since mechanisms are told from the plan alone."""
+    over: Over = "vp"
+    """The condition that is varied, one of `CONDITIONS`."""
+    values: Sequence[float] = ()
+    """Of that condition in its unit, each once; those of `CONDITIONS` unless given."""
+    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
+    """V_r (when accelerating, its final value), each 0 <= V < 1."""
+    n_starts: int = 100
+    """Number of starts; those that cannot stand on six feet at every value are left out of the result."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]."""
+    seed: int = 0
+    """Of the starts."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """All others."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+
+    def __post_init__(self) -> None:
+        if self.over not in CONDITIONS:
+            raise InputError(f"over = {self.over!r}; valid names: {', '.join(get_args(Over))}")
+        if (given := self.conditions.flat()[self.over]) != _usual(self.over):
+            raise InputError(f"{self.over} = {given:g}; expected values, which takes all of them")
+        check_distinct("values", self.chosen)
+        _ = self.varied, self.observed
+        check_draw(self.n_starts, self.seed)
+        check_controller_type(self.controller)
+        start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
+        if isinstance(self.controller.begin(start, v, self.stride, self.acceleration), ReadingPlan):
+            raise InputError(
+                "a controller that reads the legs; expected another: mechanisms are told from the plan alone"
+            )
+
+    @property
+    def chosen(self) -> list[float]:
+        """The values of the condition."""
+        return [float(value) for value in self.values or CONDITIONS[self.over].values]
+
+    @property
+    def varied(self) -> list[Conditions]:
+        """The conditions at each of them."""
+        return [self.conditions.but(**{self.over: value}) for value in self.chosen]
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocities and observation times [time units], both (velocity,)."""
+        return observed(self.velocities, self.window, self.stride, self.acceleration)
+
+    def cells(self) -> list[Cell]:
+        """A cell for each value and velocity; see `sweeps.Study`."""
+        from hexmj.studies.stability_map.walks import fates
+
+        names = "controller", "n_starts", "seed", "over", "stride", "acceleration"
+        same = {name: getattr(self, name) for name in names}
+
+        def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
+            own = {"conditions": conditions, "velocity": velocity, "duration": time}
+            name = f"{self.over}-{conditions.flat()[self.over]:g}-V-{velocity:g}"
+            return Cell(name, fates, own | same, work=time * conditions.substeps(self.stride))
+
+        return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """What happened, how often, and what dynamics and the condition change.
+
+        Returns:
+            Over (value, velocity): the measures of `differences.FLSS` and `saved`, the fraction of the starts with a
+            static loss that do not fall, with their 95 % Wilson intervals; the paired differences `dynamics`, physical
+            less static, and `change` of physical from the value in `attrs["reference"]`, with 95 % intervals; the
+            Froude number `froude`; over mechanism too the numbers of starts, `count`.  Over (value, velocity, start):
+            every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad].  Over
+            value: how many starts `stand`.
+
+        Raises:
+            InputError: no start stands at every value.
+        """
+        from hexmj.measures.kinematic import settings
+        from hexmj.studies.stability_map.differences import froude, with_differences
+
+        table = self._over_values(data)
+        usual = _usual(self.over)
+        reference = usual if usual in self.chosen else self.chosen[0]
+        numbers = np.array([froude(one, self.observed[0]) for one in self.varied])
+        table = with_differences(table, reference).assign(froude=(("value", "velocity"), numbers, {"units": "1"}))
+        others = {name: value for name, value in self.conditions.settings().items() if name != self.over}
+        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        attributes = settings({self.controller.name: self.controller}, *same)
+        return table.assign_attrs(attributes | {"over": self.over, "reference": reference, "conditions": others})
+
+    def _over_values(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """What happened to the starts that stand at every value, over (value, velocity, start)."""
+        from hexmj.studies.stability_map.mechanisms import MECHANISMS
+
+        sizes, condition = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
+        table = along(sizes, data, join="inner", combine_attrs="override")
+        if not table.sizes["start"]:
+            raise InputError(
+                f"{self.over} = {self.chosen}; none of {self.n_starts} starts stands on six feet at all of them"
+            )
+        stand = [one.sizes["start"] for one in data[:: sizes["velocity"]]]
+        return table.assign_coords(
+            **velocity_axis(*self.observed),
+            value=("value", self.chosen, {"units": condition.unit, "long_name": condition.name}),
+            mechanism_name=("mechanism_name", list(MECHANISMS)),
+        ).assign(stand=("value", stand, {"units": "1", "long_name": "starts that stand on six feet"}))
+
+
+def _usual(over: Over) -> float:
+    return Conditions().flat()[over]

@@ -1,0 +1,89 @@
+"""How far the walking insect is from its plan: a cell of the static limit."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.measures.compare import MEASURES
+from hexmj.measures.physical import PhysicalWalk, physical_walk
+from hexmj.stability import walk_margin
+from hexmj.starts import draw_starts
+from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+DISTANCES = {  # units, long_name
+    "margin": ("mm", "mean distance between measured and planned stability margin"),
+    "margin_same_feet": ("mm", "the same where the same feet stand"),
+    "same_feet": ("1", "fraction of steps in which the same feet stand"),
+    "drift": ("mm", "mean distance of the centre of mass from O"),
+}
+"""How far a measured walk is from its plan; counted until the plan loses stability or the insect falls."""
+
+REPORTED = {"slip": "mm/s", "tracking": "mm"}
+"""Other outcomes that are kept, with their units."""
+
+
+def distance_table(
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    *,
+    n_starts: int,
+    seed: int,
+    conditions: Conditions,
+    stride: Stride,
+    acceleration: Acceleration | None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """The outcomes of `compare.MEASURES`, `DISTANCES` and `REPORTED` over start.
+
+    Args:
+        controller: plans the walks.
+        velocity: V_r, or its final value.
+        duration: observation time [time units].
+        n_starts: number of starts.
+        seed: of the starts.
+        conditions: of the walks.
+        stride: step range, lines of the tips and time step.
+        acceleration: the accelerating procedure of Eq. 11.
+        threads: one per core unless given; the table does not depend on it.
+    """
+    import xarray as xr
+
+    walk = physical_walk(
+        draw_starts(n_starts, seed, stride), controller, velocity, duration,
+        conditions=conditions, stride=stride, acceleration=acceleration, threads=threads,
+    )  # fmt: skip
+    lost = {name: ("start", getattr(walk.outcomes, name), {"units": "time unit"}) for name in MEASURES.values()}
+    off = {
+        name: ("start", values, dict(zip(("units", "long_name"), DISTANCES[name], strict=True)))
+        for name, values in distances(walk).items()
+    }
+    reported = {name: ("start", getattr(walk.outcomes, name), {"units": unit}) for name, unit in REPORTED.items()}
+    return xr.Dataset(lost | off | reported)
+
+
+def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
+    """`DISTANCES` of every start, (start,); NaN where the plan is lost at once."""
+    planned, measured, outcomes = walk.planned, walk.measured, walk.outcomes
+    compared = planned.time[:, None] < np.minimum(outcomes.planned_loss, outcomes.fall)
+    off = np.abs(walk_margin(measured) - walk_margin(planned))
+    same = (measured.stance == planned.stance).all(axis=-1)
+    drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
+    touching = compared & measured.stance.any(axis=-1)  # without any foot there is no margin
+    return {
+        "margin": _mean(off, touching),
+        "margin_same_feet": _mean(off, touching & same),
+        "same_feet": _mean(same, compared),
+        "drift": _mean(drift, compared),
+    }
+
+
+def _mean(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Mean over the steps `where` it counts, (start,), of (step, start)."""
+    with np.errstate(invalid="ignore"):
+        return np.where(where, values, 0.0).sum(axis=0) / where.sum(axis=0)

@@ -1,0 +1,80 @@
+"""The static limit as a figure: FLSS, agreement and distances from the plan against V_p."""
+
+from typing import TYPE_CHECKING
+
+from hexmj.measures.figures import CONTROLLER_LINES, MEASURE_COLOURS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PANELS = {  # label of the axis, then for each curve its colour and name
+    "agreement": ("fraction", {"agreement": ("0.1", "both answers agree"), "same_feet": ("0.6", "same feet stand")}),
+    "margin": (
+        "measured from planned margin [mm]",
+        {"margin": ("#1b6ca8", "all steps"), "margin_same_feet": ("#6a4c93", "where the same feet stand")},
+    ),
+    "drift": ("centre of mass from O [mm]", {"drift": ("#1b6ca8", "")}),
+}
+
+
+def static_limit_figure(result: "xr.Dataset") -> "Figure":
+    """Four panels against V_p, a kind of line for each mass of the legs, from `static_limit.converge`."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(9.6, 7.0), layout="constrained")
+    axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
+    lines = dict(zip(result.leg_mass.values, CONTROLLER_LINES * len(result.leg_mass), strict=False))
+    for mass, line in lines.items():
+        one, first = result.sel(leg_mass=mass), mass == result.leg_mass[0]
+        _frequencies(axes["flss"], one, line, first)
+        for panel, (_, curves) in PANELS.items():
+            for name, (colour, label) in curves.items():
+                values = one[name].mean("start") if "start" in one[name].dims else one[name]
+                style = {"color": colour, "marker": "o", "markersize": 4, "linewidth": 1.6}
+                axes[panel].plot(one.vp, values, line, label=label if first and label else None, **style)
+    axes["flss"].set(ylabel="FLSS", ylim=(-0.02, 1.02))
+    axes["agreement"].set(ylim=(-0.02, 1.02))
+    for panel, (label, _) in PANELS.items():
+        axes[panel].set(ylabel=label)
+    for panel in ("margin", "drift"):
+        axes[panel].set(ylim=(0.0, None))
+    for panel, one in axes.items():
+        _tidy(one, result)
+        if panel in ("margin", "drift"):
+            one.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
+    masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
+    axes["drift"].legend(handles=masses, frameon=False, fontsize=9)
+    figure.suptitle(
+        f"As $V_p$ goes to zero: {result.sizes['start']} starts, V = {result.attrs['velocity']:g},"
+        f" window {result.attrs['window']}, with 95 % intervals",
+        fontsize=11,
+    )
+    return figure
+
+
+def _frequencies(axes: "Axes", one: "xr.Dataset", line: str, first: bool) -> None:
+    """The three FLSS at one mass of the legs; the kinematic one, a band, depends on no mass and no V_p."""
+    if first:
+        low, middle, high = (one[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
+        axes.axhspan(low, high, color=MEASURE_COLOURS["kinematic"], alpha=0.15, linewidth=0)
+        axes.axhline(middle, color=MEASURE_COLOURS["kinematic"], linewidth=1.6, label="kinematic")
+    shift = 0.97 if first else 1.03
+    for measure in ("measured", "physical"):
+        low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
+        axes.errorbar(
+            one.vp * shift, middle, [middle - low, high - middle], linestyle=line, color=MEASURE_COLOURS[measure],
+            marker="o", markersize=4, linewidth=1.6, capsize=2.5, label=measure if first else None,
+        )  # fmt: skip
+
+
+def _tidy(axes: "Axes", result: "xr.Dataset") -> None:
+    axes.set_xscale("log")
+    axes.set_xticks(result.vp.values, [f"{vp:g}" for vp in result.vp.values])
+    axes.minorticks_off()
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", linewidth=0.8)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(frameon=False, fontsize=9)

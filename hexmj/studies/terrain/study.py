@@ -1,0 +1,181 @@
+"""Real obstacles in physics: how often the insect falls once it has reached one.
+
+The same starts walk on flat ground and towards every obstacle, the same way until a foot reaches it.  All are told to
+walk so far that the hindmost foot could be one stride beyond the longest obstacle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.errors import InputError, check_distinct
+from hexmj.starts import check_draw, checked_list
+from hexmj.sweeps import Cell, along
+from hexmj.timing import Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
+"""Kinds of ground that are not flat, see `Ground.ground`."""
+
+VARIED = {"ground": "grounds", "ground_height": "heights", "grasp": "grasps"}
+"""Conditions that are given as lists, and the lists."""
+
+OUTCOMES = {  # units, long_name
+    "fall": ("time unit", "first contact of the trunk with the ground, or inf"),
+    "fall_part": ("1", "index of the part that touched first, -1 for none"),
+    "tilt": ("rad", "greatest tilt of the trunk"),
+    "speed": ("1", "distance walked ahead over distance commanded, until the fall"),
+}
+"""What stands in the result of every walk, of `physics.outcomes.Outcomes`."""
+
+FARTHER = Conditions.of(ground_at=80.0)
+"""Walks have found their gait before they come to an obstacle."""
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """The same starts on flat ground and to every obstacle, with and without grasping feet, at every velocity."""
+
+    controller: Controller
+    """Plans the walks."""
+    velocities: Sequence[float] = (0.2, 0.4, 0.6)
+    """V_r, each 0 < V < 1."""
+    grounds: Sequence[ObstacleKind] = ("step", "gap", "hurdle", "rough")
+    """Kinds of obstacles, each once; flat ground comes first by itself."""
+    heights: Sequence[float] = (2.0, 4.0, 6.0)
+    """Of steps, hurdles and rough ground [mm], each once."""
+    lengths: Sequence[float] = (2.5, 5.0, 10.0)
+    """Of gaps [mm], each once."""
+    grasps: Sequence[float] = (0.0, 1.0)
+    """As `FootContact.grasp`, each once."""
+    n_starts: int = 30
+    """Number of starts, the same for every obstacle."""
+    seed: int = 0
+    """Of the starts."""
+    conditions: Conditions = FARTHER
+    """All others."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
+        check_draw(self.n_starts, self.seed)
+        v = checked_list(self.velocities)
+        if not (v > 0).all():
+            raise InputError(f"velocities = {v.tolist()}; expected V > 0, or no obstacle is ever reached")
+        given, usual = self.conditions.flat(), Conditions().flat()
+        if wrong := [name for name in VARIED if given[name] != usual[name]]:
+            name = wrong[0]
+            raise InputError(f"{name} = {given[name]}; expected {VARIED[name]}, which takes all of them")
+        check_distinct("grasps", self.grasps)
+        for grasp in self.grasps:
+            self.conditions.but(grasp=grasp)
+        _ = self.obstacles
+
+    @property
+    def obstacles(self) -> dict[str, Conditions]:
+        """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'."""
+        return obstacles(self.conditions, self.grounds, self.heights, self.lengths)
+
+    @property
+    def distance(self) -> float:
+        """To which all starts are told to walk [mm]."""
+        _, behind = reach(self.stride)
+        return max(map(_end, self.obstacles.values())) + behind + self.stride.aep0 - self.stride.pep0
+
+    def cells(self) -> list[Cell]:
+        """A cell for each obstacle, grasp and velocity; see `sweeps.Study`."""
+        from hexmj.measures.outcome_table import outcome_table
+
+        same = {name: getattr(self, name) for name in ("controller", "n_starts", "seed", "stride")}
+        before, distance = self.obstacles, self.distance
+
+        def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
+            own: Any = {"conditions": before[obstacle].but(grasp=grasp), "velocity": velocity}
+            own["duration"] = distance / velocity
+            return Cell(f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", outcome_table, own | same, work=1 / velocity)
+
+        return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """What became of the starts.
+
+        Returns:
+            Over (obstacle, grasp, velocity), the obstacle 'flat' first: `reached`, the number of starts that did not
+            fall until a front foot was told to reach the obstacle, `flss`, the fraction of these that fell, with its
+            95 % Wilson interval `flss_low`, `flss_high`, and `crossed`, the number that never fell and whose hind feet
+            are beyond, on rough ground wherever they stand.  Over starts too: `OUTCOMES`, the `distance` walked [mm],
+            and `after`, whether the start fell after it had reached the obstacle.
+        """
+        from hexmj.measures.kinematic import settings
+        from hexmj.studies.terrain.crossings import with_crossings
+
+        (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
+        table = with_crossings(self._over_obstacles(data), self.distance, at - ahead, behind)
+        others = {name: value for name, value in self.conditions.settings().items() if name not in VARIED}
+        named = {self.controller.name: self.controller}
+        attributes = settings(named, "distance", self.n_starts, self.seed, self.stride, None)
+        return table.assign_attrs(attributes | {"distance": self.distance, "conditions": others})
+
+    def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """The outcomes over (obstacle, grasp, velocity, start)."""
+        before = self.obstacles
+        sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
+        end = [_end(one) for one in before.values()]
+        table = along(sizes, [one[list(OUTCOMES)] for one in data]).assign_coords(
+            obstacle=list(before),
+            ground=("obstacle", [one.ground.ground for one in before.values()]),
+            size=("obstacle", [_size(one) for one in before.values()], {"units": "mm"}),
+            end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
+            grasp=(
+                "grasp",
+                list(self.grasps),
+                {"units": "1", "long_name": "adhesion of a foot over the insect's weight"},
+            ),
+            velocity=("velocity", checked_list(self.velocities), {"units": "V_p", "long_name": "velocity V_r"}),
+        )
+        for name, (units, long_name) in OUTCOMES.items():
+            table[name].attrs = {"units": units, "long_name": long_name}
+        return table
+
+
+def obstacles(
+    conditions: Conditions, grounds: Sequence[ObstacleKind], heights: Sequence[float], lengths: Sequence[float]
+) -> dict[str, Conditions]:
+    """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'.
+
+    Raises:
+        InputError: none, or one twice; a ground, height or length that makes no sense.
+    """
+    for name, values in {"grounds": grounds, "heights": heights, "lengths": lengths}.items():
+        check_distinct(name, values)
+    if wrong := [ground for ground in grounds if ground not in get_args(ObstacleKind)]:
+        raise InputError(f"grounds = {list(grounds)}; {wrong[0]!r} is none of {', '.join(get_args(ObstacleKind))}")
+    named = {"flat": conditions}
+    for ground in grounds:
+        for size in lengths if ground == "gap" else heights:
+            sized = {"ground_length": size} if ground == "gap" else {"ground_height": size}
+            named[f"{ground} {size:g} mm"] = conditions.but(ground=ground, **sized)
+    return named
+
+
+def reach(stride: Stride) -> tuple[float, float]:
+    """How far ahead of O a front foot and how far behind it a hind foot may stand [mm]."""
+    origin = stride.geometry.origin
+    return max(origin) + stride.aep0, -(min(origin) + stride.pep_min)
+
+
+def _end(conditions: Conditions) -> float:
+    """Where an obstacle ends, ahead of O at the start [mm]; a step where it has been climbed."""
+    ground = conditions.ground
+    return ground.ground_at + (ground.ground_length if ground.ground in ("gap", "hurdle") else 0.0)
+
+
+def _size(conditions: Conditions) -> float:
+    """What an obstacle is called by: the length of a gap, the height of anything else [mm]; 0 for flat ground."""
+    ground = conditions.ground
+    return {"flat": 0.0, "gap": ground.ground_length}.get(ground.ground, ground.ground_height)

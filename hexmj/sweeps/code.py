@@ -1,0 +1,155 @@
+"""The code that makes a value: the sources of all modules that it needs, and the versions of the packages.
+
+Modules are followed from import to import without running them: through this package, the package that a function or a
+user's object comes from, and whatever else is not installed.  What a module imports for its types alone is left out,
+except where an `__init__` loads names as they are used; a name that an `__init__` passes on is followed to the one
+module it comes from.  Data files (TOML, XML, JSON) that a module names count like its source, if they lie beside it or
+in the package's `assets`.
+"""
+
+import ast
+import re
+import sys
+import sysconfig
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec, resolve_name
+from pathlib import Path
+
+from hexmj.errors import InputError
+from hexmj.sweeps.plain import digest, module_label
+
+PACKAGE = Path(__file__).parents[1]
+
+CARRIERS = {"h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray", "hexmj.progress", "hexmj.sweeps"}
+"""What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
+
+DATA = re.compile(r"""["']([\w. -]+\.(?:toml|xml|json))["']""")
+
+_INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
+_AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
+"""When the sources were changed last, as of this program's beginning."""
+
+
+@dataclass(frozen=True)
+class Code:
+    """What a value was made by."""
+
+    sources: dict[str, str]
+    """Module or data file -> digest."""
+    versions: dict[str, str]
+    """Python (major.minor) and packages -> version."""
+
+
+@dataclass(frozen=True)
+class _Module:
+    source: str
+    package: bool
+    """It is an `__init__`."""
+    imports: tuple[tuple[str, str], ...]
+    """Module and the name that is taken from it; no name where it is the module itself."""
+    bound: dict[str, tuple[str, str]]
+    """Name -> the import it comes from, those for types included."""
+
+
+@cache
+def code(modules: frozenset[str]) -> Code:
+    """All that some modules need, and they themselves; read once in a program, which does not see later edits either.
+
+    Raises:
+        InputError: one has no source, or a source of this package was edited since the program began.
+    """
+    followed = {PACKAGE.name} | {name.partition(".")[0] for name in modules}
+    waiting, seen = [(name, "") for name in modules], set[tuple[str, str]]()
+    sources, installed = {}, set[str]()
+    while waiting:
+        wanted = name, attribute = waiting.pop()
+        if wanted in seen:
+            continue
+        seen.add(wanted)
+        top = name.partition(".")[0]
+        file = _file(name)
+        if file is None and name in modules:
+            raise InputError(f"{name} has no source; to keep what comes of a class or function, write it into a file")
+        if CARRIERS & {name, top, name.rpartition(".")[0]}:
+            continue
+        if file is None or (top not in followed and any(file.is_relative_to(one) for one in _INSTALLED)):
+            installed |= {top} - sys.stdlib_module_names
+        else:
+            module = _read(name, file)
+            sources[module_label(name)] = digest(module.source.encode())
+            sources |= _data(file, module.source)
+            passed_on = {module.bound[attribute]} if attribute in module.bound else set()
+            if attribute and _file(inner := f"{name}.{attribute}"):
+                passed_on.add((inner, ""))
+            waiting += passed_on if module.package and passed_on else module.imports
+    names = installed | ({"llvmlite"} if "numba" in installed else set())
+    versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
+    return Code(dict(sorted(sources.items())), versions | {name: _version(name) for name in sorted(names)})
+
+
+@cache
+def _file(module: str) -> Path | None:
+    """The source of a module, found without running anything; None of what has no Python source."""
+    top, *inner = module.split(".")
+    if top in sys.stdlib_module_names:
+        return None
+    if (file := getattr(sys.modules.get(module), "__file__", None)) is not None:
+        return Path(file) if file.endswith(".py") else None
+    spec = find_spec(top) if top not in sys.modules else sys.modules[top].__spec__
+    if spec is None or not inner:
+        return Path(spec.origin) if spec and spec.origin and spec.origin.endswith(".py") else None
+    for folder in spec.submodule_search_locations or ():
+        stem = Path(folder, *inner)
+        for file in (stem.with_name(stem.name + ".py"), stem / "__init__.py"):
+            if file.is_file():
+                return file
+    return None
+
+
+@cache
+def _read(name: str, file: Path) -> _Module:
+    if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
+        raise InputError(f"{file} was edited since this program began; start it again")
+    source = file.read_text(encoding="utf-8")
+    package = name if file.name == "__init__.py" else name.rpartition(".")[0]
+    nodes = list(ast.walk(ast.parse(source)))
+    guarded = [
+        one
+        for one in nodes
+        if isinstance(one, ast.If) and ast.unparse(one.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+    ]
+    types = {inner for one in guarded for statement in one.body for inner in ast.walk(statement)}
+    followed = nodes if package == name else [one for one in nodes if one not in types]
+    imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
+    bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
+    return _Module(source, package == name, imports, bound)
+
+
+def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, tuple[str, str]]]:
+    """The names that an import binds, each with the module and the name in it."""
+    if isinstance(one, ast.Import):
+        for alias in one.names:
+            yield alias.asname or alias.name, (alias.name, "")
+    elif isinstance(one, ast.ImportFrom):
+        origin = resolve_name("." * one.level + (one.module or ""), package)
+        for alias in one.names:
+            yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
+
+
+def _data(file: Path, source: str) -> dict[str, str]:
+    """Digests of the data files that a source names."""
+    folders = file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"
+    found = {folder / name for name in DATA.findall(source) for folder in folders}
+    return {f"{path.parent.name}/{path.name}": digest(path.read_bytes()) for path in found if path.is_file()}
+
+
+@cache
+def _version(name: str) -> str:
+    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return " ".join(sorted({version(one) for one in packages_distributions().get(name, ())})) or "unknown"

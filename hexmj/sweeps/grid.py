@@ -1,0 +1,146 @@
+"""Cells computed one after another or on any executor, kept as they finish, and put together along named axes."""
+
+import pickle
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+
+from hexmj.errors import InputError
+from hexmj.progress import Progress
+from hexmj.sweeps.cells import Cell
+from hexmj.sweeps.files import decode, encode, read, write
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Study(Protocol):
+    """A frozen dataclass of settings that knows its cells and what they come to."""
+
+    def cells(self) -> Sequence[Cell]:
+        """All that is to be computed."""
+        ...
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """What comes of the cells, given in their order."""
+        ...
+
+
+class How(TypedDict, total=False):
+    """How cells are computed; what comes of them does not depend on it."""
+
+    executor: Executor | None
+    """Computes them, in threads, processes or on other machines that see the folder; without one they are computed
+    here, one after another."""
+    progress: Progress | None
+    """Told the fraction done since it was last called."""
+    threads: int | None
+    """For each cell; one per core unless given, and a single one with an executor."""
+
+
+def conduct(study: Study, folder: Path | None = None, **how: Unpack[How]) -> "xr.Dataset":
+    """The result of a study; arguments and errors as of `finish`."""
+    return study.result(run(study.cells(), folder, **how))
+
+
+def run(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]) -> list["xr.Dataset"]:
+    """What the cells give, in their order; arguments and errors as of `finish`."""
+    found = dict(finish(cells, folder, **how))
+    return [found[i] for i in range(len(cells))]
+
+
+def finish(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]) -> Iterator[tuple[int, "xr.Dataset"]]:
+    """Compute cells, and give each with its place as soon as it is there; the bits do not depend on who computes it.
+
+    After an error, at Ctrl-C or when the caller goes away, cells that have not begun are cancelled; finished ones stay.
+
+    Args:
+        cells: to be computed; what is finished in the folder is not.
+        folder: keeps a file for each cell, and several runs may work in it at once; None keeps nothing.
+        how: see `How`.
+
+    Raises:
+        InputError: a cell cannot be named, sent, written or believed.  And whatever the first cell to fail raises.
+    """
+    executor, progress, threads = how.get("executor"), how.get("progress"), how.get("threads")
+    records = [cell.record() if folder else "" for cell in cells]
+    paths = [
+        folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
+    ]
+    whole = sum(cell.work for cell in cells)
+    told = [0.0] * len(cells)
+
+    def tell(i: int, done: float) -> None:
+        told[i] += done
+        if progress:
+            progress(done * cells[i].work / whole)
+
+    def finished(i: int, data: "xr.Dataset") -> tuple[int, "xr.Dataset"]:
+        tell(i, 1.0 - told[i])
+        return i, data
+
+    if executor is None:
+        for i, cell in enumerate(cells):
+            done = _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i))
+            yield finished(i, done)
+        return
+    waiting = []
+    for i, path in enumerate(paths):
+        if path and path.exists():
+            yield finished(i, decode(read(path), records[i], path))
+        else:
+            waiting.append((i, path, _parcel(cells[i])))
+    futures: dict[Future[xr.Dataset], int] = {}
+    try:
+        for i, path, parcel in waiting:
+            futures[executor.submit(_sent, parcel, path, records[i], threads or 1)] = i
+        for future in as_completed(futures):
+            yield finished(futures[future], future.result())
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def along(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
+    """The data of cells over named axes as one dataset.
+
+    Args:
+        sizes: axis -> how many cells lie along it; the last one runs fastest, as `itertools.product` has it.
+        data: of all cells.
+        concat: options of `xarray.concat`.
+    """
+    import xarray as xr
+
+    rows = list(data)
+    for name, size in reversed(list(sizes.items())):
+        rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
+    (whole,) = rows
+    return whole
+
+
+def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.Dataset":
+    """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
+    if path is None:
+        return cell.compute(**execution)
+    if path.exists():
+        return decode(read(path), record, path)
+    content = encode(cell.compute(**execution), record)
+    write(path, content)
+    return decode(content, record, path)
+
+
+def _parcel(cell: Cell) -> bytes:
+    try:
+        return pickle.dumps(cell)
+    except Exception as error:
+        raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None
+
+
+def _sent(parcel: bytes, path: Path | None, record: str, threads: int) -> "xr.Dataset":
+    """A cell computed by an executor's worker, if that has the code and packages that the cell is named by."""
+    cell = pickle.loads(parcel)
+    if path and cell.record() != record:
+        raise InputError(f"{cell.name}: a worker has other code or packages than it was sent from; start it again")
+    return _made(cell, path, record, threads=threads)

@@ -1,0 +1,93 @@
+"""Many small values of a pure function, kept line by line in one file: the evaluations of a search."""
+
+import os
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.sweeps.cells import Cell
+
+
+class Ledger:
+    """A function of rows that never computes one twice, in this run or in a later one.
+
+    It is called as `function(rows, **settings)`, (row, number) -> (row,), and must treat every row by itself.  The file
+    begins with the cell's record; every further line is a row, its value and a checksum.  Lines are only ever added,
+    by several runs at once if need be; one that is not whole counts as if it were not there.
+    """
+
+    def __init__(self, cell: Cell, folder: Path | None = None, *, threads: int | None = None) -> None:
+        """Begin with what the folder holds.
+
+        Args:
+            cell: function, settings and name.
+            folder: keeps the file; None keeps values in memory only.
+            threads: for the function, if it takes them.
+
+        Raises:
+            InputError: the file is damaged in its first line, is of another cell, or cannot be read or written.
+        """
+        self._cell, self._threads = cell, threads
+        self._values: dict[bytes, float] = {}
+        self._path = None
+        if folder:
+            record = cell.record()
+            self._path = folder / f"{cell.stem(record)}.jsonl"
+            self._begin(self._path, record)
+        self.known = len(self._values)
+        """Values that the file held."""
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """The values, (row,), of rows (row, number)."""
+        rows = np.ascontiguousarray(rows, dtype=float)
+        keys = [row.tobytes() for row in rows]
+        new = {key: i for i, key in enumerate(keys) if key not in self._values}
+        if new:
+            picked = rows[list(new.values())]
+            values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
+            if self._path:
+                _add(self._path, "".join(map(_line, new, values.tolist())))
+            self._values |= zip(new, values.tolist(), strict=True)
+        return np.array([self._values[key] for key in keys])
+
+    def _begin(self, path: Path, record: str) -> None:
+        try:
+            first, *lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.exists() else [""]
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+        if first not in ("", record):
+            raise InputError(f"{path} is damaged, or of another search; delete it, and it is made anew")
+        for line in lines:
+            text = line.rpartition(" ")[0]
+            if text and line == _checked(text):
+                row, value = text.split(" ")
+                self._values[bytes.fromhex(row)] = float.fromhex(value)
+        if not first:
+            _add(path, f"{record}\n")
+        elif not lines or lines[-1]:
+            _add(path, "\n")
+
+
+def _line(row: bytes, value: float) -> str:
+    return _checked(f"{row.hex()} {value.hex()}") + "\n"
+
+
+def _checked(text: str) -> str:
+    return f"{text} {zlib.crc32(text.encode()):08x}"
+
+
+def _add(path: Path, text: str) -> None:
+    """Append in one write, which a kill does not undo."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            content = text.encode()
+            if os.write(file, content) < len(content):
+                raise OSError("no space left")
+        finally:
+            os.close(file)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None

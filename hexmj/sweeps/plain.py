@@ -1,0 +1,80 @@
+"""Settings as plain JSON: what a cell is named by and what its file tells."""
+
+import hashlib
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexmj.errors import InputError
+
+
+def plain(value: Any) -> Any:
+    """A setting as JSON can hold it: a frozen dataclass with the name of its class, an array as a list.
+
+    A file is its name and a digest of its content, wherever it lies.
+
+    Raises:
+        InputError: it is none of the things that a setting can be.
+    """
+    if _frozen(value):
+        return {"class": label(type(value))} | {one.name: plain(getattr(value, one.name)) for one in fields(value)}
+    if isinstance(value, np.ndarray | np.generic) and value.dtype in (np.bool_, np.int64, np.float64):
+        return value.tolist()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, Path):
+        return f"{value.name}@{digest(value.read_bytes())}" if value.is_file() else str(value)
+    raise InputError(
+        f"{value!r:.80} is no setting; expected a number, text, a path, a frozen dataclass, or a tuple, dict or array"
+        " (float64, int64, bool) of these"
+    )
+
+
+def label(thing: Any) -> str:
+    """The name of a class or function: its module, or its file and a digest where it is a user's own, and its name.
+
+    Raises:
+        InputError: it stands inside a function, where no other process can find it.
+    """
+    if "<" in thing.__qualname__:
+        raise InputError(f"{thing.__qualname__} stands inside a function; expected one of a module")
+    return f"{module_label(thing.__module__)}.{thing.__qualname__}"
+
+
+def module_label(module: str) -> str:
+    """A module's name; that of the file where it is a script or a loaded file, wherever that lies."""
+    name, _, stamp = module.partition("@")
+    if name not in ("__main__", "__mp_main__") and not stamp:
+        return module
+    file = Path(getattr(sys.modules[module], "__file__", name))
+    return f"{file.name}@{stamp}" if stamp else file.name
+
+
+def classes(value: Any) -> Iterator[type]:
+    """Those of all dataclasses in a setting."""
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
+    if isinstance(value, list | tuple):
+        for item in value:
+            yield from classes(item)
+    elif _frozen(value):
+        yield type(value)
+        yield from classes([getattr(value, one.name) for one in fields(value)])
+
+
+def digest(content: bytes) -> str:
+    """Of some bytes: the first 12 digits of their SHA-256."""
+    return hashlib.sha256(content).hexdigest()[:12]
+
+
+def _frozen(value: Any) -> bool:
+    parameters = getattr(type(value), "__dataclass_params__", None)
+    return parameters is not None and parameters.frozen

@@ -1,0 +1,126 @@
+"""Stride, periods and times: how far legs step, how finely time is divided, and for how long a walk is observed.
+
+The time unit is 1 mm / V_p: in one, a protracting tip moves 1 mm.  Velocities V are fractions of V_p.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.errors import InputError
+from hexmj.legs import FIG1, GEOMETRIES, Geometry
+
+WINDOWS = ("walk", "start")
+"""Named observation times, see `observation_time`."""
+
+MOST_STEPS = 10**9
+"""Longest walk [steps]; far beyond any use."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """Where tips step and how time is divided, the same for every controller; all are inferred (README, table)."""
+
+    aep0: float = 10.0
+    """Anterior extreme position without influences, on each leg's own axis [mm]."""
+    pep0: float = -10.0
+    """Posterior extreme position without influences [mm]."""
+    pep_min: float = -20.0
+    """Rearmost posterior extreme position [mm]."""
+    dt: float = 0.1
+    """Time step of a plan, of Eq. 6 for the network [time units; in one, a protracting tip moves 1 mm]."""
+    geometry: Geometry = field(default=FIG1)
+    """Lines of the tips: 'fig1', or 'centred' with the centre of mass above O_2."""
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(v) for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
+            raise InputError(f"aep0, pep0, pep_min and dt must be finite; given {self}")
+        if not self.pep_min <= self.pep0 < self.aep0:
+            raise InputError(
+                f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"
+            )
+        if not 0 < self.dt <= 1:
+            raise InputError(f"dt = {self.dt}; expected a time step above 0 and at most 1 time unit")
+        if not isinstance(self.geometry, Geometry):
+            raise InputError(
+                f"geometry = {self.geometry!r}; expected a Geometry, as {', '.join(GEOMETRIES)} in hexmj.legs"
+            )
+
+    def periods(self, velocity: Any, count: float = 1.0) -> Any:
+        """Duration of some periods of a single leg at V_r, (AEP_0 - PEP_0) (1 + 1/V) each [time units]."""
+        return count * (self.aep0 - self.pep0) * (1.0 + 1.0 / velocity)
+
+
+@dataclass(frozen=True)
+class Acceleration:
+    """The accelerating procedure, Eq. 11: V_r grows from `start` with `rate` up to the velocity of the walk."""
+
+    rate: float = 0.00008
+    """a [1 / time unit]; the paper's 0.00008."""
+    start: float = 0.1
+    """V_r(0), as a fraction of V_p; inferred."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"acceleration = {self.rate}; expected a finite number above 0 per time unit")
+        if not 0 <= self.start < 1:
+            raise InputError(f"velocity at the start = {self.start}; expected 0 <= V_r(0) < 1")
+
+    def duration(self, velocity: Any) -> Any:
+        """Time until V_r is reached [time units]."""
+        return (velocity - self.start) / self.rate
+
+
+def observation_time(
+    window: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
+) -> np.ndarray:
+    """The time t of Eq. 7 for each velocity [time units], which the paper leaves open.
+
+    'walk' is three periods of a single leg oscillator, 3 (AEP_0 - PEP_0) (1 + 1/V); 'start' is
+    2 (AEP_0 - PEP_0) / V_p.  When accelerating, a named window is counted from the time at which V is
+    reached; a number is always the whole time.
+
+    Raises:
+        InputError: no such window, or V = 0 with the window 'walk'.
+    """
+    v = np.asarray(velocity, dtype=float)
+    if not isinstance(window, str):
+        return np.full(v.shape, float(window))
+    if window not in WINDOWS:
+        raise InputError(f"window = {window!r}; valid names: {', '.join(WINDOWS)}, or a number of time units")
+    if window == "walk" and not (v > 0).all():
+        raise InputError("velocity = 0 has no period; expected V > 0 with the window 'walk'")
+    time = stride.periods(v, 3.0) if window == "walk" else np.full(v.shape, 2.0 * (stride.aep0 - stride.pep0))
+    return time + acceleration.duration(v) if acceleration else time
+
+
+def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
+    """Whole steps of a plan within an observation time [time units].
+
+    Raises:
+        InputError: less than a step, or more than `MOST_STEPS`.
+    """
+    duration, dt = np.asarray(duration, dtype=float), stride.dt
+    if not ((duration >= dt) & (duration <= MOST_STEPS * dt)).all():
+        raise InputError(
+            f"duration = {duration}; expected at least one step, {dt:g}, and at most {MOST_STEPS * dt:g} time units"
+        )
+    return np.floor(duration / dt + 1e-6).astype(int)
+
+
+def commanded_velocities(
+    velocity: np.ndarray, done: int, steps: int, stride: Stride, acceleration: Acceleration | None
+) -> np.ndarray:
+    """V_r during each of the `steps` after `done`, (step, start): Eq. 11, or V itself without an acceleration.
+
+    Args:
+        velocity: final V_r, (start,).
+    """
+    if acceleration is None:
+        return np.broadcast_to(velocity, (steps, len(velocity)))
+    step = np.arange(done, done + steps)[:, np.newaxis]
+    now, before = (acceleration.start + acceleration.rate * (n * stride.dt) for n in (step, step - 1))
+    return np.where(before < velocity, now, velocity)

@@ -1,0 +1,153 @@
+"""The comparison as a sweep: it goes on where it was stopped, and its bits do not depend on who computes them."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj import HWS, LDVS, UNCOORDINATED, Conditions, InputError, ReadsLegs, compare, physical_flss
+from hexmj.measures import outcome_table
+from hexmj.measures.compare import Comparison
+from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.studies.terrain.study import Terrain
+from hexmj.sweeps import Cell, conduct
+
+BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
+FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
+WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "30", "--window", "60"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("compare")
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return compare(BOTH, [0.4, 0.6], **FEW, folder=folder)
+
+
+@pytest.fixture(scope="module")
+def two_processes():
+    with ProcessPoolExecutor(2, get_context("spawn")) as executor:
+        yield executor
+
+
+def test_every_controller_and_velocity_is_a_cell(result, folder):
+    names = sorted(path.name.rpartition("-")[0] for path in folder.iterdir())
+    assert names == ["ldvs-V-0.4", "ldvs-V-0.6", "uncoordinated-V-0.4", "uncoordinated-V-0.6"]
+    assert compare(BOTH, [0.4, 0.6], **FEW).identical(result)
+
+
+def test_only_what_is_missing_is_walked(result, folder, monkeypatch):
+    next(folder.glob("uncoordinated-V-0.4-*")).unlink()
+    computed, compute = [], Cell.compute
+    monkeypatch.setattr(Cell, "compute", lambda cell, **how: (computed.append(cell.name), compute(cell, **how))[1])
+    assert compare(BOTH, [0.4, 0.6], **FEW, folder=folder).identical(result)
+    assert computed == ["uncoordinated-V-0.4"]
+    more = compare(BOTH | {"hws": HWS}, [0.6], **FEW, folder=folder)
+    assert computed[1:] == ["hws-V-0.6"]
+    assert more.fall.sel(controller="ldvs").equals(result.fall.sel(controller="ldvs", velocity=[0.6]))
+    table = physical_flss(LDVS, [0.4, 0.6], **FEW, folder=folder)
+    assert np.array_equal(table.flss, result.physical.sel(controller="ldvs"))
+    assert computed[1:] == ["hws-V-0.6"]
+
+
+def test_starts_settle_once(monkeypatch):
+    outcome_table.settled_starts.cache_clear()
+    settled, settle = [], outcome_table.settle
+    monkeypatch.setattr(outcome_table, "settle", lambda *given: (settled.append(given), settle(*given))[1])
+    compare(BOTH, [0.4, 0.6], **FEW)
+    assert len(settled) == 1
+    compare(BOTH, [0.4], **FEW, conditions=Conditions.of(load=0.5))
+    assert len(settled) == 2
+
+
+STUDIES = {
+    "compare": Comparison(BOTH, [0.6], **FEW),
+    "reading": Comparison({"reading": ReadsLegs(LDVS)}, [0.5, 0.6], **FEW),
+    "map": StabilityMap(LDVS, "load", [0.0, 0.5], [0.6], **FEW),
+    "terrain": Terrain(LDVS, [0.8], grounds=["step"], heights=[3.0], grasps=[0.0], n_starts=2),
+    "disturb": DisturbedWalks(LDVS, [0.7], ["halt", "push"], strategies=["reorganise"], **FEW),
+    "converge": StaticLimit(LDVS, 0.6, [200.0, 80.0], [1.0], **FEW),
+}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_processes_and_threads_give_the_same_bits(name, two_processes):
+    here = conduct(STUDIES[name], threads=2)
+    assert conduct(STUDIES[name], executor=two_processes).identical(here)
+    with ThreadPoolExecutor(2) as executor:
+        assert conduct(STUDIES[name], executor=executor).identical(here)
+
+
+def test_a_killed_command_goes_on_and_ends_like_an_unbroken_one(tmp_path):
+    def command(out: Path, *more: str) -> subprocess.Popen[str]:
+        words = [sys.executable, "-m", "hexmj", *WORDS, "--no-video", "--json", "--out", str(out), *more]
+        paths = str(Path(hexmj.__file__).parents[1])
+        return subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=os.environ | {"PYTHONPATH": paths}
+        )
+
+    killed, walks = command(tmp_path / "killed"), tmp_path / "killed" / "walks"
+    while not list(walks.glob("ldvs-*")) and killed.poll() is None:
+        time.sleep(0.01)
+    killed.kill()
+    killed.communicate()
+    kept = {path: path.stat().st_mtime_ns for path in walks.glob("[!.]*")}
+    assert 0 < len(kept) < 6 and not (tmp_path / "killed" / "manifest.json").exists()
+    answers = []
+    for name, more in (("killed", ("--processes", "2")), ("unbroken", ())):
+        text, _ = command(tmp_path / name, *more).communicate()
+        answers.append({key: value for key, value in json.loads(text).items() if key != "files"})
+    assert answers[0] == answers[1]
+    assert kept.items() <= {path: path.stat().st_mtime_ns for path in walks.iterdir()}.items()
+
+
+@dataclass(frozen=True)
+class Nobody:
+    """No controller: it begins nothing."""
+
+    name: str = "nobody"
+
+
+@pytest.mark.parametrize(
+    ("controllers", "changed", "said"),
+    [
+        ({}, {}, "no controller was given"),
+        ("ldvs", {}, "expected a controller, a frozen dataclass"),
+        ({"nobody": Nobody()}, {}, "expected a controller, a frozen dataclass"),
+        (LDVS, {"n_starts": 0}, "starts = 0; expected a whole number"),
+        (LDVS, {"seed": -1}, "seed = -1; expected"),
+        (LDVS, {"window": "long"}, "valid names: walk, start"),
+        (LDVS, {"velocities": [0.5, 0.5]}, "none of them twice"),
+        (LDVS, {"velocities": [1.0]}, "0 <= V < 1"),
+        (LDVS, {"velocities": [0.05], "acceleration": hexmj.Acceleration()}, r"expected at least V_r\(0\)"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anything_walks(tmp_path, controllers, changed, said):
+    given: dict[str, Any] = {"velocities": [0.5], "n_starts": 2, "window": 5.0} | changed
+    with pytest.raises(InputError, match=said):
+        compare(controllers, **given, folder=tmp_path / "walks")
+    assert not (tmp_path / "walks").exists()
+
+
+def test_a_name_that_the_results_need_is_refused(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, error = run("compare", "--models", "ldvs", "report")
+    assert code == 2 and "a parameter file has the name 'report'" in error
+    code, _, error = run("compare", "--processes", 0, "--out", tmp_path / "out")
+    assert code == 2 and "--processes = 0; expected at least 1" in error
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,295 @@
+"""Kinematics in closed form against MuJoCo's own; the numeric ones equal to it, and right for any chain of hinges."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import minimize
+
+from hexmj.bodies.compiled import kinematics
+from hexmj.bodies.description import ROOT_QPOS, Body, Leg
+from hexmj.bodies.hinges import ThreeHinges, three_hinges
+from hexmj.bodies.loading import plain_model
+from hexmj.bodies.numeric import HingeChains, hinge_chains
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.legs import FIG1, LEGS, MIRROR, SIDE
+
+ORIGIN = np.stack([FIG1.origin, FIG1.y, np.zeros(6)], axis=-1)  # (leg, axis)
+
+
+def numbers(values: np.ndarray | Sequence[float]) -> str:
+    """As MJCF writes them."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def any_hexapod(folder: Path, hinges: int, seed: int) -> Body:
+    """A body with so many hinges in each leg, about any axes, with offsets and turns of any kind between them.
+
+    Its MJCF has neither servos nor sensors nor pairs that touch; some hinges share a body, some bodies have none.
+    """
+    rng = np.random.default_rng(seed)
+    text, home, legs = "", [], []
+    for name, side, x in zip(LEGS, SIDE, (25, 0, -25, 25, 0, -25), strict=True):
+        joints, closing = [], ""
+        for j in range(hinges):
+            place = (x, 5 * side, 0) if j == 0 else rng.normal((14 if j % 2 else 3, 0, -2), 2)
+            turn = numbers(rng.normal(size=4) * 0.3 + (1 if side > 0 or j else 0.7, 0, 0, 0 if j else 0.7 * side))
+            axis, anchor = rng.normal(size=3), numbers(rng.normal(size=3))
+            low, zero, high = np.sort(rng.uniform(-1.2, 1.2, 3)) + np.array([-0.5, 0.0, 0.5])
+            joints.append(f"{name}_{j}")
+            home.append(rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high))
+            if j != hinges - 2:  # the last but one shares the body of the hinge before it
+                text += f'<body name="part_{name}_{j}" pos="{numbers(place)}" quat="{turn}">'
+                text += f'<geom type="sphere" size="0.5" pos="{anchor}" mass="0.01"/>'
+                closing += "</body>"
+            text += f'<joint name="{joints[-1]}" axis="{numbers(axis)}" pos="{anchor}" ref="{zero}" armature="1"'
+            text += f' range="{low} {high}"/>'
+            if j == 0:
+                text += f'<body name="bare_{name}" pos="1 2 3" euler="0.1 0.2 0.3">'
+                text += '<geom type="sphere" size="0.5" mass="0.001"/>'
+                closing += "</body>"
+        text += f'<body name="foot_{name}" pos="15 0 -3"><geom type="sphere" size="0.5" mass="0.01" name="{name}"/>'
+        text += f'<site name="{name}"/></body>{closing}'
+        parts = tuple(f"part_{name}_{j}" for j in range(hinges) if j != hinges - 2)
+        legs.append(Leg(tuple(joints), name, (*parts, f"bare_{name}", f"foot_{name}")))
+    file = folder / "hexapod.xml"
+    file.write_text(
+        f"""<mujoco><compiler angle="radian"/><option gravity="0 0 -9810" timestep="0.0005"/><worldbody>
+        <geom name="floor" type="plane" size="0 0 1"/>
+        <body name="hull"><freejoint/><geom name="hull" type="box" size="30 5 2" mass="1"/>{text}</body>
+        </worldbody><keyframe><key name="stand" qpos="0 0 40 1 0 0 0 {numbers(home)}"/></keyframe></mujoco>"""
+    )
+    mass = mujoco.MjModel.from_xml_path(str(file)).body_mass.sum()
+    names: dict[str, Any] = {
+        "name": f"made_{hinges}_{seed}",
+        "root": "hull",
+        "trunk": ("hull",),
+        "ground": "floor",
+        "home": "stand",
+    }
+    names["cameras"] = ()
+    return replace(STICK_INSECT, mjcf=file, legs=tuple(legs), mass=float(mass), **names)
+
+
+@pytest.fixture(scope="module")
+def closed() -> ThreeHinges:
+    """The closed form of the stick insect."""
+    found = kinematics(plain_model(STICK_INSECT), STICK_INSECT)
+    assert isinstance(found, ThreeHinges)
+    return found
+
+
+@pytest.fixture(scope="module")
+def numeric() -> HingeChains:
+    """The stick insect's legs as chains."""
+    return hinge_chains(plain_model(STICK_INSECT), STICK_INSECT)
+
+
+@pytest.fixture(scope="module", params=[(3, 0), (3, 1), (4, 2), (5, 3)], ids="{0[0]} hinges, seed {0[1]}".format)
+def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Body:
+    """A body with hinges about any axes."""
+    return any_hexapod(tmp_path_factory.mktemp("body"), *request.param)
+
+
+def step_range(count: int = 61) -> np.ndarray:
+    """All tips that a walk may ask for, (x * z, leg, axis) [mm]: standing heights 8 to 14, lifts of 12, a sag of 1."""
+    x, z = (grid.ravel()[:, None] for grid in np.meshgrid(np.linspace(-20.2, 10.2, count), np.linspace(-14, 5, count)))
+    return ORIGIN + np.stack(np.broadcast_arrays(x, 0.0, z + np.zeros(6)), axis=-1)
+
+
+def random_joints(chains: HingeChains, count: int, share: float = 1.0) -> np.ndarray:
+    """Angles within a share of the ranges around home, (count, leg, joint) [rad]."""
+    low, high = (chains.home + share * (limit - chains.home) for limit in (chains.low, chains.high))
+    return np.random.default_rng(1998).uniform(low, high, (count, *low.shape))
+
+
+def test_it_is_the_closed_form_over_the_whole_step_range(closed: ThreeHinges, numeric: HingeChains):
+    tips = step_range()
+    for wanted, found in zip(closed.inverse(tips), numeric.inverse(tips), strict=True):
+        assert_allclose(found, wanted, rtol=0, atol=1e-9)
+
+
+def test_it_reaches_what_the_closed_form_reaches(closed: ThreeHinges, numeric: HingeChains):
+    """And besides only tips beyond the thorax-coxa axis, which belong to another protraction in the closed form."""
+    rng = np.random.default_rng(1998)
+    around = ORIGIN + rng.uniform([-25, -10, -15], [15, 10, 10], (10_000, 6, 3))
+    within = closed.forward(random_joints(numeric, 10_000))
+    for tips in (around, within):
+        wanted, reachable = closed.inverse(tips)
+        found, reached = numeric.inverse(tips)
+        assert reachable.mean() > 0.5
+        assert reached[reachable].all()
+        assert_allclose(found[reachable], wanted[reachable], rtol=0, atol=1e-9)
+        more = reached & ~reachable
+        off = (tips - closed.coxa_position)[more]
+        protraction, side = found[more][:, 0], np.broadcast_to(closed.side, more.shape)[more]
+        assert (off[:, 0] * np.sin(protraction) + side * off[:, 1] * np.cos(protraction) < 0).all()
+
+
+def test_limits_of_joints_are_reached_and_not_passed(closed: ThreeHinges, numeric: HingeChains):
+    middle = closed.joint_range.mean(axis=-1)
+    for joint in range(3):
+        for bound in range(2):
+            for beyond, reachable in ((-1e-8, True), (0.0, True), (1e-8, False)):
+                joints = middle.copy()
+                joints[:, joint] = closed.joint_range[:, joint, bound] + (beyond if bound else -beyond)
+                found, reached = numeric.inverse(closed.forward(joints))
+                assert (reached == reachable).all()
+                assert_allclose(found, joints if reachable else np.nan, atol=1e-9)
+
+
+def test_the_result_depends_on_nothing_but_the_tip(numeric: HingeChains):
+    tips = ORIGIN + np.random.default_rng(1).uniform([-20, -3, -12], [10, 3, 5], (200, 6, 3))
+    joints, reachable = numeric.inverse(tips)
+    shuffled = np.random.default_rng(2).permutation(len(tips))
+    assert_array_equal(numeric.inverse(tips[shuffled])[0], joints[shuffled])
+    for one, wanted, ok in zip(tips, joints, reachable, strict=True):
+        assert_array_equal(numeric.inverse(one)[0], wanted)
+        assert_array_equal(numeric.inverse(one)[1], ok)
+
+
+@pytest.fixture(params=["closed", "numeric"])
+def legs(request: pytest.FixtureRequest) -> ThreeHinges | HingeChains:
+    """The stick insect's legs either way."""
+    return request.getfixturevalue(request.param)
+
+
+def test_unreachable_tips_are_flagged_and_have_no_angles(legs: ThreeHinges | HingeChains):
+    tips = ORIGIN - [0, 0, 10.0]
+    tips[0] += [0, 60, 0]  # longer than the leg
+    tips[2] = [-8, 3.5, -2]  # closer than femur and tibia can fold
+    tips[4] += [30, 0, 0]
+    tips[5] = np.nan
+    joints, reachable = legs.inverse(tips)
+    assert reachable.tolist() == [False, True, False, True, False, False]
+    assert np.isnan(joints[~reachable]).all() and np.isfinite(joints[reachable]).all()
+
+
+def test_mirrored_tips_have_equal_angles(closed: ThreeHinges):
+    """To the last bit; the numeric ones' axes are mirrored, their angles are rounded otherwise."""
+    tips = ORIGIN + np.random.default_rng(1998).uniform([-20, -3, -12], [10, 3, 5], (1000, 6, 3))
+    for one, other in zip(closed.inverse(tips), closed.inverse(tips[:, MIRROR] * [1, -1, 1]), strict=True):
+        assert_array_equal(other, one[:, MIRROR])
+
+
+def test_joint_ranges_bound_what_is_reachable(closed: ThreeHinges):
+    home = ORIGIN - [0, 0, 10.0]
+    angles, _ = closed.inverse(home)
+    for joint in range(3):
+        for bound, outside in ((0, 1e-6), (1, -1e-6)):
+            joint_range = closed.joint_range.copy()
+            joint_range[3, joint, bound] = angles[3, joint] + outside
+            _, reachable = replace(closed, joint_range=joint_range).inverse(home)
+            assert reachable.tolist() == [True, True, True, False, True, True]
+
+
+def test_the_closed_form_s_inverse_and_forward_are_each_others(closed: ThreeHinges, numeric: HingeChains):
+    joints = random_joints(numeric, 10_000)
+    tips = closed.forward(joints)
+    back, reachable = closed.inverse(tips)
+    # A tip beyond its own thorax-coxa axis belongs to another protraction, on the leg's own side.
+    forward, left, _ = np.moveaxis(tips - closed.coxa_position, -1, 0)
+    outward = forward * np.sin(joints[..., 0]) + closed.side * left * np.cos(joints[..., 0]) > 1e-6
+    assert outward.mean() > 0.9
+    assert reachable[outward].all()
+    assert_allclose(back[outward], joints[outward], atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(), (4,), (2, 3), (0,)])
+def test_leading_axes_are_free_and_the_input_stays(legs: ThreeHinges | HingeChains, shape: tuple[int, ...]):
+    tips = np.broadcast_to(ORIGIN - [0, 0, 10.0], (*shape, 6, 3)).copy()
+    before = tips.copy()
+    joints, reachable = legs.inverse(tips)
+    assert joints.shape == (*shape, 6, 3)
+    assert reachable.shape == (*shape, 6)
+    assert legs.forward(joints).shape == (*shape, 6, 3)
+    assert_array_equal(tips, before)
+
+
+def tips_in_mujoco(model: mujoco.MjModel, body: Body, joints: np.ndarray) -> np.ndarray:
+    """In the root frame by MuJoCo's forward kinematics, (leg, axis) [mm], with the root tilted."""
+    data = mujoco.MjData(model)
+    data.qpos[:ROOT_QPOS] = 3, -2, 15, 0.8, 0.36, 0, 0.48
+    data.qpos[ROOT_QPOS:] = joints.ravel()
+    mujoco.mj_kinematics(model, data)
+    root = data.body(body.root)
+    return (np.array([data.site(foot).xpos for foot in body.feet]) - root.xpos) @ root.xmat.reshape(3, 3)
+
+
+def test_mujoco_puts_the_insects_feet_where_they_are_wanted(legs: ThreeHinges | HingeChains, numeric: HingeChains):
+    model = plain_model(STICK_INSECT)
+    for joints in random_joints(numeric, 50):
+        assert_allclose(legs.forward(joints), tips_in_mujoco(model, STICK_INSECT, joints), atol=1e-9)
+    tips = ORIGIN + np.random.default_rng(1998).uniform([-20, -3, -12], [10, 3, 5], (200, 6, 3))
+    found, reachable = legs.inverse(tips)
+    whole = reachable.all(axis=1)
+    assert whole.mean() > 0.5
+    for joints, wanted in zip(found[whole], tips[whole], strict=True):
+        assert_allclose(tips_in_mujoco(model, STICK_INSECT, joints), wanted, atol=1e-6)
+
+
+def test_mujoco_puts_the_feet_where_the_chains_do(made: Body):
+    model = plain_model(made)
+    chains = hinge_chains(model, made)
+    for joints in random_joints(chains, 50):
+        assert_allclose(chains.forward(joints), tips_in_mujoco(model, made, joints), atol=1e-9)
+
+
+def test_any_chain_reaches_its_tips(made: Body):
+    """All around home; at the ends of the ranges a few are missed, where a chain is all but singular."""
+    chains = hinge_chains(plain_model(made), made)
+    for share, reached_at_least in ((0.4, 1.0), (1.0, 0.99)):
+        tips = chains.forward(random_joints(chains, 2000, share))
+        joints, reachable = chains.inverse(tips)
+        assert reachable.mean() >= reached_at_least
+        assert_allclose(chains.forward(joints)[reachable], tips[reachable], rtol=0, atol=1e-9)
+        assert ((chains.low <= joints) & (joints <= chains.high))[reachable].all()
+
+
+def test_home_is_where_it_begins(made: Body):
+    chains = hinge_chains(plain_model(made), made)
+    joints, reachable = chains.inverse(chains.forward(chains.home))
+    assert reachable.all()
+    assert_allclose(joints, chains.home, atol=1e-9)
+
+
+def test_more_than_three_hinges_stay_near_home(tmp_path: Path):
+    """No posture close by reaches the tip and is nearer to home, as SciPy looks for one."""
+    body = any_hexapod(tmp_path, 5, 4)
+    chains = hinge_chains(plain_model(body), body)
+    tips = chains.forward(random_joints(chains, 3, 0.5))
+    joints, reachable = chains.inverse(tips)
+    assert reachable.all()
+    for tip, found in zip(tips, joints, strict=True):
+        for leg in range(len(LEGS)):
+
+            def missed(angles: np.ndarray, leg: int = leg, tip: np.ndarray = tip, found: np.ndarray = found):
+                posture = found.copy()
+                posture[leg] = angles
+                return chains.forward(posture)[leg] - tip[leg]
+
+            def from_home(angles: np.ndarray, leg: int = leg):
+                return ((angles - chains.home[leg]) ** 2).sum()
+
+            nearest = minimize(
+                from_home,
+                found[leg],
+                method="SLSQP",
+                bounds=np.stack([chains.low[leg], chains.high[leg]], axis=-1),
+                constraints={"type": "eq", "fun": missed},
+                options={"ftol": 1e-14},
+            )
+            if np.linalg.norm(missed(nearest.x)) < 1e-6:
+                assert from_home(found[leg]) <= from_home(nearest.x) + 1e-6
+
+
+def test_only_legs_that_the_closed_form_fits_have_it(made: Body):
+    model = plain_model(made)
+    chains = hinge_chains(model, made)
+    assert three_hinges(model, made, chains) is None
+    assert isinstance(kinematics(model, made), HingeChains)

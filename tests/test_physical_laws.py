@@ -1,0 +1,218 @@
+"""Laws that the physics must keep: units, mirror, time step, momentum, penetration and energy."""
+
+import copy
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hexmj.bodies.loading import compile_body
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.losses import begin
+from hexmj.legs import MIRROR
+from hexmj.measures.compare import physical_flss
+from hexmj.measures.physical import physical_outcomes, physical_walk
+from hexmj.physics.backend import STATE
+from hexmj.physics.drive import drive
+from hexmj.physics.orders import JointTargets
+from hexmj.physics.settling import Settled, settle
+from hexmj.rotations import rotated
+from hexmj.starts import draw_starts
+
+MM, G = 1e-3, 1e-3  # in m and kg
+LENGTHS = (
+    "body_pos", "body_ipos", "jnt_pos", "geom_pos", "geom_size", "geom_rbound", "geom_aabb", "bvh_aabb", "site_pos",
+    "site_size", "pair_margin", "pair_gap",
+)  # fmt: skip
+TORQUES = ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "dof_damping")
+INERTIAS = ("body_inertia", "dof_armature")
+GRAVITY = 9810.0  # mm/s^2
+WEIGHT = STICK_INSECT.mass * GRAVITY
+FALL_HEIGHT = 20.0  # mm
+
+
+def in_si(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The same insect in m, kg, s: every number of the compiled model that has a length or a mass in its unit."""
+    si = copy.copy(model)
+    scales = [(MM, LENGTHS), (G, ("body_mass",)), (G * MM**2, TORQUES + INERTIAS)]
+    for scale, names in scales:
+        for name in names:
+            getattr(si, name)[:] *= scale
+    si.pair_solimp[:, 2] *= MM  # the width of the transition; that of joint limits is an angle
+    si.pair_friction[:, 2:] *= MM  # torsion and rolling
+    for qpos in (si.qpos0, si.qpos_spring, si.key_qpos[0]):
+        qpos[:3] *= MM
+    si.opt.gravity[:] *= MM
+    si.opt.tolerance *= MM  # an acceleration
+    si.opt.ccd_tolerance *= MM
+    mujoco.mj_setConst(si, mujoco.MjData(si))
+    si.stat.meaninertia = si.dof_M0.mean()  # as the compiler has it
+    return si
+
+
+def walk_of(model: mujoco.MjModel, settled: Settled, control: np.ndarray, length: float) -> np.ndarray:
+    """Paths of the roots, (start, substep, 3), in a model whose unit of length is `length` mm."""
+    batch = Batch(model, len(settled.starts), 2)
+    parts = np.split(settled.state, np.cumsum([model.nq, model.nv]), axis=1)
+    for name, values in zip(STATE, parts, strict=True):
+        batch.bind(name)[:] = values
+        batch.bind(name)[:, :3] /= length
+    return batch.rollout(control.shape[1], control, record=("qpos",))["qpos"][:, :, :3] * length
+
+
+def test_the_same_insect_in_si_units_walks_the_same_way():
+    settled = settle(draw_starts(6, 0))
+    targets = JointTargets(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 60.0)
+    orders = list(iter(lambda: targets.ahead(np.arange(6)), None))
+    control = np.concatenate([one.control for one in orders], axis=1)
+    model = settled.compiled.model
+    assert_allclose(model.dof_M0.mean(), model.stat.meaninertia)
+    ours, si = walk_of(model, settled, control, 1.0), walk_of(in_si(model), settled, control, 1 / MM)
+    length = np.linalg.norm(ours[:, -1] - ours[:, 0], axis=1)
+    assert (length > 20.0).all()
+    assert (np.linalg.norm(ours - si, axis=2).max(axis=1) < 0.005 * length).all()
+    forgotten = in_si(model)
+    forgotten.pair_solimp[:, 2] /= MM
+    off = np.linalg.norm(ours - walk_of(forgotten, settled, control, 1 / MM), axis=2).max(axis=1)
+    assert (off > 0.005 * length).any(), "this test would not notice a length that was left in mm"
+
+
+def test_mirrored_starts_walk_mirrored_paths():
+    starts, mirror = draw_starts(8, 3), list(MIRROR)
+    one, other = (physical_walk(x, LDVS, 0.5, 40.0) for x in (starts, starts[:, mirror]))
+    assert np.array_equal(one.outcomes.fall, other.outcomes.fall)
+    assert_allclose(one.qpos[..., :3], other.qpos[..., :3] * [1, -1, 1], atol=1e-9)
+    assert_allclose(one.measured.x, other.measured.x[..., mirror], atol=1e-9)
+    assert np.array_equal(one.measured.stance, other.measured.stance[..., mirror])
+
+
+def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
+    """`test_physics` has the half of it, with 200 starts."""
+    conditions = (Conditions.of(longest_substep=ms) for ms in (0.625, 0.15625))
+    whole, quarter = (physical_flss(LDVS, [0.5], n_starts=60, window="start", conditions=one) for one in conditions)
+    assert whole.low.item() <= quarter.flss.item() <= whole.high.item()
+
+
+@pytest.fixture(scope="module")
+def resting():
+    """Forces, (start, leg) [g mm/s^2], and heights, (start, leg) [mm], of the feet of 30 starts that stand still."""
+    settled = settle(draw_starts(30, 4))
+    first = next(iter(drive(settled, begin(LDVS, settled.starts, 0.0, settled.stride), 1.0)))
+    columns = settled.compiled.columns
+    return first.sensors[:, 0, columns.touch], heights(settled, first.sensors[:, 0])
+
+
+def heights(settled: Settled, sensors: np.ndarray) -> np.ndarray:
+    """Of the feet's lowest points, (..., leg) [mm]."""
+    feet = sensors[..., settled.compiled.columns.foot]
+    return feet.reshape(*feet.shape[:-1], 6, 3)[..., 2] - settled.compiled.foot_radius
+
+
+def test_at_rest_the_feet_carry_the_weight_and_hardly_sink_in(resting):
+    force, height = resting
+    assert_allclose(force.sum(axis=1), WEIGHT, rtol=0.01)
+    assert -height.min() < 0.02 * Conditions().path.standing_height
+
+
+@pytest.fixture(scope="module")
+def walking():
+    """12 settled starts and what their sensors showed in 40 time units, (start, substep, column)."""
+    settled = settle(draw_starts(12, 4))
+    shown = list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 40.0))
+    assert not any(one.fell.any() for one in shown), "this test needs starts that do not fall"
+    return settled, np.concatenate([one.sensors for one in shown], axis=1)
+
+
+def test_over_a_walk_the_ground_carries_the_weight(walking):
+    """Momentum: mean vertical force = weight + change of vertical momentum over time."""
+    settled, sensors = walking
+    columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
+    force = sensors[:, 1:-1, columns.touch].sum(axis=2)
+    height = sensors[:, :, columns.centre_of_mass][:, :, 2]
+    momentum = STICK_INSECT.mass * np.diff(height, axis=1) / h
+    balance = force.mean(axis=1) - (momentum[:, -1] - momentum[:, 0]) / (h * force.shape[1])
+    assert_allclose(balance, WEIGHT, rtol=0.001)
+
+
+def fall_energy(timestep: float, integrator: mujoco.mjtIntegrator, seconds: float, seed: int) -> np.ndarray:
+    """Total energy, (step,) [g mm^2/s^2], of an insect without muscles, turning and waving its legs as it falls."""
+    model = compile_body(Conditions(), timestep, looks=False).model
+    model.opt.integrator = integrator
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.qpos[2] += FALL_HEIGHT
+    rng = np.random.default_rng(seed)
+    data.qvel[3:6], data.qvel[6:] = rng.normal(0.0, 5.0, 3), rng.normal(0.0, 1.0, 18)
+    energy = []
+    for _ in range(round(seconds / timestep)):
+        mujoco.mj_forward(model, data)
+        energy.append(data.energy.sum())
+        mujoco.mj_step(model, data)
+    assert data.warning.number.sum() == 0
+    return np.array(energy)
+
+
+def test_free_flight_conserves_energy_as_far_as_the_integrator_does():
+    """To 1e-9 of the potential energy lost with Runge-Kutta; ours loses a share that halves with the time step."""
+    seconds, integrators = 0.05, mujoco.mjtIntegrator
+    gained = WEIGHT * GRAVITY * seconds**2 / 2
+    exact = fall_energy(STICK_INSECT.longest_step, integrators.mjINT_RK4, seconds, 0)
+    assert np.ptp(exact) < 1e-9 * gained
+    coarse, fine = (-np.diff(fall_energy(h, integrators.mjINT_IMPLICITFAST, seconds, 0)).sum() for h in (5e-4, 2.5e-4))
+    assert 0 < coarse < 0.02 * gained
+    assert coarse / fine == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_passive_fall_never_gains_energy(seed):
+    """What soft contacts give back within it is below 1 % of what they and the joints' limits take."""
+    energy = fall_energy(0.000625, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, 0.4, seed)
+    lost = energy[0] - energy[-1]
+    assert lost > WEIGHT * FALL_HEIGHT
+    assert energy.max() == energy[0]
+    assert (energy - np.minimum.accumulate(energy)).max() < 0.01 * lost
+
+
+def test_tracking_is_a_percentile_and_depth_the_most_of_all_feet():
+    """The same distances and depths, kept whole: root, foot and target of every substep until the fall."""
+    settled = settle(draw_starts(6, 0))
+    outcomes = physical_outcomes(settled, LDVS, 0.5, 40.0)
+    columns = settled.compiled.columns
+    seen: list[list[np.ndarray]] = [[] for _ in range(6)]
+    deepest, shown = np.zeros(6), np.zeros(6)
+    for one in drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 40.0):
+        for row, start in enumerate(one.ids):
+            qpos, targets = one.qpos[row, : one.valid[row]], one.targets[row, : one.valid[row]]
+            feet = one.sensors[row, : one.valid[row], columns.foot].reshape(-1, 6, 3)
+            turned = qpos[:, None, :3] + rotated(qpos[:, None, 3:7], targets)
+            off = np.linalg.norm(feet - turned, axis=2)
+            seen[start].append(off[targets[:, :, 2] == -settled.conditions.path.standing_height])
+            until = one.valid[row] - one.fell[row]
+            deepest[start] = max(deepest[start], one.depth[row, :until].max())
+            shown[start] = max(shown[start], -heights(settled, one.sensors[row, : one.valid[row]]).min())
+    whole = [np.percentile(np.concatenate(one), 95) for one in seen]
+    assert_allclose(outcomes.tracking, whole, atol=0.011)
+    assert_array_equal(outcomes.depth, deepest)
+    assert (shown <= deepest).all()
+
+
+def test_targets_belong_to_the_state_that_is_shown():
+    """Standing legs shall stay where they are from the first substep on, the one after the last step included."""
+    settled = settle(draw_starts(4, 0))
+    shown = list(drive(settled, begin(LDVS, settled.starts, 0.0, settled.stride), 2.0))
+    targets = np.concatenate([one.targets for one in shown], axis=1)
+    assert targets.shape[1] == sum(one.qpos.shape[1] for one in shown)
+    assert (targets[..., 2] == -settled.conditions.path.standing_height).all()
+    assert (targets[..., 0] == (settled.starts + settled.stride.geometry.origin)[:, None]).all()
+
+
+def test_feet_keep_to_their_targets():
+    """The aim is 1 mm at V = 0.5; the mean of 60 starts over the window `walk` is 0.89 mm."""
+    outcomes = physical_outcomes(settle(draw_starts(20, 0)), LDVS, 0.5, 60.0)
+    assert outcomes.tracking.mean() < 1.0

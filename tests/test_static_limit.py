@@ -1,0 +1,120 @@
+"""The static limit: slow walks tend to their plan and to the static criterion, and what keeps them apart is known."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, physical_walk
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.studies.static_limit.distances import distances
+from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.sweeps import Cell, conduct
+
+FEW: dict[str, Any] = {"n_starts": 12, "window": "start"}
+
+
+@pytest.fixture(scope="module")
+def slower(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("converge")
+    return folder, conduct(StaticLimit(LDVS, vps=(400.0, 100.0, 25.0), **FEW), folder)
+
+
+def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
+    _, result = slower
+    fast, slow = result.sel(vp=400.0), result.sel(vp=25.0)
+    assert (slow.margin.mean("start") < 0.25 * fast.margin.mean("start")).all()
+    assert (slow.margin_same_feet.mean("start") < fast.margin_same_feet.mean("start")).all()
+    assert (result.same_feet.mean("start").diff("vp") > 0).all()
+    assert (slow.same_feet.mean("start") > 0.9).all()
+    assert (slow.agreement >= fast.agreement).all()
+    assert (abs(slow.physical - slow.kinematic) < abs(fast.physical - fast.kinematic)).all()
+    assert (fast.physical < slow.physical / 2).all()  # dynamics saves fast walks
+
+
+def test_light_legs_keep_the_centre_of_mass_at_o(slower):
+    _, result = slower
+    assert (result.drift.sel(leg_mass=0.01) < 0.02).all()
+    assert (result.drift.sel(leg_mass=1.0) > 0.05).all()
+    assert (result.kinematic == result.kinematic[0, 0]).all()
+
+
+def test_every_number_has_a_unit(slower):
+    assert all("units" in variable.attrs for variable in slower[1].data_vars.values())
+
+
+def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
+    """What keeps them apart where the same feet stand: legs that give way, and whose mass moves the centre of mass.
+
+    A servo for half the time step is four times as stiff.  Measured: 0.152 mm, and 0.040 and 0.011 mm with legs of 1 %
+    of the mass and servos 4 and 16 times as stiff.
+    """
+    margins, servo = [], STICK_INSECT.servo
+    for finer, leg_mass, longest in ((1, 1.0, 0.5), (2, 0.01, 0.25), (4, 0.01, 0.125)):
+        body = replace(STICK_INSECT, servo=replace(servo, step=servo.step / finer))
+        conditions = replace(Conditions.of(vp=25.0, leg_mass=leg_mass, longest_substep=longest), body=body)
+        walk = physical_walk(draw_starts(8, 0), LDVS, 0.5, 40.0, conditions=conditions)
+        margins.append(distances(walk)["margin_same_feet"].mean())
+    assert margins[1] < margins[0] / 3
+    assert margins[2] < margins[1] / 3
+
+
+def test_finished_walks_are_not_walked_again(slower, monkeypatch):
+    folder, result = slower
+    monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
+    told: list[float] = []
+    part = StaticLimit(LDVS, vps=(100.0, 25.0), leg_masses=(0.01,), **FEW)
+    again = conduct(part, folder, progress=told.append)
+    assert again.equals(result.sel(leg_mass=[0.01], vp=[100.0, 25.0]))
+    assert sum(told) == pytest.approx(1.0)
+
+
+def test_a_controller_may_read_the_legs(slower):
+    few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
+    reading, alone = conduct(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
+    assert np.array_equal(reading.planned_loss, alone.planned_loss)  # on paper nothing is read
+    assert not np.array_equal(reading.margin, alone.margin)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"vps": ()}, "vps = .*; expected at least one, and none of them twice"),
+        ({"vps": (80.0, 80.0)}, "vps = .*; expected at least one, and none of them twice"),
+        ({"leg_masses": ()}, "leg_masses = .*; expected at least one, and none of them twice"),
+        ({"vps": (0.0,)}, "vp = 0.0; expected above 0.1"),
+        ({"velocity": 1.0}, "0 <= V < 1"),
+        ({"window": "long"}, "valid names: walk, start"),
+        ({"conditions": Conditions.of(vp=20.0)}, "vp = 20; expected vps, which takes all of them"),
+        ({"conditions": Conditions.of(leg_mass=0.5)}, "leg_mass = 0.5; expected leg_masses, which takes all of them"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(wrong, said):
+    with pytest.raises(InputError, match=said):
+        StaticLimit(LDVS, **wrong)
+
+
+def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
+    words = ("converge", "--vps", 100, 50, "--starts", 4, "--window", 10, "--out", tmp_path)
+    code, text, _ = run(*words, "--json")
+    assert code == 0
+    answer = json.loads(text)
+    assert {path.name for path in tmp_path.iterdir()} == {"converge.nc", "converge.png", "manifest.json", "walks"}
+    assert len(list((tmp_path / "walks").iterdir())) == 4
+    assert np.shape(answer["margin"]) == np.shape(answer["agreement"]) == (2, 2)
+    assert answer["settings"]["conditions"]["longest_substep"] == 0.5
+    assert not {"vp", "leg_mass"} & set(answer["settings"]["conditions"])
+    code, text, _ = run(*words)
+    assert code == 0
+    assert f"{answer['margin'][0][1]:.3f}" in text
+    assert "vp 80" not in text
+
+
+@pytest.mark.parametrize("option", ["vp", "leg-mass"])
+def test_one_value_where_a_list_is_wanted_is_no_option(tmp_path, run, option):
+    code, _, error = run("converge", f"--{option}", 0.5, "--out", tmp_path / "out")
+    assert code == 2
+    assert "Unrecognized options" in error
+    assert not (tmp_path / "out").exists()
