@@ -1,4 +1,4 @@
-"""The insect as a dm_env environment: one episode of the pure network walk, without offsets to its tips."""
+"""The insect as a dm_env environment: one episode of the controller's own walk, without offsets to its tips."""
 
 import numpy as np
 

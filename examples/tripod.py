@@ -44,7 +44,7 @@ class Tripod:
 if __name__ == "__main__":
     velocities = [0.1, 0.3, 0.5]
     for controller in (Tripod(), hexmj.LDVS):
-        kinematic = hexmj.flss(controller, velocities, n_starts=500)
-        physical = hexmj.physical_flss(controller, velocities, n_starts=16)
+        kinematic = hexmj.flss(controller, velocities, n_starts=200)
+        physical = hexmj.physical_flss(controller, velocities, n_starts=8)
         print(f"{controller.name}: FLSS at V = {velocities}: kinematic {kinematic.flss.values.round(3)},", end=" ")
         print(f"physical {physical.flss.values.round(3)}")

@@ -8,6 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hexmj.bodies.description import Body as Body
+    from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
     from hexmj.conditions import Conditions as Conditions
     from hexmj.controllers.cruse1998 import HWS as HWS
     from hexmj.controllers.cruse1998 import LDVS as LDVS
@@ -51,6 +53,8 @@ if TYPE_CHECKING:
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
+    "bodies.description": ("Body",),
+    "bodies.stick_insect": ("STICK_INSECT",),
     "conditions": ("Conditions",),
     "controllers.cruse1998": ("HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Symmetric", "Weights"),
     "controllers.named": ("load_controller",),

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.losses import begin
+from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2
@@ -36,7 +36,7 @@ TOLERANCE = 0.002
 """A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
 
 STEPS = 5
-"""... and this many time steps more, since states change only at whole steps and the network hands that jitter on."""
+"""... and this many time steps more, since states change only at whole steps and controllers hand that jitter on."""
 
 CYCLES = 10
 """Fewest whole cycles of every leg that show a limit regime; some settle so slowly that three look alike too soon."""
@@ -126,7 +126,7 @@ def limit_gait(
     changes, upright = [], []
     while plan.done < steps:
         done = plan.done
-        part = plan.advance(min(PART, (tail if done < tail else steps) - done))
+        part = advanced(plan, min(PART, (tail if done < tail else steps) - done))
         row, foot, down = _changes(np.concatenate([stance, part.stance]))
         changes.append((row + done, foot, down))
         stance = part.stance[-1:]

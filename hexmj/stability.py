@@ -1,7 +1,7 @@
 """Static stability (paper, Section 3): support polygon, signed stability margin, first loss.
 
 The general polygon, for planned and measured walks alike.  The compiled network decides stability in
-the same pass by a closed form that holds for the paper's geometry (`hexmj.network`); a test holds the
+the same pass by a closed form that holds for the paper's geometry (`controllers.cruse1998.kernel`); a test holds the
 two against each other.
 """
 

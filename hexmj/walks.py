@@ -48,6 +48,9 @@ class PlannedWalk(Walk):
     """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
 
 
+PLANNED = ("x", "y", "stance", "aep", "height")
+"""What a plan says of every step, start and leg."""
+
 AnyWalk = TypeVar("AnyWalk", bound=Walk)
 
 

@@ -146,8 +146,9 @@ def test_what_makes_no_sense_is_refused_before_anything_walks(tmp_path, controll
 
 def test_a_name_that_the_results_need_is_refused(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, error = run("compare", "--models", "ldvs", "report")
-    assert code == 2 and "a parameter file has the name 'report'" in error
+    Path("report.toml").write_text("[symmetric]\n")
+    code, _, error = run("compare", "--models", "ldvs", "report.toml")
+    assert code == 2 and "a controller has the name 'report'" in error
     code, _, error = run("compare", "--processes", 0, "--out", tmp_path / "out")
     assert code == 2 and "--processes = 0; expected at least 1" in error
     assert not (tmp_path / "out").exists()

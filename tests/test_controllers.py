@@ -20,7 +20,7 @@ from hexmj.controllers.protocol import Controller, ReadingPlan, settings_of
 from hexmj.measures.physical import physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
-from hexmj.walks import PlannedWalk
+from hexmj.walks import PlannedWalk, part_of
 
 STRIDE = hexmj.Stride()
 LDVS = hexmj.LDVS
@@ -106,8 +106,8 @@ REFUSED = {
     "other starts": (lambda s: plan_of(s.starts[::-1]), r"the plan is of other starts, \(2, 6\); expected the 2"),
     "too few starts": (lambda s: plan_of(s.starts[:1]), r"the plan is of other starts, \(1, 6\); expected the 2"),
     "another stride": (lambda s: plan_of(s.starts, hexmj.Stride(dt=0.2)), "the plan's stride is Stride"),
-    "not at time 0": (advanced_plan, "the plan is 3 steps past its begin; expected a plan at time 0"),
-    "too few steps": (lambda s: Short(s.starts), r"asked for 4 steps, and its x has the shape \(3, 2, 6\); expected"),
+    "not at time 0": (advanced_plan, "the plan is at step 3; expected one at time 0"),
+    "too few steps": (lambda s: Short(s.starts), r"asked for 4 steps, and its time is float64 of the shape \(3,\); expected"),
 }
 
 
@@ -257,7 +257,7 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
         ("nowhere.toml", "nor a TOML file that exists"),
         ("nowhere.py:Still", "nowhere.py is no file; expected one that ends in .py"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
-        ("broken.py:Still", "broken.py cannot be imported"),
+        ("broken.py:Still", "broken.py cannot be loaded"),
         ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy"),
         ("mine_of_a_user.py:number", "controller = 6; expected a controller, a frozen dataclass"),
         ("mine_of_a_user.py:np", "expected a controller, a frozen dataclass"),
@@ -460,3 +460,76 @@ def test_what_is_no_controller_is_refused():
     for thing in (3, Own, hexmj.Symmetric()):
         with pytest.raises(hexmj.InputError, match="expected a controller, a frozen dataclass"):
             check_controller(thing)
+
+
+LIES = {
+    "a tip that is NaN": lambda walk: replace(walk, x=np.full_like(walk.x, np.nan)),
+    "a tip beside that is inf": lambda walk: replace(walk, y=np.full(walk.x.shape, np.inf)),
+    "a height that is inf": lambda walk: replace(walk, height=np.full(walk.x.shape, np.inf)),
+    "too few steps": lambda walk: part_of(walk, slice(1, None)),
+    "states as numbers": lambda walk: replace(walk, stance=walk.stance.astype(float)),
+    "no walk": lambda walk: [walk],
+}
+
+
+@dataclass(frozen=True)
+class Liar:
+    """LDVS without its fast lane, whose plans say something else."""
+
+    lie: str
+    name: str = "liar"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        plan = LDVS.begin(starts, velocity, stride, acceleration, threads)
+        true = plan.advance
+        plan.advance = lambda steps: LIES[self.lie](true(steps))
+        return plan
+
+
+@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize("physical", [False, True])
+def test_a_plan_that_makes_no_sense_is_never_an_outcome(lie, physical):
+    starts = hexmj.draw_starts(2, 0)
+    with pytest.raises(hexmj.InputError, match="a plan"):
+        if physical:
+            hexmj.physical_walk(starts, Liar(lie), 0.3, 5.0)
+        else:
+            hexmj.first_loss(starts, Liar(lie), 0.3, 5.0)
+
+
+@dataclass(frozen=True)
+class Raises:
+    """Raises something in its third step."""
+
+    what: type[BaseException]
+    name: str = "raises"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        done = 0
+
+        def step(v):
+            nonlocal done
+            done += 1
+            if done == 3:
+                raise self.what("no more")
+            return Step(starts, True)
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+@pytest.mark.parametrize("what", [ZeroDivisionError, SystemExit])
+def test_what_a_controller_raises_is_said_in_one_sentence(what):
+    with pytest.raises(hexmj.InputError, match=rf"{what.__name__} in .*test_controllers.py, line \d+: no more"):
+        hexmj.first_loss(hexmj.draw_starts(2, 0), Raises(what), 0.3, 5.0)
+
+
+def test_toml_that_names_itself_is_refused(tmp_path):
+    path = tmp_path / "ring.toml"
+    path.write_text(f"controller = '{path}'\n[fields]\n")
+    with pytest.raises(hexmj.InputError, match="expected module:object"):
+        hexmj.load_controller(str(path))
+
+
+def test_arguments_that_nobody_knows_are_refused():
+    with pytest.raises(hexmj.InputError, match="argument 'condition'; valid names: executor"):
+        hexmj.compare(LDVS, [0.3], n_starts=2, window=5.0, condition=1)  # pyright: ignore[reportCallIssue]

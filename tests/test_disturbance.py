@@ -9,8 +9,9 @@ import pytest
 import xarray as xr
 
 from hexmj import HWS, LDVS, UNCOORDINATED, Acceleration, Cruse1998, InputError, ReadsLegs, Stride
+from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.controllers.losses import begin, planned_losses
+from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.reads_legs import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk

@@ -41,9 +41,7 @@ def test_command(command, folder):
 
 
 def test_snippet(folder):
-    done = subprocess.run(
-        [sys.executable, "-c", SNIPPET], cwd=folder, check=True, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-c", SNIPPET], cwd=folder, check=True, capture_output=True, text=True)
     kinematic, physical = map(float, done.stdout.splitlines()[:2])
     assert 0 < physical < kinematic < 1
 

@@ -11,8 +11,8 @@ from dm_env.test_utils import EnvironmentTestMixin
 
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS
-from hexmj.controllers.losses import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm

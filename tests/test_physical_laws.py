@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.losses import begin
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import physical_flss
 from hexmj.measures.physical import physical_outcomes, physical_walk

@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
-from hexmj.controllers.losses import begin
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR

@@ -35,19 +35,24 @@ def compile_body(conditions: "Conditions", timestep: float | None = None, *, loo
     timestep = body.longest_step if timestep is None else timestep
     if not 0 < timestep <= body.longest_step:
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
-    compiled, measures = _compiled(body, conditions.masses, conditions.contact, conditions.ground, looks)
+    compiled, measures = _compiled(body, conditions.masses, conditions.contact, conditions.ground, looks, body.text())
     model = copy.copy(compiled)
     model.opt.timestep = timestep
     return CompiledBody(model=model, conditions=conditions, **measures)
 
 
-@lru_cache(maxsize=16)
 def plain_model(body: Body) -> mujoco.MjModel:
     """The MJCF of a body, compiled as it is; not to be written to.
 
     Raises:
         InputError: it does not compile, or it is not as described.
     """
+    return _plain_model(body, body.text())
+
+
+@lru_cache(maxsize=16)
+def _plain_model(body: Body, text: str) -> mujoco.MjModel:
+    """The same; `text` is the file as it is now, so that an edited one is compiled anew."""
     try:
         model = _spec(body).compile()
     except ValueError as error:
@@ -63,10 +68,10 @@ def gravity(body: Body) -> float:
 
 @lru_cache(maxsize=16)
 def _compiled(
-    body: Body, masses: "Masses", contact: "FootContact", ground: "Ground", looks: bool
+    body: Body, masses: "Masses", contact: "FootContact", ground: "Ground", looks: bool, text: str
 ) -> tuple[mujoco.MjModel, dict[str, Any]]:
-    """The model under some conditions, and what is measured on it once."""
-    plain = plain_model(body)
+    """The model under some conditions, and what is measured on it once, for the file as it is now."""
+    plain = _plain_model(body, text)
     spec = _spec(body)
     spec.compiler.discardvisual = not looks
     complete(spec, plain, body, gains(plain, body))

@@ -15,7 +15,7 @@ from hexmj.cli.sweep import run_study
 from hexmj.cli.tables import conditions_line, interval, new_table, physical_report, print_json, report_line, show
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError, RenderingError, check_distinct
+from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, MEASURES, Comparison
 from hexmj.progress import progress_bar
 from hexmj.replay.film.film import Film
@@ -59,11 +59,11 @@ class Compare:
         """Compare, write the results and a video, and print."""
         from hexmj.measures.figures import comparison_figure
 
-        check_distinct("models", self.models)
-        if clash := set(self.models) & set(SUMMARY):
-            raise InputError(f"a parameter file has the name {min(clash)!r}, which the results need; rename it")
+        controllers = self.controlled.controllers(self.models)
+        if clash := set(controllers) & set(SUMMARY):
+            raise InputError(f"a controller has the name {min(clash)!r}, which the results need; rename it")
         study = Comparison(
-            {name: self.controlled.controller(name) for name in self.models},
+            controllers,
             self.velocities,
             self.starts,
             self.walks.time,

@@ -90,7 +90,7 @@ class Converge:
             return
         frequencies, distances = _tables(means)
         show(
-            f"{self.model}, V = {self.velocity:g}, {self.starts} starts: FLSS, with 95 % intervals",
+            f"{study.controller.name}, V = {self.velocity:g}, {self.starts} starts: FLSS, with 95 % intervals",
             frequencies,
             "Distances from the plan [mm] until it loses stability, the fraction of steps in which the same feet stand,"
             " slip [mm/s] and tracking [mm] to the end",

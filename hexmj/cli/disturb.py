@@ -11,6 +11,7 @@ from hexmj.cli.options import Controlled, ControllerName, Hidden, Sweepers, Walk
 from hexmj.cli.sweep import lists_of, run_study
 from hexmj.cli.tables import conditions_line, interval, new_table, print_json, show
 from hexmj.conditions import Conditions, FootContact
+from hexmj.errors import InputError
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
 from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks
 from hexmj.timing import Acceleration
@@ -69,6 +70,14 @@ class Disturb:
     sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
     conditions: OmitArgPrefixes[_Conditions] = field(default_factory=_Conditions)
 
+    def _check(self, study: DisturbedWalks) -> None:
+        """Refuse options that would not be obeyed."""
+        needs = {"impulses": "push", "adhesion": "grasp", "recovery": "slow_down", "initial_velocity": "slow_down"}
+        met, usual = {*study.disturbances, *study.strategies}, Disturb()
+        for name, needed in needs.items():
+            if getattr(self, name) != getattr(usual, name) and needed not in met:
+                raise InputError(f"--{name.replace('_', '-')} without {needed}; expected it among those that are tried")
+
     def run(self) -> None:
         """Disturb walks, write the results, and print."""
         from hexmj.studies.disturbance.figure import disturbed_figure
@@ -92,6 +101,7 @@ class Disturb:
             Conditions.of(**self.conditions.flat()),
             self.walks.stride,
         )
+        self._check(study)
         figures = {"disturb.png": disturbed_figure}
         result, files = run_study(
             study, "disturbing walks", self.out, self.sweepers, data="disturb.nc", figures=figures
@@ -104,7 +114,8 @@ class Disturb:
         show(
             *(part for measure in MEASURES if measure in result for part in _tables(result, measure)),
             "takes off: how much lower than without a strategy, on the same starts",
-            f"{self.model}; {self.starts} starts whose plan is stable until it is disturbed, the first of {found}",
+            f"{study.controller.name}; {self.starts} starts whose plan is stable until it is disturbed, the first of"
+            f" {found}",
             f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}; grasp {self.adhesion:g}",
             conditions_line(self.walks, self.controlled, None, conditions),
             *map(str, files),

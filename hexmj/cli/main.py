@@ -1,5 +1,6 @@
 """The command line: typed options in, one call to the package, tables and files out."""
 
+import os
 import sys
 from functools import reduce
 from importlib import import_module
@@ -49,6 +50,9 @@ def main() -> None:
         sys.exit(_complain(f"{error}{_kept(error, getattr(options, 'out', None))}", 1))
     except RenderingError as error:
         sys.exit(_complain(error, 1))
+    except BrokenPipeError:  # whoever read the output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(141)
 
 
 def _options(words: list[str]) -> Any:

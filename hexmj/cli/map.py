@@ -86,7 +86,7 @@ class Map:
             f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True)
         )
         show(
-            f"{self.model} over {self.over}: FLSS, with 95 % intervals",
+            f"{study.controller.name} over {self.over}: FLSS, with 95 % intervals",
             measures,
             "Saved: of the starts that are statically lost, those that do not fall; dynamics: physical less static"
             f" FLSS; change: physical FLSS less that at {self.over} = {result.attrs['reference']:g}",

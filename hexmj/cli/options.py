@@ -3,7 +3,7 @@
 Each command is a frozen dataclass made of these parts, and offers just the options that it obeys.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -21,7 +21,7 @@ from tyro.constructors import (
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError
+from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
 from hexmj.timing import Acceleration, Stride
 
@@ -106,6 +106,13 @@ class Controlled:
                 raise InputError(f"--order = {self.order} with {name}; expected it with the 1998 network only")
             found = replace(found, order=self.order)  # pyright: ignore[reportArgumentType]
         return ReadsLegs(found) if self.feedback else found
+
+    def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
+        """Several of them, by what they call themselves, or as they were asked for where two have one name."""
+        check_distinct("controllers", names)
+        found = [self.controller(name) for name in names]
+        own = [one.name for one in found]
+        return dict(zip(own if len(set(own)) == len(own) else names, found, strict=True))
 
 
 @dataclass(frozen=True)

@@ -52,9 +52,8 @@ class Render:
         from hexmj.replay.recording import load_recording
 
         self._check()
-        controllers = {
-            name: self.controlled.controller(name) for name in (self.model, self.beside) if name and name != "planned"
-        }
+        beside = [] if self.beside in (None, "planned") else [self.beside]
+        controllers = self.controlled.controllers([self.model, *beside])
         shown = [load_recording(path) for path in self.recordings]
         out = results_folder(self.out, ("gait.mp4", "recording-1.nc", "recording-2.nc"))
         if sentence := gl.missing():
@@ -89,7 +88,7 @@ class Render:
         """The walks that are to be seen, recorded, and their files."""
         from hexmj.replay.recording import save_recording
 
-        walked = [(one, Path(name).stem, True) for name, one in controllers.items()]
+        walked = [(one, name, True) for name, one in controllers.items()]
         if self.beside == "planned":
             first, title, _ = walked[0]
             walked.insert(0, (first, f"{title}, planned", False))

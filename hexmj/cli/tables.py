@@ -31,7 +31,7 @@ def physical_report(result: "xr.Dataset") -> dict[str, float]:
 
 
 def report_line(report: dict[str, float]) -> str:
-    return "; ".join(f"{key}: {value:.3g}" for key, value in report.items())
+    return "; ".join(f"{key}: {value:{'.3g' if isinstance(value, float) else ''}}" for key, value in report.items())
 
 
 def conditions_line(

@@ -107,7 +107,8 @@ class Terrain:
             return
         walks = replace(self.walks, window=f"{result.attrs['distance']:g} / V")
         show(
-            f"{self.model}, {self.starts} starts: FLSS once the obstacle has been reached, with 95 % intervals",
+            f"{study.controller.name}, {self.starts} starts: FLSS once the obstacle has been reached, with 95 %"
+            " intervals",
             _table(result, self.conditions.body.trunk),
             conditions_line(walks, self.controlled, None, self.conditions, varied=tuple(VARIED)),
             *map(str, files),

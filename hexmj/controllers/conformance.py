@@ -26,7 +26,7 @@ from hexmj.controllers.protocol import (
 from hexmj.legs import LEGS, MIRROR
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, commanded_velocities
-from hexmj.walks import PlannedWalk, joined
+from hexmj.walks import PLANNED, PlannedWalk, joined
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
 """V_r of the starts of a trial, in turn."""
@@ -48,9 +48,6 @@ REACH = 1.0
 
 BESIDE = 0.5
 """How far a tip may be from its leg's line, as a part of the line's distance from the body axis."""
-
-WALKED = ("x", "y", "stance", "aep", "height")
-"""What a plan says of every start and leg."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +179,7 @@ def _shapes(trial: Trial) -> Iterator[str]:
         yield f"advance gives {walk!r:.100}; expected a PlannedWalk"
         return
     shape = (STEPS, *trial.starts.shape)
-    for name in WALKED:
+    for name in PLANNED:
         values, kind = np.asarray(getattr(walk, name)), np.dtype(bool if name == "stance" else float)
         if values.shape != shape:
             yield f"{name} has the shape {values.shape}; expected (step, start, leg), {shape}"
@@ -272,7 +269,7 @@ def _fast_losses(trial: Trial) -> Iterator[str]:
 def _mirrored(trial: Trial) -> Iterator[str]:
     if claims_mirrored(trial.controller):
         other = replace(trial, starts=trial.starts[:, MIRROR]).walk
-        back = replace(other, **{name: getattr(other, name)[..., MIRROR] for name in WALKED})
+        back = replace(other, **{name: getattr(other, name)[..., MIRROR] for name in PLANNED})
         yield from _difference(trial.walk, replace(back, y=-back.y), "mirrored starts, mirrored back,")
 
 
@@ -319,12 +316,12 @@ LAWS: dict[str, tuple[Law, str]] = {
 def _starts(walk: PlannedWalk, which: Any) -> PlannedWalk:
     """The walks of some starts."""
     at = which if isinstance(which, slice) else np.asarray(which)
-    return replace(walk, **{name: getattr(walk, name)[:, at] for name in ("velocity", *WALKED)})
+    return replace(walk, **{name: getattr(walk, name)[:, at] for name in ("velocity", *PLANNED)})
 
 
 def _difference(one: PlannedWalk, other: PlannedWalk, what: str) -> Iterator[str]:
     """A sentence on the first thing in which two walks differ."""
-    for name in WALKED:
+    for name in PLANNED:
         a, b = np.asarray(getattr(one, name)), np.asarray(getattr(other, name))
         if a.shape != b.shape:
             yield f"{what} differ: {name} has the shapes {a.shape} and {b.shape}; expected the same bits"

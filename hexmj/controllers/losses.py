@@ -1,34 +1,16 @@
 """First losses of static stability (Eq. 7) of any controller: its own fast way, or its plan looked at."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller, FastLosses, Plan
+from hexmj.errors import InputError
 from hexmj.stability import walk_margin
-from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
 CHUNK, BLOCK = 200, 2000
 """Steps and starts of a plan held in memory at a time."""
-
-
-def begin(
-    controller: Controller,
-    starts: ArrayLike,
-    velocity: ArrayLike,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-    threads: int | None = None,
-) -> Plan:
-    """A plan of checked starts and velocities; one velocity stands for all starts.
-
-    Raises:
-        InputError: a controller, start or velocity that makes no sense.
-    """
-    x = checked_starts(starts, stride)
-    v = checked_velocities(velocity, len(x), acceleration)
-    return controller.begin(x, v, stride, acceleration, threads)
 
 
 def first_losses(
@@ -42,11 +24,16 @@ def first_losses(
 ) -> np.ndarray:
     """The first of each start's `steps`, (start,), that is statically unstable, counted from 1; 0 where none is."""
     if isinstance(controller, FastLosses):
-        return controller.first_losses(starts, velocity, steps, stride, acceleration, threads)
+        lost = np.asarray(controller.first_losses(starts, velocity, steps, stride, acceleration, threads))
+        if lost.shape != steps.shape or not ((lost >= 0) & (lost <= steps)).all():
+            raise InputError(
+                f"first_losses of {controller.name}: {lost!r:.80}; expected a step from 0 on for each start"
+            )
+        return lost
     lost = np.empty(len(starts), dtype=int)
     for first in range(0, len(starts), BLOCK):
         block = slice(first, first + BLOCK)
-        plan = controller.begin(starts[block], velocity[block], stride, acceleration, threads)
+        plan = begin(controller, starts[block], velocity[block], stride, acceleration, threads)
         lost[block] = planned_losses(plan, steps[block], threads)
     return lost
 
@@ -57,7 +44,7 @@ def planned_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) ->
     lost = np.zeros(len(steps), dtype=int)
     while plan.done < (end := steps[lost == 0].max(initial=0)):
         first = plan.done + 1
-        unstable = unstable_steps(plan.advance(int(min(CHUNK, end - plan.done))), threads)
+        unstable = unstable_steps(advanced(plan, int(min(CHUNK, end - plan.done))), threads)
         unstable &= (first + np.arange(len(unstable)))[:, np.newaxis] <= steps
         new = (lost == 0) & unstable.any(axis=0)
         lost[new] = first + np.argmax(unstable, axis=0)[new]

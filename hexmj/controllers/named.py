@@ -60,11 +60,13 @@ def _with_fields(path: Path) -> Controller | None:
         return None  # `read_weights` says what is wrong
     if set(table) != {"controller", "fields"} or not isinstance(table["fields"], dict):
         return None
-    found: Any = load_controller(str(table["controller"]))
+    if ":" not in (named := str(table["controller"])):
+        raise InputError(f"{path}: controller = {named!r}; expected module:object or file.py:object")
+    found: Any = load_controller(named)
     try:
         return replace(found, **table["fields"])
-    except TypeError as error:
-        raise InputError(f"{path} [fields]: {error}; expected fields of {table['controller']}") from None
+    except Exception as error:  # whatever the user's class raises
+        raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 
 
 def _module(where: str, name: str) -> ModuleType:
@@ -74,7 +76,9 @@ def _module(where: str, name: str) -> ModuleType:
             return import_module(where)
         if _is_file(Path(where)):
             return importable(Path(where))
-    except Exception as error:  # whatever the user's code raises
+    except InputError as error:
+        raise InputError(f"controller {name!r}: {error}") from None
+    except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
     raise InputError(f"controller {name!r}: {where} is no file; expected one that ends in .py")
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import Controller, Sensed, SteerablePlan, claims_mirrored
+from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, SteerablePlan, claims_mirrored
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, joined
@@ -57,6 +57,10 @@ class ReadsLegs:
             InputError: plans that cannot be steered.
         """
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+        if isinstance(plan, ReadingPlan):
+            raise InputError(
+                f"feedback around {self.controller.name}; expected another: this one reads the legs already"
+            )
         if not isinstance(plan, SteerablePlan):
             raise InputError(
                 f"feedback around {self.controller.name}; expected a controller whose plans can go on from the legs as"

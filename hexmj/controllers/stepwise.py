@@ -59,7 +59,7 @@ class StepwisePlan:
         usual = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
         planned = {name: np.empty((steps, *shape), dtype=kind) for name, kind in _KINDS.items()}
         for n, now in enumerate(v):
-            step = self._step(now)
+            step = self._step(now.copy())
             if not isinstance(step, Step):
                 raise InputError(f"a step gave {step!r:.80}; expected a Step")
             given = usual | {name: value for name, value in vars(step).items() if value is not None}
@@ -119,7 +119,10 @@ def stepwise(
 
 def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """A value of one step that can be written into (start, leg)."""
-    values = np.asarray(value)
+    try:
+        values = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name} of a step is {value!r:.80}; expected one array") from None
     if values.dtype.kind not in ("b" if name == "stance" else "fiu"):
         raise InputError(
             f"{name} of a step is of type {values.dtype}; expected {'booleans' if name == 'stance' else 'numbers'}"

@@ -1,9 +1,9 @@
 """The insect as a dm_env environment on dm_control: walk straight ahead at a commanded velocity.
 
 An episode begins at a random start in S, settled as for a physical walk.  One step of the environment is one
-step of the network, with its substeps.  The network runs along and its plan is observed whatever the actions
+step of the plan, with its substeps.  The controller runs along and its plan is observed whatever the actions
 are: the targets of all joints, held for the step ('joints'), or offsets to the tips that the controller plans
-('tips'), so that zeros are the pure network's walk, bit for bit that of `physical_walks.physical_walk`.
+('tips'), so that zeros are its own walk, bit for bit that of `measures.physical.physical_walk`.
 
 Observations, all float64:
 
@@ -17,7 +17,7 @@ Observations, all float64:
 - margin: measured stability margin [mm], from the feet in contact and the insect's own centre of mass;
   `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
 - command: velocity to walk at [mm/s]
-- planned_stance: (leg,) 1 where the network lets the leg stand
+- planned_stance: (leg,) 1 where the plan lets the leg stand
 - planned_tips: in the root frame, (leg, axis) [mm], without offsets
 - out_of_reach, with 'tips' only: (leg,) substeps of the last step in which the leg kept its last angles,
   because its planned tip with the offset could not be reached
@@ -44,15 +44,15 @@ from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import advanced, begin, tell
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.losses import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.physics.backend import Rolled
 from hexmj.physics.fine_steps import SINK, FineSteps
 from hexmj.physics.foot_path import TipTargets
-from hexmj.physics.orders import advanced, hold
+from hexmj.physics.orders import hold
 from hexmj.physics.sensing import sensed
 from hexmj.physics.settling import settle
 from hexmj.physics.standing import StandingFeet
@@ -287,7 +287,7 @@ class Walking(control.Task):
                 f" expected {spec.minimum[i]:.4g} to {spec.maximum[i]:.4g}"
             )
         if isinstance(self._plan, ReadingPlan):
-            self._plan.sense(self._sensed(physics))
+            tell(self._plan, self._sensed(physics))
         ahead = advanced(self._plan, 1)
         tips = self._targets.follow(ahead, np.zeros(1, dtype=int))[0]
         self._planned_stance, self._planned_tips = ahead.stance[0, 0].astype(float), tips[-1]

@@ -128,7 +128,7 @@ def compare(
         start) every field of `Outcomes`.
 
     Raises:
-        InputError, SimulationError: see `settling.settle` and `physics.drive`.
+        InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)

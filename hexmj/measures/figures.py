@@ -1,6 +1,6 @@
 """FLSS against velocity as figures, and what other figures share with them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 MEASURE_COLOURS = {"kinematic": "#1b6ca8", "measured": "#e08e1b", "physical": "#b3261e"}
 CONTROLLER_LINES = ("-", "--", ":", "-.")
+CONTROLLER_MARKERS = ("o", "s", "^", "D")
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
@@ -20,13 +21,14 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     axes = figure.subplots()
     shift = 0.004
-    for line, name in zip(CONTROLLER_LINES * len(result.controller), result.controller.values, strict=False):
+    styles: list[Any] = list(zip(CONTROLLER_LINES, CONTROLLER_MARKERS, strict=True)) * result.sizes["controller"]
+    for (line, marker), name in zip(styles, result.controller.values, strict=False):
         one = result.sel(controller=name)
         for offset, (measure, colour) in zip((-shift, 0.0, shift), MEASURE_COLOURS.items(), strict=True):
             low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
             axes.errorbar(
                 one.velocity + offset, middle, [middle - low, high - middle],
-                color=colour, linestyle=line, marker="o", markersize=4, capsize=2.5, linewidth=1.6,
+                color=colour, linestyle=line, marker=marker, markersize=4, capsize=2.5, linewidth=1.6,
                 label=f"{name}, {measure}",
             )  # fmt: skip
     _flss_axes(axes)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.losses import begin, first_losses
+from hexmj.controllers.asking import advanced, begin
+from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval, wilson_intervals
@@ -46,7 +47,7 @@ def walk(
     """
     stride = stride or Stride()
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
-    return plan.advance(int(steps_within(duration, stride)))
+    return advanced(plan, int(steps_within(duration, stride)))
 
 
 def first_loss(

@@ -30,8 +30,10 @@ UNITS = {
 
 
 @lru_cache(maxsize=1)
-def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> Settled:
-    """The seed's starts at rest; kept, because every controller and velocity begins with the same."""
+def settled_starts(
+    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None, mjcf: str
+) -> Settled:
+    """The seed's starts at rest, for the body's MJCF as it is; kept, since every controller begins with the same."""
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
 
 
@@ -64,7 +66,7 @@ def outcome_table(
     """
     import xarray as xr
 
-    settled = settled_starts(n_starts, seed, conditions, stride, threads)
+    settled = settled_starts(n_starts, seed, conditions, stride, threads, conditions.body.text())
     outcomes = physical_outcomes(
         settled, controller, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
     )

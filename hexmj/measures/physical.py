@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.losses import begin
+from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive

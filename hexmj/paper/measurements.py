@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.controllers.losses import begin
 from hexmj.gaits import PAIRS, limit_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from hexmj.controllers.asking import tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.physics.chunks import Chunk, Insects, Push
 from hexmj.physics.orders import JointTargets, Orders
@@ -81,6 +82,6 @@ def _step_by_step(
 ) -> Iterator[Orders]:
     """Orders for one step after the other, each made from what the last one has brought about."""
     for _ in range(steps):
-        plan.sense(insects.sensed(ids))
+        tell(plan, insects.sensed(ids))
         if orders := targets.ahead(ids, steps=1):
             yield orders

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexmj.controllers.asking import advanced, check_plan
 from hexmj.controllers.protocol import Plan
-from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.settling import Settled
 from hexmj.timing import steps_within
@@ -52,12 +52,12 @@ class JointTargets:
         Raises:
             InputError: a plan of other starts, with another stride, or not at time 0.
         """
-        check_plan(plan, settled)
+        check_plan(plan, settled.starts, settled.stride)
         self._plan = plan
         self._steps = int(steps_within(duration, settled.stride))
         self._substeps = settled.conditions.substeps(settled.stride)
         self._tips = TipTargets(settled.starts, settled.conditions, settled.stride)
-        self._body, columns = settled.compiled, settled.compiled.columns
+        self._compiled, columns = settled.compiled, settled.compiled.columns
         self._last = settled.ctrl[:, columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self._last_tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
         self._grasps = columns.grasp.stop > columns.grasp.start
@@ -76,7 +76,7 @@ class JointTargets:
             return None
         plan = advanced(self._plan, steps or self.steps_ahead())
         tips = self._tips.follow(plan, ids)
-        joints, reachable = self._body.inverse(tips)
+        joints, reachable = self._compiled.inverse(tips)
         for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
             hold(joints[i], self._last[ids[i]])
         self._last[ids] = joints[:, -1]
@@ -89,40 +89,6 @@ class JointTargets:
         if self._plan.done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, first, ids, control, tips[:, : control.shape[1]], missed)
-
-
-def check_plan(plan: Plan, settled: Settled) -> None:
-    """Refuse a plan that does not begin where the settled starts are.
-
-    Raises:
-        InputError: a plan of other starts, with another stride, or not at time 0.
-    """
-    if plan.done:
-        raise InputError(
-            f"the plan is {plan.done} steps past its begin; expected a plan at time 0, as `begin` gives it"
-        )
-    if plan.stride != settled.stride:
-        raise InputError(f"the plan's stride is {plan.stride}; expected that of the settled starts, {settled.stride}")
-    if not np.array_equal(plan.starts, settled.starts):
-        raise InputError(
-            f"the plan is of other starts, {np.shape(plan.starts)}; expected the {len(settled.starts)} that settled"
-        )
-
-
-def advanced(plan: Plan, steps: int) -> PlannedWalk:
-    """The plan's next steps, if it gives as many, for all of its starts.
-
-    Raises:
-        InputError: too few or too many steps, or other shapes.
-    """
-    walk, shape = plan.advance(steps), (steps, *np.shape(plan.starts))
-    for name in ("x", "y", "stance", "aep", "height"):
-        if np.shape(getattr(walk, name)) != shape:
-            raise InputError(
-                f"a plan was asked for {steps} steps, and its {name} has the shape {np.shape(getattr(walk, name))};"
-                f" expected (step, start, leg), {shape}"
-            )
-    return walk
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:

@@ -50,7 +50,7 @@ def measured_walk(
     """The measured walk at the plan's steps that fall within a chunk.
 
     Args:
-        chunk: of `physics.drive`.
+        chunk: of `drive.drive`.
         settled: what it began with.
         rows: which of the chunk's starts, (n,); all unless given.
 
@@ -123,7 +123,7 @@ class Tally:
         self._depth, self._corners = np.zeros(size), settled.compiled.trunk_corners
 
     def add(self, chunk: Chunk) -> None:
-        """Take in one chunk of `physics.drive`."""
+        """Take in one chunk of `drive.drive`."""
         settled, ids = self._settled, chunk.ids
         compiled, dt, m = settled.compiled, settled.stride.dt, settled.conditions.substeps(settled.stride)
         columns, limit = compiled.columns, compiled.torque_limits
@@ -148,7 +148,7 @@ class Tally:
             self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
-        """How every start went, as far as the chunkes reach."""
+        """How every start went, as far as the chunks reach."""
         sums, timestep = self._sums, self._settled.compiled.model.opt.timestep
         with np.errstate(invalid="ignore", divide="ignore"):
             speed = np.where(self._commanded > 0, self._walked / self._commanded, np.nan)
@@ -216,5 +216,5 @@ def _count_misses(qpos: Any, feet: Any, targets: Any, ground: float, width: floa
             off_x = qpos[0] + xx * a + xy * b + xz * c - feet[3 * leg]
             off_y = qpos[1] + yx * a + yy * b + yz * c - feet[3 * leg + 1]
             off_z = qpos[2] + zx * a + zy * b + zz * c - feet[3 * leg + 2]
-            distance = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z)
-            counts[min(int(distance / width), len(counts) - 1)] += 1
+            place, last = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z) / width, len(counts) - 1
+            counts[int(place) if place < last else last] += 1

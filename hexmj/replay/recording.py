@@ -59,7 +59,7 @@ MEASURED = {
 """Variables of a recorded physical insect; a puppet that only shows the plan has none of them."""
 
 _TIMES = {
-    "time": (_STEPS, "time unit", "time, in the network's unit 1 mm / V_p"),
+    "time": (_STEPS, "time unit", "time, in the unit 1 mm / V_p"),
     "seconds": (_STEPS, "s", "time"),
 }
 

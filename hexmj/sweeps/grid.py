@@ -64,6 +64,9 @@ def finish(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]
     Raises:
         InputError: a cell cannot be named, sent, written or believed.  And whatever the first cell to fail raises.
     """
+    if unknown := set(how) - set(How.__annotations__):
+        raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(How.__annotations__)}")
+    folder = None if folder is None else Path(folder)
     executor, progress, threads = how.get("executor"), how.get("progress"), how.get("threads")
     records = [cell.record() if folder else "" for cell in cells]
     paths = [

@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from hexmj.controllers.losses import begin
+from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss

@@ -16,7 +16,7 @@ ROWS = {"kinematic": "on paper (kinematic)", "physical": "falls (physical)"}
 
 
 def disturbed_figure(result: "xr.Dataset") -> "Figure":
-    """A column of panels for each disturbance, a row for each measure; window `whole`, from `disturbed_walks`."""
+    """A column of panels for each disturbance, a row for each measure; window `whole`, from `DisturbedWalks`."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 

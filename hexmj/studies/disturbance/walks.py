@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.losses import begin, planned_losses
+from hexmj.controllers.asking import begin
+from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.measures.physical import outcomes_of_plan

@@ -20,7 +20,7 @@ PANELS = {  # label of the axis, then for each curve its colour and name
 
 
 def static_limit_figure(result: "xr.Dataset") -> "Figure":
-    """Four panels against V_p, a kind of line for each mass of the legs, from `static_limit.converge`."""
+    """Four panels against V_p, a kind of line for each mass of the legs, from `StaticLimit`."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
