@@ -107,7 +107,10 @@ REFUSED = {
     "too few starts": (lambda s: plan_of(s.starts[:1]), r"the plan is of other starts, \(1, 6\); expected the 2"),
     "another stride": (lambda s: plan_of(s.starts, hexmj.Stride(dt=0.2)), "the plan's stride is Stride"),
     "not at time 0": (advanced_plan, "the plan is at step 3; expected one at time 0"),
-    "too few steps": (lambda s: Short(s.starts), r"asked for 4 steps, and its time is float64 of the shape \(3,\); expected"),
+    "too few steps": (
+        lambda s: Short(s.starts),
+        r"asked for 4 steps, and its time is float64 of the shape \(3,\); expected",
+    ),
 }
 
 
