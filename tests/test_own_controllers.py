@@ -30,6 +30,7 @@ OWN = {
     "turning": f"{EXAMPLES / 'turning.py'}:Turning",
 }
 STRIDE = hexmj.Stride()
+FEW = ("--velocities", 0.5, "--starts", 4, "--window", 30, "--json")
 
 
 @pytest.fixture(scope="module", params=OWN)
@@ -245,11 +246,14 @@ def hexmj_prints(folder: Path, *words: object) -> str:
 
 @pytest.mark.parametrize("name", OWN)
 def test_on_the_command_line(name, tmp_path):
-    few = ("--velocities", 0.5, "--starts", 4, "--window", 30, "--json")
     assert json.loads(hexmj_prints(tmp_path, "check-controller", OWN[name], "--json"))["well"]
-    for more in ((), ("--physical",)):
-        assert json.loads(hexmj_prints(tmp_path, "flss", "--model", OWN[name], *few, *more))
-    assert json.loads(hexmj_prints(tmp_path, "compare", "--models", OWN[name], "ldvs", "--no-video", *few))
+    assert json.loads(hexmj_prints(tmp_path, "flss", "--model", OWN[name], *FEW, "--physical"))
+
+
+def test_the_tripod_is_measured_compared_and_filmed_on_the_command_line(tmp_path):
+    name = "tripod"
+    assert json.loads(hexmj_prints(tmp_path, "flss", "--model", OWN[name], *FEW))
+    assert json.loads(hexmj_prints(tmp_path, "compare", "--models", OWN[name], "ldvs", "--no-video", *FEW))
     hexmj_prints(tmp_path, "render", "--model", OWN[name], "--beside", "ldvs", "--window", 5, "--width", 320)
     assert list(tmp_path.rglob("*.mp4"))
 

@@ -51,7 +51,7 @@ class TipTargets:
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
         wanted = plan.x, plan.y, plan.stance, plan.aep, plan.height
         last = self._x, self._y, self._stance, self._lift, self._height
-        _follow(*wanted, ids, *last, m, *self._rates, path.step_height, path.standing_height, self._origin, tips)
+        _follow(wanted, ids, last, m, self._rates, (path.step_height, path.standing_height), self._origin, tips)
         for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
             old[ids] = values[-1, ids]
         return tips
@@ -64,17 +64,16 @@ def standing_tips(x: np.ndarray, standing_height: float, stride: Stride) -> np.n
 
 
 @njit(cache=True, nogil=True)
-def _follow(
-    x: Any, y: Any, stance: Any, aep: Any, own_height: Any, ids: Any,
-    x_old: Any, y_old: Any, s_old: Any, lift: Any, height_old: Any,
-    m: int, rise: float, sink: float, landing: float, step_height: float, standing_height: float,
-    origin: Any, tips: Any,
-) -> None:  # fmt: skip
+def _follow(wanted: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, origin: Any, tips: Any) -> None:
     """Between two steps a tip moves evenly; where the plan names no height, that is a smooth function of the phase of
     its lift, 0 to 1.
 
     The phase tends to 1 in swing and to 0 in stance, and to the distance from the AEP within `landing` of it [mm].
     """
+    x, y, stance, aep, own_height = wanted
+    x_old, y_old, s_old, lift, height_old = last
+    rise, sink, landing = rates
+    step_height, standing_height = heights
     for i, start in enumerate(ids):
         for leg in range(6):
             x_from, y_from, s = x_old[start, leg], y_old[start, leg], s_old[start, leg]
