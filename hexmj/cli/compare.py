@@ -1,20 +1,18 @@
 """`hexmj compare`."""
 
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from tyro.conf import OmitArgPrefixes, arg
+from tyro.conf import arg
 
-from hexmj.cli.options import CONTROLLER, Accelerating, Controlled, Sweepers, Walks
+from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
-from hexmj.cli.sweep import run_study
-from hexmj.cli.tables import conditions_line, interval, new_table, physical_report, print_json, report_line, show
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
+from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.tables import interval, new_table, physical_report, report_line
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, MEASURES, Comparison
 from hexmj.progress import progress_bar
@@ -32,11 +30,8 @@ FILMED = 0.3
 
 
 @dataclass(frozen=True)
-class Compare:
-    """Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait video.
-
-    Repeat the command to go on with a run that was stopped.
-    """
+class Compare(StudyCommand):
+    """Options of `hexmj compare`, which `main.COMMANDS` describes."""
 
     models: Annotated[tuple[str, ...], arg(help=f"Controllers, each {CONTROLLER}.")] = ("ldvs", "uncoordinated")
     velocities: Sequence[float] = Comparison.velocities
@@ -47,60 +42,52 @@ class Compare:
     """Folder for the results and finished walks."""
     no_video: bool = False
     """Leave the video out."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
-    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
-    def run(self) -> None:
-        """Compare, write the results and a video, and print."""
-        from hexmj.measures.figures import comparison_figure
-
+    def study(self) -> Comparison:
+        """See `StudyCommand.study`."""
         controllers = self.controlled.controllers(self.models)
         if clash := set(controllers) & set(SUMMARY):
             raise InputError(f"a controller has the name {min(clash)!r}, which the results need; rename it")
-        study = Comparison(
-            controllers,
-            self.velocities,
-            self.starts,
-            self.walks.time,
-            self.walks.seed,
-            self.conditions,
-            self.walks.stride,
-            self.accelerating.procedure,
-        )
-        result, files = run_study(
-            study, "comparing", self.out, self.sweepers,
-            data="comparison.nc",
-            figures={"comparison.png": comparison_figure},
-            also=("recording.nc", "gait.mp4"),
-        )  # fmt: skip
-        no_video = None
-        if not self.no_video:
-            try:
-                files.append(self._typical_gait(study.controllers, result))
-            except RenderingError as error:
-                no_video = error
-        if self.json:
-            print_json(_summary(result) | {"files": files})
-        else:
-            frequencies, answers = _tables(result)
-            show(
-                "Frequency of the loss of static stability, with 95 % intervals",
-                frequencies,
-                "Starts by what happened: lost on paper (kin.), fell (phys.); speed over command",
-                answers,
-                conditions_line(self.walks, self.controlled, self.accelerating.procedure, self.conditions),
-                report_line(physical_report(result)),
-                *map(str, files),
-            )
-        if no_video:
-            print(f"hexmj: no video: {no_video}", file=sys.stderr)
+        return Comparison(controllers, self.velocities, self.starts, conditions=self.conditions, **self.walked)
 
-    def _typical_gait(self, controllers: Mapping[str, Controller], result: "xr.Dataset") -> Path:
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.measures.figures import comparison_figure
+
+        others = "recording.nc", "gait.mp4"
+        return Outputs("comparing", "comparison.nc", {"comparison.png": comparison_figure}, others=others)
+
+    def write_others(self, result: "xr.Dataset") -> list[Path]:
+        """The video, unless it is left out or cannot be made."""
+        if self.no_video:
+            return []
+        try:
+            return [self._typical_gait(result)]
+        except RenderingError as error:
+            print(f"hexmj: no video: {error}", file=sys.stderr)
+            return []
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """The frequencies and answers of every controller."""
+        summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
+        keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")] + ["agreement", *AGREEMENT]
+        for name in result.controller.values:
+            one = result.sel(controller=name)
+            summary[name] = {key: one[key].values.tolist() for key in keys}
+        durations = {"duration": result.duration.values.tolist()}
+        return summary | {"report": physical_report(result), "settings": result.attrs | durations}
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """The frequencies, what the starts did, the conditions, and how far the bodies did what they were told."""
+        frequencies, answers = _tables(result)
+        yield "Frequency of the loss of static stability, with 95 % intervals"
+        yield frequencies
+        yield "Starts by what happened: lost on paper (kin.), fell (phys.); speed over command"
+        yield answers
+        yield self.conditions_line()
+        yield report_line(physical_report(result))
+
+    def _typical_gait(self, result: "xr.Dataset") -> Path:
         """A video of the first controller near V = 0.3, of the first start that kept its stability, if any."""
         from hexmj.replay.film import gl
         from hexmj.replay.film.video import render
@@ -108,30 +95,16 @@ class Compare:
 
         if sentence := gl.missing():
             raise RenderingError(sentence)
-        name, controller = next(iter(controllers.items()))
+        name, controller = next(iter(self.controlled.controllers(self.models).items()))
         velocities = result.velocity.values
         v = float(velocities[np.abs(velocities - FILMED).argmin()])
         one = result.sel(controller=name, velocity=v)
         start = int(np.argmax((np.isinf(one.planned_loss) & np.isinf(one.fall)).values))
-        walked = recorded(
-            controller, v, start, self.walks, self.accelerating.procedure, self.conditions,
-            physical=True, title=name, threads=self.sweepers.threads,
-        )  # fmt: skip
+        walked = recorded(self, controller, v, start, title=name, threads=self.sweepers.threads)
         save_recording(walked, self.out / "recording.nc")
         with progress_bar("rendering") as progress:
             render([walked], self.out / "gait.mp4", Film(), progress)
         return self.out / "gait.mp4"
-
-
-def _summary(result: "xr.Dataset") -> dict[str, Any]:
-    """The frequencies and answers of every controller, for JSON."""
-    summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
-    keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")] + ["agreement", *AGREEMENT]
-    for name in result.controller.values:
-        one = result.sel(controller=name)
-        summary[name] = {key: one[key].values.tolist() for key in keys}
-    durations = {"duration": result.duration.values.tolist()}
-    return summary | {"report": physical_report(result), "settings": result.attrs | durations}
 
 
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":

@@ -1,16 +1,16 @@
 """`hexmj converge`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Accelerating, Controlled, ControllerName, Hidden, Sweepers, Walks
-from hexmj.cli.sweep import lists_of, run_study
-from hexmj.cli.tables import conditions_line, interval, new_table, print_json, show
-from hexmj.conditions import Conditions, Masses, Numerics, TimeScale
+from hexmj.cli.options import ControllerName, hiding
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import interval, new_table
+from hexmj.conditions import Conditions
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.static_limit.study import FINE, VARIED, StaticLimit
 
@@ -20,30 +20,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Time(TimeScale):
-    vp: Hidden = TimeScale.vp
-
-
-@dataclass(frozen=True)
-class _Masses(Masses):
-    leg_mass: Hidden = Masses.leg_mass
-
-
-@dataclass(frozen=True)
-class _Conditions(Conditions):
-    """All but those that are given as lists."""
-
-    time: OmitArgPrefixes[_Time] = field(default_factory=_Time)
-    masses: OmitArgPrefixes[_Masses] = field(default_factory=_Masses)
-    numerics: OmitArgPrefixes[Numerics] = FINE.numerics
-
-
-@dataclass(frozen=True)
-class Converge:
-    """The same starts at smaller and smaller V_p: does the insect tend to its plan and to the static criterion?
-
-    Repeat the command to go on with a run that was stopped.
-    """
+class Converge(StudyCommand):
+    """Options of `hexmj converge`, which `main.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocity: float = StaticLimit.velocity
@@ -55,51 +33,46 @@ class Converge:
     starts: int = StaticLimit.n_starts
     """Number of random starts, the same for every V_p and mass."""
     out: Path = Path("results/converge")
-    """Folder for figure, NetCDF, manifest and finished walks."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
-    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
-    conditions: OmitArgPrefixes[_Conditions] = field(default_factory=_Conditions)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(FINE, VARIED))
 
-    def run(self) -> None:
-        """Walk slower and slower, write the results, and print."""
-        from hexmj.studies.static_limit.figure import static_limit_figure
-
-        study = StaticLimit(
+    def study(self) -> StaticLimit:
+        """See `StudyCommand.study`."""
+        return StaticLimit(
             self.controlled.controller(self.model),
             self.velocity,
             self.vps,
             self.leg_masses,
-            self.starts,
-            self.walks.time,
-            self.walks.seed,
-            Conditions.of(**self.conditions.flat()),
-            self.walks.stride,
-            self.accelerating.procedure,
+            n_starts=self.starts,
+            conditions=self.conditions,
+            **self.walked,
         )
-        figures = {"converge.png": static_limit_figure}
-        result, files = run_study(
-            study, "walking slower and slower", self.out, self.sweepers, data="converge.nc", figures=figures
-        )
-        means = result.drop_vars(MEASURES.values()).mean("start")
-        if self.json:
-            print_json(lists_of(means) | {"settings": result.attrs, "files": files})
-            return
-        frequencies, distances = _tables(means)
-        show(
-            f"{study.controller.name}, V = {self.velocity:g}, {self.starts} starts: FLSS, with 95 % intervals",
-            frequencies,
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.static_limit.figure import static_limit_figure
+
+        return Outputs("walking slower and slower", "converge.nc", {"converge.png": static_limit_figure})
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """Frequencies and distances, over masses and V_p."""
+        return lists_of(_means(result))
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """The frequencies, the distances from the plan, and the conditions."""
+        name, (frequencies, distances) = self.controlled.controller(self.model).name, _tables(_means(result))
+        yield f"{name}, V = {self.velocity:g}, {self.starts} starts: FLSS, with 95 % intervals"
+        yield frequencies
+        yield (
             "Distances from the plan [mm] until it loses stability, the fraction of steps in which the same feet stand,"
-            " slip [mm/s] and tracking [mm] to the end",
-            distances,
-            conditions_line(
-                self.walks, self.controlled, self.accelerating.procedure, self.conditions, varied=tuple(VARIED)
-            ),
-            *map(str, files),
+            " slip [mm/s] and tracking [mm] to the end"
         )
+        yield distances
+        yield self.conditions_line(varied=VARIED)
+
+
+def _means(result: "xr.Dataset") -> "xr.Dataset":
+    """Over the starts."""
+    return result.drop_vars(MEASURES.values()).mean("start", keep_attrs=True)
 
 
 def _tables(means: "xr.Dataset") -> "tuple[Table, Table]":

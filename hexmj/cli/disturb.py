@@ -1,16 +1,16 @@
 """`hexmj disturb`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Controlled, ControllerName, Hidden, Sweepers, Walks, refuse_physical
-from hexmj.cli.sweep import lists_of, run_study
-from hexmj.cli.tables import conditions_line, interval, new_table, print_json, show
-from hexmj.conditions import Conditions, FootContact
+from hexmj.cli.options import STEADY, Accelerating, ControllerName, hiding
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import interval, new_table
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
 from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks
@@ -20,25 +20,13 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-
-@dataclass(frozen=True)
-class _Contact(FootContact):
-    grasp: Hidden = FootContact.grasp
+NEEDS = {"impulses": "push", "adhesion": "grasp", "recovery": "slow_down", "initial_velocity": "slow_down"}
+"""Option -> the disturbance or strategy that it belongs to."""
 
 
 @dataclass(frozen=True)
-class _Conditions(Conditions):
-    """All but the strategy's own."""
-
-    contact: OmitArgPrefixes[_Contact] = field(default_factory=_Contact)
-
-
-@dataclass(frozen=True)
-class Disturb:
-    """Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies buy.
-
-    Repeat the command to go on with a run that was stopped.
-    """
+class Disturb(StudyCommand):
+    """Options of `hexmj disturb`, which `main.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: Sequence[float] = DisturbedWalks.velocities
@@ -62,29 +50,17 @@ class Disturb:
     kinematic: bool = False
     """Leave physics out, and with it pushes and grasping."""
     out: Path = Path("results/disturb")
-    """Folder for figure, NetCDF, manifest and finished walks."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
-    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
-    conditions: OmitArgPrefixes[_Conditions] = field(default_factory=_Conditions)
+    accelerating: OmitArgPrefixes[Accelerating] = STEADY
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["grasp"]))
 
-    def _check(self, study: DisturbedWalks) -> None:
-        """Refuse options that would not be obeyed."""
-        needs = {"impulses": "push", "adhesion": "grasp", "recovery": "slow_down", "initial_velocity": "slow_down"}
-        met, usual = {*study.disturbances, *study.strategies}, Disturb()
-        for name, needed in needs.items():
-            if getattr(self, name) != getattr(usual, name) and needed not in met:
-                raise InputError(f"--{name.replace('_', '-')} without {needed}; expected it among those that are tried")
+    def study(self) -> DisturbedWalks:
+        """See `StudyCommand.study`.
 
-    def run(self) -> None:
-        """Disturb walks, write the results, and print."""
-        from hexmj.studies.disturbance.figure import disturbed_figure
-        from hexmj.studies.disturbance.frequencies import MEASURES
-
+        Raises:
+            InputError: options that would not be obeyed.
+        """
         if self.kinematic:
-            refuse_physical(Conditions.of(**self.conditions.flat()), self.controlled, "with --kinematic")
+            self.refuse_physical("with --kinematic")
         left_out = PHYSICAL if self.kinematic else ()
         study = DisturbedWalks(
             self.controlled.controller(self.model),
@@ -95,31 +71,41 @@ class Disturb:
             Acceleration(self.recovery, self.initial_velocity),
             self.adhesion,
             not self.kinematic,
-            self.starts,
-            self.walks.time,
-            self.walks.seed,
-            Conditions.of(**self.conditions.flat()),
-            self.walks.stride,
+            n_starts=self.starts,
+            window=self.walks.time,
+            seed=self.walks.seed,
+            conditions=self.conditions,
+            stride=self.walks.stride,
         )
-        self._check(study)
-        figures = {"disturb.png": disturbed_figure}
-        result, files = run_study(
-            study, "disturbing walks", self.out, self.sweepers, data="disturb.nc", figures=figures
-        )
-        if self.json:
-            print_json(lists_of(result.drop_dims("start")) | {"settings": result.attrs, "files": files})
-            return
-        found = ", ".join(f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
-        conditions = None if self.kinematic else self.conditions
-        show(
-            *(part for measure in MEASURES if measure in result for part in _tables(result, measure)),
-            "takes off: how much lower than without a strategy, on the same starts",
-            f"{study.controller.name}; {self.starts} starts whose plan is stable until it is disturbed, the first of"
-            f" {found}",
-            f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}; grasp {self.adhesion:g}",
-            conditions_line(self.walks, self.controlled, None, conditions),
-            *map(str, files),
-        )
+        met, usual = {*study.disturbances, *study.strategies}, Disturb()
+        for name, needed in NEEDS.items():
+            if getattr(self, name) != getattr(usual, name) and needed not in met:
+                raise InputError(f"--{name.replace('_', '-')} without {needed}; expected it among those that are tried")
+        return study
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.disturbance.figure import disturbed_figure
+
+        return Outputs("disturbing walks", "disturb.nc", {"disturb.png": disturbed_figure})
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """Everything over velocities and cases."""
+        return lists_of(result.drop_dims("start"))
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """Tables for every measure, how the starts were found, the strategies, and the conditions."""
+        from hexmj.studies.disturbance.frequencies import MEASURES
+
+        for measure in MEASURES:
+            if measure in result:
+                yield from _tables(result, measure)
+        found = (f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
+        starts = f"{self.starts} starts whose plan is stable until it is disturbed"
+        yield "takes off: how much lower than without a strategy, on the same starts"
+        yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
+        yield f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}; grasp {self.adhesion:g}"
+        yield self.conditions_line(physical=not self.kinematic)
 
 
 def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Accelerating, Controlled, ControllerName, Walks, Workers, refuse_physical
-from hexmj.cli.tables import conditions_line, new_table, physical_report, print_json, report_line, save_figure, show
-from hexmj.conditions import Conditions
+from hexmj.cli.command import WalkingCommand
+from hexmj.cli.options import ControllerName, Workers
+from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
 from hexmj.controllers.protocol import Controller
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Flss:
-    """FLSS of one controller over velocities, kinematic or physical."""
+class Flss(WalkingCommand):
+    """Options of `hexmj flss`, which `main.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -31,13 +31,7 @@ class Flss:
     """Number of random starts; 7000 unless given (seven samples of 1000, as in the paper), 200 if physical."""
     out: Path | None = None
     """Folder for figure, NetCDF and manifest; none are written unless given."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
     @property
     def kind(self) -> str:
@@ -52,7 +46,7 @@ class Flss:
     def run(self) -> None:
         """Measure, write what is asked for, and print."""
         if not self.physical:
-            refuse_physical(self.conditions, self.controlled, "without --physical")
+            self.refuse_physical("without --physical")
         controller = self.controlled.controller(self.model)
         if self.out:
             results_folder(self.out, ("flss.nc", "flss.png", "manifest.json"))
@@ -61,14 +55,7 @@ class Flss:
         self._print(table, self._write(table, controller, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
-        how = {
-            "n_starts": self.n_starts,
-            "window": self.walks.time,
-            "seed": self.walks.seed,
-            "stride": self.walks.stride,
-            "acceleration": self.accelerating.procedure,
-            "threads": self.workers.threads,
-        }
+        how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.workers.threads}
         with progress_bar(f"{self.kind} FLSS") as progress:
             if self.physical:
                 from hexmj.measures.compare import physical_flss
@@ -99,7 +86,5 @@ class Flss:
         for v in table.velocity.values:
             one = table.sel(velocity=v)
             rows.add_row(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns))
-        conditions = self.conditions if self.physical else None
-        lines = [conditions_line(self.walks, self.controlled, self.accelerating.procedure, conditions)]
-        lines += [report_line(report)] if report else []
+        lines = [self.conditions_line(self.physical), *([report_line(report)] if report else [])]
         show(f"{self.kind} FLSS of {self.model}, {self.n_starts} starts", rows, *lines, *map(str, files))

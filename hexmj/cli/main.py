@@ -2,6 +2,7 @@
 
 import os
 import sys
+from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
 from operator import or_
@@ -11,27 +12,41 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
-from hexmj.cli.options import registry
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.replay.film.gl import drop_vain_wish
 
 ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice."
 
+AGAIN = "\n\nRepeat the command to go on with a {} that was stopped."
+
 COMMANDS = {
-    "compare": "Compare",
-    "flss": "Flss",
-    "walk": "Walk",
-    "render": "Render",
-    "search": "Search",
-    "reproduce": "Reproduce",
-    "converge": "Converge",
-    "terrain": "Terrain",
-    "map": "Map",
-    "disturb": "Disturb",
-    "check-controller": "CheckController",
-    "doctor": "Doctor",
+    "compare": "Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait"
+    f" video.{AGAIN.format('run')}",
+    "flss": "FLSS of one controller over velocities, kinematic or physical.",
+    "walk": "One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF).",
+    "render": "A gait video, from recordings or from a walk that is recorded first.",
+    "search": "Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with"
+    f" many.{AGAIN.format('search')}",
+    "reproduce": "The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms,"
+    f" footfall diagrams.{AGAIN.format('run')}",
+    "converge": "The same starts at smaller and smaller V_p: does the insect tend to its plan and to the static"
+    f" criterion?{AGAIN.format('run')}",
+    "terrain": "Steps, gaps, hurdles and rough ground in physics: how often the insect falls once it has reached"
+    f" one.{AGAIN.format('run')}",
+    "map": f"Physical FLSS over the velocity and one condition, and why starts fall or do not.{AGAIN.format('run')}",
+    "disturb": "Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies"
+    f" buy.{AGAIN.format('run')}",
+    "check-controller": "Does a controller keep the protocol?  A check that fails says in a sentence what is wrong;"
+    " exit code 1 then.",
+    "doctor": "Checks of this machine, each with a remedy where it fails; exit code 1 if one does.",
 }
-"""Name of a command -> the class of its options, in a module of the command's name, with a method `run`."""
+"""Name of a command -> what it does.  Its options are a class with a method `run`: `CheckController` of the module
+`check_controller`."""
+
+
+@dataclass(frozen=True)
+class _Listed:
+    """Stands for the options of a command that is only listed."""
 
 
 def main() -> None:
@@ -56,16 +71,27 @@ def main() -> None:
 
 
 def _options(words: list[str]) -> Any:
-    """The options of the command that is asked for; no other is imported then."""
-    how: Any = {"registry": registry, "config": (FlagCreatePairsOff,)}
+    """The options of the command that is asked for; no other is imported then, and none that are only listed."""
+    how: Any = {"config": (FlagCreatePairsOff,)}
+    listed = words in (["--help"], ["-h"])
+    if not listed:
+        from hexmj.cli.options import registry
+
+        how["registry"] = registry
     if words and words[0] in COMMANDS:
-        return tyro.cli(_class(words[0]), prog=f"hexmj {words[0]}", args=words[1:], **how)
-    any_command: Any = reduce(or_, [Annotated[_class(name), subcommand(name)] for name in COMMANDS])
+        about = COMMANDS[words[0]]
+        return tyro.cli(_class(words[0]), prog=f"hexmj {words[0]}", description=about, args=words[1:], **how)
+    commands = [
+        Annotated[_Listed if listed else _class(name), subcommand(name, description=about)]
+        for name, about in COMMANDS.items()
+    ]
+    any_command: Any = reduce(or_, commands)
     return tyro.cli(any_command, prog="hexmj", description=ABOUT, args=words, **how)
 
 
 def _class(command: str) -> Any:
-    return getattr(import_module(f"hexmj.cli.{command.replace('-', '_')}"), COMMANDS[command])
+    module = import_module(f"hexmj.cli.{command.replace('-', '_')}")
+    return getattr(module, command.title().replace("-", ""))
 
 
 def _kept(error: SimulationError, out: Path | None) -> str:

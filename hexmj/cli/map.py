@@ -1,16 +1,15 @@
 """`hexmj map`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-from tyro.conf import Fixed, OmitArgPrefixes, Suppress
+from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Accelerating, Controlled, ControllerName, Sweepers, Walks
-from hexmj.cli.sweep import lists_of, run_study
-from hexmj.cli.tables import conditions_line, interval, new_table, print_json, show
-from hexmj.conditions import Conditions
+from hexmj.cli.options import Controlled, ControllerName, hiding
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import interval, new_table
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
 
@@ -26,15 +25,10 @@ DIFFERENCES = ("dynamics", "change")
 class _Controlled(Controlled):
     """A map refuses controllers that read the legs."""
 
-    feedback: Annotated[bool, Fixed, Suppress] = False
-
 
 @dataclass(frozen=True)
-class Map:
-    """Physical FLSS over the velocity and one condition, and why starts fall or do not.
-
-    Repeat the command to go on with a run that was stopped.
-    """
+class Map(StudyCommand):
+    """Options of `hexmj map`, which `main.COMMANDS` describes."""
 
     over: Over = StabilityMap.over
     """The condition that is varied."""
@@ -47,58 +41,47 @@ class Map:
     """Number of random starts, the same for every value and velocity."""
     out: Path = Path("results/map")
     """Folder for figures, NetCDF, manifest and finished walks."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[_Controlled] = field(default_factory=_Controlled)
-    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=lambda: hiding(_Controlled(), ["feedback"]))
 
-    def run(self) -> None:
-        """Walk over all values, write the results, and print."""
-        from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
-
-        study = StabilityMap(
+    def study(self) -> StabilityMap:
+        """See `StudyCommand.study`."""
+        return StabilityMap(
             self.controlled.controller(self.model),
             self.over,
             self.values,
             self.velocities,
-            self.starts,
-            self.walks.time,
-            self.walks.seed,
-            self.conditions,
-            self.walks.stride,
-            self.accelerating.procedure,
+            n_starts=self.starts,
+            conditions=self.conditions,
+            **self.walked,
         )
-        result, files = run_study(
-            study, f"walking over {self.over}", self.out, self.sweepers,
-            data=f"{self.over}.nc",
-            figures={f"{self.over}.png": map_figure, f"{self.over}-mechanisms.png": mechanisms_figure},
-            manifest=f"{self.over}-manifest.json",
-        )  # fmt: skip
-        if self.json:
-            lists = lists_of(result.drop_dims("start")) | {"starts": result.sizes["start"]}
-            print_json(lists | {"settings": result.attrs, "files": files})
-            return
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
+
+        figures = {f"{self.over}.png": map_figure, f"{self.over}-mechanisms.png": mechanisms_figure}
+        return Outputs(f"walking over {self.over}", f"{self.over}.nc", figures, f"{self.over}-manifest.json")
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """Everything over values and velocities."""
+        return lists_of(result.drop_dims("start")) | {"starts": result.sizes["start"]}
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """The measures, what differs between them, the mechanisms, and the conditions."""
         measures, differences = _tables(result)
-        stand = ", ".join(
-            f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True)
-        )
-        show(
-            f"{study.controller.name} over {self.over}: FLSS, with 95 % intervals",
-            measures,
+        yield f"{self.controlled.controller(self.model).name} over {self.over}: FLSS, with 95 % intervals"
+        yield measures
+        yield (
             "Saved: of the starts that are statically lost, those that do not fall; dynamics: physical less static"
-            f" FLSS; change: physical FLSS less that at {self.over} = {result.attrs['reference']:g}",
-            differences,
-            f"Why they fall or do not, numbers of starts at each {self.over}",
-            _reasons(result),
-            f"{result.sizes['start']} of {self.starts} starts, which stand on six feet at every value ({stand})",
-            conditions_line(
-                self.walks, self.controlled, self.accelerating.procedure, self.conditions, varied=(self.over,)
-            ),
-            *map(str, files),
+            f" FLSS; change: physical FLSS less that at {self.over} = {result.attrs['reference']:g}"
         )
+        yield differences
+        yield f"Why they fall or do not, numbers of starts at each {self.over}"
+        yield _reasons(result)
+        stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
+        starts = f"{result.sizes['start']} of {self.starts} starts"
+        yield f"{starts}, which stand on six feet at every value ({', '.join(stand)})"
+        yield self.conditions_line(varied=[self.over])
 
 
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":

@@ -6,8 +6,8 @@ Each command is a frozen dataclass made of these parts, and offers just the opti
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Annotated, Any, get_type_hints
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
+from typing import Annotated, Any, TypeVar, cast, get_type_hints
 
 from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
 from tyro.constructors import (
@@ -159,24 +159,6 @@ class Sweepers:
             yield executor
 
 
-def refuse_physical(conditions: Conditions, controlled: Controlled, reason: str, obeyed: Collection[str] = ()) -> None:
-    """Refuse what only a body obeys, where none walks.
-
-    Args:
-        conditions: as given on the command line.
-        controlled: may ask for feedback.
-        reason: why no body walks, such as 'without --physical'.
-        obeyed: names of conditions that are obeyed nevertheless.
-
-    Raises:
-        InputError: a condition that is not the usual one, or feedback.
-    """
-    given = [name for name in changed(conditions, Conditions()) if name not in obeyed]
-    given += ["feedback"] if controlled.feedback else []
-    if given:
-        raise InputError(f"--{given[0].replace('_', '-')} {reason}; expected it only where the insect walks in physics")
-
-
 def changed(given: Any, usual: Any) -> Iterator[str]:
     """Names of the options, of their parts too, that are not as usual; both are of one dataclass."""
     for name in (one.name for one in fields(given)):
@@ -186,6 +168,7 @@ def changed(given: Any, usual: Any) -> Iterator[str]:
 
 
 registry = ConstructorRegistry()
+"""How types of this package are read."""
 
 
 @registry.primitive_rule
@@ -206,15 +189,35 @@ def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometr
 @registry.struct_rule
 def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
     """On the command line conditions are given one by one, and hold for the stick insect."""
-    if not (isinstance(info.type, type) and issubclass(info.type, Conditions)):
+    if info.type is not Conditions:
         return None
-    usual = info.default if isinstance(info.default, info.type) else info.type()
-    hints = get_type_hints(info.type, include_extras=True)
-    parts = [one.name for one in fields(info.type) if one.name != "body"]
+    usual = info.default if isinstance(info.default, Conditions) else Conditions()
+    hints = get_type_hints(Conditions, include_extras=True)
+    parts = [one.name for one in fields(Conditions) if one.name != "body"]
+
+    def conditions(**given: Any) -> Conditions:
+        return Conditions.of(**{name: value for part in given.values() for name, value in asdict(part).items()})
+
     return StructConstructorSpec(
-        info.type, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
+        conditions, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
     )
 
 
-Hidden = Annotated[float, Fixed, Suppress]
-"""An option that a command does not offer: a field of a subclass of one of these parts, which keeps its default."""
+Options = TypeVar("Options")
+
+
+def hiding(usual: Options, names: Collection[str]) -> Options:
+    """Options to begin with, of which a command does not offer some, those of parts too: these keep their values."""
+    whole, base = cast(Any, usual), type(usual)
+    values = {one.name: getattr(usual, one.name) for one in fields(whole)}
+    parts = {name: hiding(value, names) for name, value in values.items() if is_dataclass(value) and name != "body"}
+    if isinstance(usual, Conditions):
+        return replace(usual, **parts)
+    hidden = [(name, Annotated[type(values[name]), Fixed, Suppress], values[name]) for name in names if name in values]
+    namespace = {"__doc__": usual.__doc__}
+    kind = make_dataclass(base.__name__, hidden, bases=(base,), namespace=namespace, frozen=True) if hidden else base
+    return kind(**values | parts)
+
+
+STEADY = hiding(Accelerating(), ["acceleration", "initial_velocity"])
+"""Of commands whose walks do not accelerate."""

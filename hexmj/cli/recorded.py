@@ -4,26 +4,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.options import Walks
-from hexmj.conditions import Conditions
+from hexmj.cli.command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.progress import progress_bar
-from hexmj.timing import Acceleration, observation_time
+from hexmj.timing import observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def recorded(
+    command: WalkingCommand,
     controller: Controller,
     velocity: float,
     start: int,
-    walks: Walks,
-    acceleration: Acceleration | None,
-    conditions: Conditions,
     *,
-    physical: bool,
+    physical: bool = True,
     title: str,
     threads: int | None = None,
 ) -> "xr.Dataset":
@@ -35,14 +32,15 @@ def recorded(
 
     if start < 0:
         raise InputError(f"start = {start}; expected at least 0")
-    starts = draw_starts(start + 1, walks.seed, walks.stride)[start:]
-    time = float(observation_time(walks.time, np.array(velocity), walks.stride, acceleration))
-    how: Any = {"stride": walks.stride, "acceleration": acceleration, "threads": threads}
+    stride, acceleration = command.walks.stride, command.accelerating.procedure
+    starts = draw_starts(start + 1, command.walks.seed, stride)[start:]
+    time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
+    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     if not physical:
-        return record_plan(walk(starts, controller, velocity, time, **how), conditions, walks.stride, title=title)
+        return record_plan(walk(starts, controller, velocity, time, **how), command.conditions, stride, title=title)
     with progress_bar("walking") as progress:
-        walked = physical_walk(starts, controller, velocity, time, conditions=conditions, progress=progress, **how)
-    return record(walked, title=title)
+        how |= {"conditions": command.conditions, "progress": progress}
+        return record(physical_walk(starts, controller, velocity, time, **how), title=title)
 
 
 def walk_summary(walked: "xr.Dataset") -> dict[str, Any]:

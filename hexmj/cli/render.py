@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from tyro.conf import OmitArgPrefixes, Positional
 
-from hexmj.cli.options import Accelerating, Controlled, ControllerName, Walks, Workers, changed
+from hexmj.cli.command import WalkingCommand
+from hexmj.cli.options import ControllerName, Workers, changed
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, show
-from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
 from hexmj.progress import progress_bar
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Render:
-    """A gait video, from recordings or from a walk that is recorded first."""
+class Render(WalkingCommand):
+    """Options of `hexmj render`, which `main.COMMANDS` describes."""
 
     recordings: Positional[tuple[Path, ...]] = ()
     """One recording, or two for side by side (recording.nc of `hexmj walk`); none: record a physical walk first, to
@@ -36,14 +36,8 @@ class Render:
     """Which of the seed's random starts."""
     out: Path = Path("results/render")
     """Folder for the video and its recordings."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
     film: OmitArgPrefixes[Film] = field(default_factory=Film)
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
     def run(self) -> None:
         """Record if there is nothing to render yet, then render from the recordings."""
@@ -77,7 +71,7 @@ class Render:
         """Refuse options that would not be obeyed."""
         if len(self.recordings) > 2:
             raise InputError(f"{len(self.recordings)} recordings were given; expected one, or two for side by side")
-        obeyed = Render(self.recordings, out=self.out, json=self.json, film=self.film)
+        obeyed = Render(recordings=self.recordings, out=self.out, json=self.json, film=self.film)
         if self.recordings and (names := list(changed(self, obeyed))):
             raise InputError(
                 f"--{names[0].replace('_', '-')} was given with recordings; expected a second recording for side by"
@@ -93,10 +87,7 @@ class Render:
             first, title, _ = walked[0]
             walked.insert(0, (first, f"{title}, planned", False))
         shown = [
-            recorded(
-                one, self.velocity, self.start, self.walks, self.accelerating.procedure, self.conditions,
-                physical=physical, title=title, threads=self.workers.threads,
-            )
+            recorded(self, one, self.velocity, self.start, physical=physical, title=title, threads=self.workers.threads)
             for one, title, physical in walked
-        ]  # fmt: skip
+        ]
         return shown, [save_recording(one, out / f"recording-{i + 1}.nc") for i, one in enumerate(shown)]

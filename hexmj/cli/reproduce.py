@@ -12,10 +12,7 @@ from hexmj.progress import progress_bar
 
 @dataclass(frozen=True)
 class Reproduce:
-    """The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms, footfall diagrams.
-
-    Repeat the command to go on with a run that was stopped.
-    """
+    """Options of `hexmj reproduce`, which `main.COMMANDS` describes."""
 
     quick: bool = False
     """Fewer starts and velocities, under a minute; the full protocol takes several."""

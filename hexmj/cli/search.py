@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Accelerating, Controlled, Walks, Workers, refuse_physical
-from hexmj.cli.tables import conditions_line, interval, new_table, print_json, save_figure, show
-from hexmj.conditions import Conditions
+from hexmj.cli.command import WalkingCommand
+from hexmj.cli.options import Workers
+from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest, write_whole
@@ -28,11 +28,8 @@ KEPT = "evaluations"
 
 
 @dataclass(frozen=True)
-class Search:
-    """Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with many.
-
-    Repeat the command to go on with a search that was stopped.
-    """
+class Search(WalkingCommand):
+    """Options of `hexmj search`, which `main.COMMANDS` describes."""
 
     form: str = "ldvs"
     """Nine parameters (hws), ten with a neutral position that depends on the velocity (ldvs), or 29, in which only
@@ -68,13 +65,7 @@ class Search:
     """Seed of the fresh starts; another than --seed."""
     out: Path = Path("results/search")
     """Folder for what was found (TOML), the history (NetCDF), a figure, a manifest and all evaluations."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
     def run(self) -> None:
         """Search, judge what was found on fresh starts, write and print."""
@@ -108,7 +99,7 @@ class Search:
     def _check(self) -> None:
         """Refuse what makes no sense together, or would not be obeyed."""
         if not self.physical:
-            refuse_physical(self.conditions, self.controlled, "without --physical")
+            self.refuse_physical("without --physical")
         if self.verdict_seed == self.walks.seed:
             raise InputError(f"--verdict-seed = {self.verdict_seed} is also --seed; expected another, for fresh starts")
         if self.velocity is not None and self.velocities is not None:
@@ -223,7 +214,7 @@ class Search:
             judged,
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
             f" least cost {found.cost:.4g}",
-            conditions_line(self.walks, self.controlled, self.accelerating.procedure, problem.conditions),
+            self.conditions_line(self.physical),
             *map(str, files),
         )
 

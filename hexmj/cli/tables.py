@@ -3,18 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.options import Controlled, Walks
-from hexmj.conditions import Conditions
 from hexmj.results import json_text, write_whole
-from hexmj.timing import Acceleration
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
     from rich.table import Table
-
-TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
-"""Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
 
 
 def physical_report(result: "xr.Dataset") -> dict[str, float]:
@@ -32,26 +26,6 @@ def physical_report(result: "xr.Dataset") -> dict[str, float]:
 
 def report_line(report: dict[str, float]) -> str:
     return "; ".join(f"{key}: {value:{'.3g' if isinstance(value, float) else ''}}" for key, value in report.items())
-
-
-def conditions_line(
-    walks: Walks,
-    controlled: Controlled,
-    acceleration: Acceleration | None = None,
-    conditions: Conditions | None = None,
-    varied: tuple[str, ...] = (),
-) -> str:
-    """What stands beside every measure, in a line: conditions of physical walks, but for those that were `varied`."""
-    line = f"window {walks.window} (t in time units); seed {walks.seed}"
-    if acceleration:
-        line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
-    line += f"; order {controlled.order}" if controlled.order else ""
-    line += "; feedback" if controlled.feedback else ""
-    if conditions:
-        values, usual = conditions.flat(), Conditions().flat()
-        shown = (key for key in values if (key in TOLD or values[key] != usual[key]) and key not in varied)
-        line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
-    return line
 
 
 def interval(one: "xr.Dataset", measure: str) -> str:

@@ -1,16 +1,16 @@
 """`hexmj terrain`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-from tyro.conf import Fixed, OmitArgPrefixes, Suppress
+from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Controlled, ControllerName, Hidden, Sweepers, Walks
-from hexmj.cli.sweep import run_study
-from hexmj.cli.tables import conditions_line, interval, new_table, print_json, show
-from hexmj.conditions import Conditions, FootContact, Ground, GroundKind
+from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import interval, new_table
+from hexmj.conditions import Conditions, Ground
 from hexmj.studies.terrain import study as terrain
 from hexmj.studies.terrain.study import FARTHER, VARIED, ObstacleKind
 
@@ -26,38 +26,23 @@ TABLED = ("flss", "flss_low", "flss_high", "reached", "crossed")
 class _Walks(Walks):
     """Each start walks a distance instead of a time."""
 
-    window: Annotated[str, Fixed, Suppress] = Walks.window
-
-
-@dataclass(frozen=True)
-class _Contact(FootContact):
-    grasp: Hidden = FootContact.grasp
-
 
 @dataclass(frozen=True)
 class _Ground(Ground):
-    ground: Annotated[GroundKind, Fixed, Suppress] = Ground.ground
-    ground_height: Hidden = Ground.ground_height
+    """What lies ahead, beside the lists."""
+
     ground_at: float = FARTHER.ground.ground_at
     """Where obstacles begin, ahead of O at the start [mm]."""
     ground_length: float = Ground.ground_length
     """Length of hurdles along the way [mm]."""
 
 
-@dataclass(frozen=True)
-class _Conditions(Conditions):
-    """All but those that are given as lists."""
-
-    contact: OmitArgPrefixes[_Contact] = field(default_factory=_Contact)
-    ground: OmitArgPrefixes[_Ground] = field(default_factory=_Ground)
+_CONDITIONS = replace(FARTHER, ground=_Ground())
 
 
 @dataclass(frozen=True)
-class Terrain:
-    """Steps, gaps, hurdles and rough ground in physics: how often the insect falls once it has reached one.
-
-    Repeat the command to go on with a run that was stopped.
-    """
+class Terrain(StudyCommand):
+    """Options of `hexmj terrain`, which `main.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: Sequence[float] = terrain.Terrain.velocities
@@ -73,46 +58,44 @@ class Terrain:
     starts: int = terrain.Terrain.n_starts
     """Number of random starts, the same for every obstacle."""
     out: Path = Path("results/terrain")
-    """Folder for figure, NetCDF, manifest and finished walks."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[_Walks] = field(default_factory=_Walks)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
-    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
-    conditions: OmitArgPrefixes[_Conditions] = field(default_factory=_Conditions)
+    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: hiding(_Walks(), ["window"]))
+    accelerating: OmitArgPrefixes[Accelerating] = STEADY
+    conditions: OmitArgPrefixes[Conditions] = field(
+        default_factory=lambda: hiding(replace(FARTHER, ground=_Ground()), VARIED)
+    )
 
-    def run(self) -> None:
-        """Walk to the obstacles, write the results, and print."""
-        from hexmj.studies.terrain.figure import terrain_figure
-
-        study = terrain.Terrain(
+    def study(self) -> terrain.Terrain:
+        """See `StudyCommand.study`."""
+        return terrain.Terrain(
             self.controlled.controller(self.model),
             self.velocities,
             self.grounds,
             self.heights,
             self.lengths,
             self.grasps,
-            self.starts,
-            self.walks.seed,
-            Conditions.of(**self.conditions.flat()),
-            self.walks.stride,
+            n_starts=self.starts,
+            seed=self.walks.seed,
+            conditions=self.conditions,
+            stride=self.walks.stride,
         )
-        figures = {"terrain.png": terrain_figure}
-        result, files = run_study(
-            study, "walking to obstacles", self.out, self.sweepers, data="terrain.nc", figures=figures
-        )
-        if self.json:
-            lists = {str(name): result[name].values.tolist() for name in (*result.coords, *TABLED)}
-            print_json(lists | {"settings": result.attrs, "files": files})
-            return
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.terrain.figure import terrain_figure
+
+        return Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """Every obstacle, grasp and velocity."""
+        return lists_of(result[list(TABLED)])
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """A table of the obstacles, and the conditions."""
+        name = self.controlled.controller(self.model).name
+        yield f"{name}, {self.starts} starts: FLSS once the obstacle has been reached, with 95 % intervals"
+        yield _table(result, self.conditions.body.trunk)
         walks = replace(self.walks, window=f"{result.attrs['distance']:g} / V")
-        show(
-            f"{study.controller.name}, {self.starts} starts: FLSS once the obstacle has been reached, with 95 %"
-            " intervals",
-            _table(result, self.conditions.body.trunk),
-            conditions_line(walks, self.controlled, None, self.conditions, varied=tuple(VARIED)),
-            *map(str, files),
-        )
+        yield replace(self, walks=walks).conditions_line(varied=VARIED)
 
 
 def _table(result: "xr.Dataset", trunk: tuple[str, ...]) -> "Table":

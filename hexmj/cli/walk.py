@@ -2,13 +2,15 @@
 
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.options import Accelerating, Controlled, ControllerName, Walks, Workers, refuse_physical
+from hexmj.cli.command import WalkingCommand
+from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.recorded import recorded, walk_summary
-from hexmj.cli.tables import conditions_line, print_json, save_figure, short, show
-from hexmj.conditions import Conditions, FootPath, TimeScale
+from hexmj.cli.tables import print_json, save_figure, short, show
+from hexmj.conditions import FootPath, TimeScale
 from hexmj.results import results_folder, save_manifest
 
 SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part))
@@ -16,8 +18,8 @@ SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part)
 
 
 @dataclass(frozen=True)
-class Walk:
-    """One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF)."""
+class Walk(WalkingCommand):
+    """Options of `hexmj walk`, which `main.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocity: float = 0.3
@@ -28,13 +30,7 @@ class Walk:
     """Which of the seed's random starts."""
     out: Path = Path("results/walk")
     """Folder for the results."""
-    json: bool = False
-    """Print one JSON object on standard output, nothing else."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
-    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
     def run(self) -> None:
         """Walk, and write recording, figure and manifest."""
@@ -43,17 +39,14 @@ class Walk:
         from hexmj.replay.recording import save_recording
 
         if not self.physical:
-            refuse_physical(self.conditions, self.controlled, "without --physical", SHOWN)
-        controller, acceleration = self.controlled.controller(self.model), self.accelerating.procedure
+            self.refuse_physical("without --physical", SHOWN)
+        controller = self.controlled.controller(self.model)
         out = results_folder(self.out, ("recording.nc", "walk.png", "manifest.json"))
         title = f"{controller.name}, V = {self.velocity:g}"
-        walked = recorded(
-            controller, self.velocity, self.start, self.walks, acceleration, self.conditions,
-            physical=self.physical, title=title, threads=self.workers.threads,
-        )  # fmt: skip
+        how: Any = {"physical": self.physical, "threads": self.workers.threads}
+        walked = recorded(self, controller, self.velocity, self.start, title=title, **how)
         manifest = {"velocity": self.velocity, "start": self.start, "physical": self.physical}
-        manifest |= settings({self.model: controller}, self.walks.time, self.start + 1, self.walks.seed,
-                             self.walks.stride, acceleration)  # fmt: skip
+        manifest |= settings({self.model: controller}, n_starts=self.start + 1, **self.walked)
         manifest |= {"conditions": asdict(self.conditions)}
         files = [
             save_recording(walked, out / "recording.nc"),
@@ -65,7 +58,4 @@ class Walk:
             print_json(summary | {"settings": manifest, "files": files})
         else:
             lines = [f"{key}: {short(value)}" for key, value in summary.items()]
-            line = conditions_line(
-                self.walks, self.controlled, acceleration, self.conditions if self.physical else None
-            )
-            show(title, *lines, line, *map(str, files))
+            show(title, *lines, self.conditions_line(self.physical), *map(str, files))

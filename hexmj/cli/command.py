@@ -1,0 +1,65 @@
+"""What commands that walk have in common: the options of the walks, and the line that tells them."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+from tyro.conf import OmitArgPrefixes
+
+from hexmj.cli.options import Accelerating, Controlled, Walks, changed
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError
+
+TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
+"""Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
+
+
+@dataclass(frozen=True)
+class WalkingCommand:
+    """Base of the commands that walk."""
+
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    walks: OmitArgPrefixes[Walks] = field(default_factory=Walks)
+    accelerating: OmitArgPrefixes[Accelerating] = field(default_factory=Accelerating)
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=Controlled)
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
+
+    @property
+    def walked(self) -> dict[str, Any]:
+        """How walks go, as measures and studies are told: window, seed, stride and acceleration."""
+        return {
+            "window": self.walks.time,
+            "seed": self.walks.seed,
+            "stride": self.walks.stride,
+            "acceleration": self.accelerating.procedure,
+        }
+
+    def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
+        """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
+        line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
+        if acceleration := self.accelerating.procedure:
+            line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
+        line += f"; order {self.controlled.order}" if self.controlled.order else ""
+        line += "; feedback" if self.controlled.feedback else ""
+        if physical:
+            values, usual = self.conditions.flat(), Conditions().flat()
+            shown = (key for key in values if (key in TOLD or values[key] != usual[key]) and key not in varied)
+            line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
+        return line
+
+    def refuse_physical(self, reason: str, obeyed: Collection[str] = ()) -> None:
+        """Refuse what only a body obeys, where none walks.
+
+        Args:
+            reason: why no body walks, such as 'without --physical'.
+            obeyed: names of conditions that are obeyed nevertheless.
+
+        Raises:
+            InputError: a condition that is not the usual one, or feedback.
+        """
+        given = [name for name in changed(self.conditions, Conditions()) if name not in obeyed]
+        given += ["feedback"] if self.controlled.feedback else []
+        if given:
+            name = given[0].replace("_", "-")
+            raise InputError(f"--{name} {reason}; expected it only where the insect walks in physics")

@@ -1,0 +1,87 @@
+"""What commands that conduct a study have in common: walk with a progress bar, keep what is finished, write, print."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tyro.conf import OmitArgPrefixes
+
+from hexmj.cli.command import WalkingCommand
+from hexmj.cli.options import Sweepers
+from hexmj.cli.tables import print_json, save_figure, show
+from hexmj.progress import progress_bar
+from hexmj.results import results_folder, save_dataset, save_manifest
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from hexmj.sweeps import Study
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a study is written to."""
+
+    doing: str
+    """What the progress bar says meanwhile."""
+    data: str
+    """Name of the NetCDF file."""
+    figures: "Mapping[str, Callable[[xr.Dataset], Figure]]"
+    """By the names of their files."""
+    manifest: str = "manifest.json"
+    """Name of its file."""
+    others: tuple[str, ...] = ()
+    """Names of files that the command writes itself."""
+
+
+@dataclass(frozen=True)
+class StudyCommand(WalkingCommand):
+    """Base of the commands that conduct a study."""
+
+    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
+    out: Path = Path("results")
+    """Folder for figure, NetCDF, manifest and finished walks."""
+
+    def study(self) -> "Study":
+        """What is to be conducted; its cells name the function that walks."""
+        raise NotImplementedError
+
+    def outputs(self) -> Outputs:
+        """What is written."""
+        raise NotImplementedError
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """What is printed as JSON."""
+        raise NotImplementedError
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """What is printed otherwise: tables and lines."""
+        raise NotImplementedError
+
+    def write_others(self, result: "xr.Dataset") -> list[Path]:
+        """Write what else comes of the result; the files."""
+        return []
+
+    def run(self) -> None:
+        """Conduct the study in the folder, write its result, and print."""
+        from hexmj.sweeps import conduct
+
+        study, outputs = self.study(), self.outputs()
+        folder = results_folder(self.out, [outputs.data, *outputs.figures, outputs.manifest, *outputs.others])
+        with progress_bar(outputs.doing) as progress, self.sweepers.executor() as executor:
+            how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
+            result = conduct(study, folder / "walks", **how)
+        drawn = [save_figure(draw(result), folder / name) for name, draw in outputs.figures.items()]
+        written = save_dataset(result, folder / outputs.data), *drawn
+        files = [*written, save_manifest(result.attrs, folder / outputs.manifest), *self.write_others(result)]
+        if self.json:
+            print_json(self.summary(result) | {"files": files})
+        else:
+            show(*self.shown(result), *map(str, files))
+
+
+def lists_of(result: "xr.Dataset") -> dict[str, Any]:
+    """All coordinates and variables of a result as lists, and its settings, for JSON."""
+    return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": result.attrs}
