@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from hexmj import LDVS, Conditions, InputError, ReadsLegs, compare
 from hexmj.intervals import paired_difference
-from hexmj.studies.stability_map import walks
+from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
 from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
 from hexmj.studies.stability_map.study import CONDITIONS, StabilityMap
@@ -70,7 +70,7 @@ def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
 
 
 def test_same_bits_in_any_blocks_and_threads(result, monkeypatch):
-    monkeypatch.setattr(walks, "BLOCK", 5)
+    monkeypatch.setattr(fates, "BLOCK", 5)
     other = conduct(StabilityMap(LDVS, "vp", **SMALL), threads=1)
     assert other.drop_vars("speed").equals(result.drop_vars("speed"))
     assert_allclose(other.speed, result.speed, rtol=1e-14)  # a mean, summed in another order

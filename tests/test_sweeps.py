@@ -20,7 +20,7 @@ import xarray as xr
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.progress import Progress
-from hexmj.sweeps import Cell, Ledger, along, conduct, finish, run
+from hexmj.sweeps import Cell, KeptValues, conduct, finish, over_axes, run
 from hexmj.sweeps import code as sources
 from hexmj.sweeps.code import code
 from hexmj.sweeps.plain import plain
@@ -508,7 +508,7 @@ class Products:
         ]
 
     def result(self, data: Sequence[xr.Dataset]) -> xr.Dataset:
-        whole = along({"height": len(self.heights), "speed": len(self.speeds)}, data)
+        whole = over_axes({"height": len(self.heights), "speed": len(self.speeds)}, data)
         return whole.assign_coords(height=list(self.heights), speed=list(self.speeds))
 
 
@@ -549,8 +549,8 @@ def test_a_file_that_does_not_load_is_refused_in_one_sentence(tmp_path: Path, te
 # The evaluations of a search
 
 
-def ledger(tmp_path: Path, folder: Path | None = None) -> Ledger:
-    return Ledger(Cell("squares", squares, {"log": tmp_path}), folder or tmp_path / "kept")
+def ledger(tmp_path: Path, folder: Path | None = None) -> KeptValues:
+    return KeptValues(Cell("squares", squares, {"log": tmp_path}), folder or tmp_path / "kept")
 
 
 def test_a_ledger_computes_no_row_twice_and_gives_the_same_bits(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from hexmj.physics.settling import settle
 from hexmj.replay.film.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
 from hexmj.studies.terrain.figure import terrain_figure
-from hexmj.studies.terrain.study import Terrain, obstacles, reach
+from hexmj.studies.terrain.study import Terrain, reach
 from hexmj.sweeps import Cell, conduct
 
 GROUNDS = {
@@ -215,7 +215,8 @@ def test_the_command_offers_no_option_that_it_does_not_obey(run, tmp_path, optio
 
 
 def test_obstacles_have_their_names_and_sizes():
-    found = obstacles(Conditions(), ("gap", "hurdle"), (2.0,), (5.0,))
+    study = Terrain(LDVS, grounds=("gap", "hurdle"), heights=(2.0,), lengths=(5.0,), conditions=Conditions())
+    found = study.obstacles
     assert list(found) == ["flat", "gap 5 mm", "hurdle 2 mm"]
     assert found["gap 5 mm"] == Conditions.of(ground="gap", ground_length=5.0)
     assert found["hurdle 2 mm"] == Conditions.of(ground="hurdle", ground_height=2.0)

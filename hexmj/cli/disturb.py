@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, new_table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
@@ -88,10 +88,6 @@ class Disturb(StudyCommand):
         from hexmj.studies.disturbance.figure import disturbed_figure
 
         return Outputs("disturbing walks", "disturb.nc", {"disturb.png": disturbed_figure})
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """Everything over velocities and cases."""
-        return lists_of(result.drop_dims("start"))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """Tables for every measure, how the starts were found, the strategies, and the conditions."""

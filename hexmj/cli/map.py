@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Controlled, ControllerName, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, new_table
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
@@ -63,8 +63,8 @@ class Map(StudyCommand):
         return Outputs(f"walking over {self.over}", f"{self.over}.nc", figures, f"{self.over}-manifest.json")
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """Everything over values and velocities."""
-        return lists_of(result.drop_dims("start")) | {"starts": result.sizes["start"]}
+        """Everything over values and velocities, and how many starts stand at all of them."""
+        return super().summary(result) | {"starts": result.sizes["start"]}
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The measures, what differs between them, the mechanisms, and the conditions."""

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import dataclass, field
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -71,6 +70,7 @@ class Search(WalkingCommand):
         """Search, judge what was found on fresh starts, write and print."""
         from hexmj.search.problems import Sample
         from hexmj.search.stages import search
+        from hexmj.sweeps.plain import plain
 
         self._check()
         problem, effort = self._problem(), self._effort()
@@ -82,7 +82,7 @@ class Search(WalkingCommand):
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
         manifest = {
             "problem": problem.settings(),
-            "effort": effort.settings(),
+            "effort": plain(effort),
             "found": dict(zip(problem.form.names, found.vector.tolist(), strict=True)),
             "verdict_starts": fresh.n_starts,
             "verdict_seed": self.verdict_seed,
@@ -110,13 +110,9 @@ class Search(WalkingCommand):
     def _problem(self) -> "Problem":
         from hexmj.search.problems import Problem
 
-        v = 0.3 if self.velocity is None else self.velocity
-        low, high = self.velocities or (v, v)
+        how = {name: value for name, value in self.walked.items() if name != "seed"}
         conditions = self.conditions if self.physical else None
-        return Problem(
-            self._form(), low, high, self.walks.time, self.walks.stride, self.accelerating.procedure, conditions,
-            self.controlled.feedback,
-        )  # fmt: skip
+        return Problem(self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback)
 
     def _form(self) -> "Form":
         from hexmj.controllers.named import load_controller
@@ -136,15 +132,12 @@ class Search(WalkingCommand):
         from hexmj.controllers.named import load_controller
         from hexmj.search.stages import Effort
 
+        same = "algorithm", "population", "domain", "budget", "refine_budget"
         return Effort(
-            algorithm=self.algorithm,
-            population=self.population,
-            domain=self.domain,
+            **{name: getattr(self, name) for name in same},
             begin=load_controller(self.begin) if self.begin else None,
             starts=self._size(self.starts, 500, 50),
-            budget=self.budget,
             refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
-            refine_budget=self.refine_budget,
             seed=self.walks.seed,
         )
 
@@ -164,9 +157,14 @@ class Search(WalkingCommand):
         return "physical" if self.physical else "kinematic"
 
     @property
-    def _title(self) -> str:
+    def _range(self) -> tuple[float, float]:
         v = 0.3 if self.velocity is None else self.velocity
-        at = f"V from {self.velocities[0]:g} to {self.velocities[1]:g}" if self.velocities else f"V = {v:g}"
+        return self.velocities or (v, v)
+
+    @property
+    def _title(self) -> str:
+        low, high = self._range
+        at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
         method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
         return f"{self.form}, {self._kind} FLSS at {at}, {method}"
 
@@ -221,9 +219,9 @@ class Search(WalkingCommand):
 
 def _judged(verdict: "xr.Dataset") -> dict[str, Any]:
     """FLSS and its interval by controller and window."""
-    places = product(verdict.controller.values.tolist(), verdict.window.values.tolist())
-    judged: dict[str, Any] = {}
-    for name, window in places:
-        one = verdict.sel(controller=name, window=window)
-        judged.setdefault(name, {})[window] = {str(key): values.item() for key, values in one.items()}
-    return judged
+
+    def one(name: str, window: str) -> dict[str, float]:
+        return {str(key): values.item() for key, values in verdict.sel(controller=name, window=window).items()}
+
+    windows = verdict.window.values.tolist()
+    return {name: {window: one(name, window) for window in windows} for name in verdict.controller.values.tolist()}

@@ -12,12 +12,11 @@ from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest
+from hexmj.sweeps import Study, conduct
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-    from hexmj.sweeps import Study
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class StudyCommand(WalkingCommand):
     out: Path = Path("results")
     """Folder for figure, NetCDF, manifest and finished walks."""
 
-    def study(self) -> "Study":
+    def study(self) -> Study:
         """What is to be conducted; its cells name the function that walks."""
         raise NotImplementedError
 
@@ -53,8 +52,8 @@ class StudyCommand(WalkingCommand):
         raise NotImplementedError
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """What is printed as JSON."""
-        raise NotImplementedError
+        """What is printed as JSON: everything but the single starts."""
+        return lists_of(result.drop_dims("start"))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """What is printed otherwise: tables and lines."""
@@ -66,16 +65,17 @@ class StudyCommand(WalkingCommand):
 
     def run(self) -> None:
         """Conduct the study in the folder, write its result, and print."""
-        from hexmj.sweeps import conduct
-
         study, outputs = self.study(), self.outputs()
         folder = results_folder(self.out, [outputs.data, *outputs.figures, outputs.manifest, *outputs.others])
         with progress_bar(outputs.doing) as progress, self.sweepers.executor() as executor:
             how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
             result = conduct(study, folder / "walks", **how)
-        drawn = [save_figure(draw(result), folder / name) for name, draw in outputs.figures.items()]
-        written = save_dataset(result, folder / outputs.data), *drawn
-        files = [*written, save_manifest(result.attrs, folder / outputs.manifest), *self.write_others(result)]
+        files = [
+            save_dataset(result, folder / outputs.data),
+            *(save_figure(draw(result), folder / name) for name, draw in outputs.figures.items()),
+            save_manifest(result.attrs, folder / outputs.manifest),
+            *self.write_others(result),
+        ]
         if self.json:
             print_json(self.summary(result) | {"files": files})
         else:

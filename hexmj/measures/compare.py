@@ -14,7 +14,7 @@ from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw, draw_starts
-from hexmj.sweeps import Cell, How, along, conduct
+from hexmj.sweeps import Cell, Execution, conduct, over_axes
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Comparison:
         from hexmj.measures.kinematic import settings
 
         starts = draw_starts(self.n_starts, self.seed, self.stride)
-        table = along({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
+        table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
             **velocity_axis(*self.observed),
             controller=list(self.controllers),
             leg=list(LEGS),
@@ -104,7 +104,7 @@ def compare(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     folder: Path | None = None,
-    **how: Unpack[How],
+    **how: Unpack[Execution],
 ) -> "xr.Dataset":
     """Kinematic, measured and physical FLSS of one or more controllers over velocities, on the same starts.
 
@@ -119,7 +119,7 @@ def compare(
         stride: of the plans.
         acceleration: of Eq. 11.
         folder: keeps what is finished, for a run that was stopped; None keeps nothing.
-        how: executor, threads and progress, see `sweeps.How`; the result does not depend on it.
+        how: executor, threads and progress, see `sweeps.Execution`; the result does not depend on it.
 
     Returns:
         Over (controller, velocity): the three FLSS with their 95 % Wilson intervals (`kinematic`,
@@ -148,7 +148,7 @@ def physical_flss(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     folder: Path | None = None,
-    **how: Unpack[How],
+    **how: Unpack[Execution],
 ) -> "xr.Dataset":
     """Physical FLSS: the frequency with which the trunk touches the ground; arguments and errors as of `compare`.
 

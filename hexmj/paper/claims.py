@@ -8,6 +8,7 @@ Rules were chosen from the paper's words, not from our numbers:
 - "about zero" is at most 0.01; "substantial" is a half; "drastically" is to a tenth.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from hexmj.paper.quantities import Lost, Named, Phase, Regime, Scatter, Weight
@@ -36,6 +37,16 @@ class Claim:
     def command(self) -> str:
         """Recomputes this row."""
         return f"hexmj reproduce --only {self.key}"
+
+
+def _both(
+    key: str, section: str, words: str, value: str, rule: Callable[[str], Rule], why: str = ""
+) -> tuple[Claim, ...]:
+    """The same claim of HWS and of LDVS, judged by the rule for each."""
+    models = {"hws": "HWS", "ldvs": "LDVS"}
+    return tuple(
+        Claim(f"{model}-{key}", section, f"{words}, {name}", value, rule(model), why) for model, name in models.items()
+    )
 
 
 SLOWLY = "the regimes become stable, but later: see the rows on limit regimes"
@@ -116,36 +127,23 @@ CLAIMS = (
         Band(Lost("ldvs", "hws"), (0.1, 0.5), most=0.0),
         "in the window start it is smaller up to V = 0.2 and no larger up to 0.35",
     ),
-    Claim("hws-slow", "5.2", "about zero at low V, HWS", "about 0", Band(Lost("hws"), (0.1, 0.1), most=ABOUT_ZERO)),
-    Claim("ldvs-slow", "5.2", "about zero at low V, LDVS", "about 0", Band(Lost("ldvs"), (0.1, 0.1), most=ABOUT_ZERO)),
-    Claim(
-        "hws-late", "5.2", "after five periods FLSS about zero up to V = 0.6, HWS", "about 0",
-        Band(Lost("hws late"), (0.1, 0.6), most=ABOUT_ZERO),
+    *_both(
+        "slow", "5.2", "about zero at low V", "about 0",
+        lambda model: Band(Lost(model), (0.1, 0.1), most=ABOUT_ZERO),
+    ),
+    *_both(
+        "late", "5.2", "after five periods FLSS about zero up to V = 0.6", "about 0",
+        lambda model: Band(Lost(f"{model} late"), (0.1, 0.6), most=ABOUT_ZERO),
         SLOWLY,
     ),
-    Claim(
-        "ldvs-late", "5.2", "after five periods FLSS about zero up to V = 0.6, LDVS", "about 0",
-        Band(Lost("ldvs late"), (0.1, 0.6), most=ABOUT_ZERO),
+    *_both(
+        "diminishes", "5.2", "after five periods FLSS diminishes drastically", "to a tenth",
+        lambda model: Band(Lost(f"{model} late", model, 0.1), (0.1, 0.6), most=0.0),
         SLOWLY,
     ),
-    Claim(
-        "hws-diminishes", "5.2", "after five periods FLSS diminishes drastically, HWS", "to a tenth",
-        Band(Lost("hws late", "hws", 0.1), (0.1, 0.6), most=0.0),
-        SLOWLY,
-    ),
-    Claim(
-        "ldvs-diminishes", "5.2", "after five periods FLSS diminishes drastically, LDVS", "to a tenth",
-        Band(Lost("ldvs late", "ldvs", 0.1), (0.1, 0.6), most=0.0),
-        SLOWLY,
-    ),
-    Claim(
-        "hws-regimes", "5.2", "no unstable limit regime up to V = 0.85, HWS", "none",
-        Band(Regime("hws", "unstable"), (0.1, 0.85), 0.0, 0.0),
-        UNSTABLE,
-    ),
-    Claim(
-        "ldvs-regimes", "5.2", "no unstable limit regime up to V = 0.85, LDVS", "none",
-        Band(Regime("ldvs", "unstable"), (0.1, 0.85), 0.0, 0.0),
+    *_both(
+        "regimes", "5.2", "no unstable limit regime up to V = 0.85", "none",
+        lambda model: Band(Regime(model, "unstable"), (0.1, 0.85), 0.0, 0.0),
         UNSTABLE,
     ),
     Claim(
@@ -156,30 +154,17 @@ CLAIMS = (
         "hws-accelerated", "5.2", "accelerated FLSS on [0.1, 0.9], HWS", "< 0.1",
         Band(Lost("hws accelerated"), (0.1, 0.9), most=0.1),
     ),
-    Claim(
-        "hws-periodic", "5.3", "only periodic oscillations, HWS", "all",
-        Band(Regime("hws", "aperiodic", accelerated=True), (0.1, 0.95), 0.0, 0.0),
+    *_both(
+        "periodic", "5.3", "only periodic oscillations", "all",
+        lambda model: Band(Regime(model, "aperiodic", accelerated=True), (0.1, 0.95), 0.0, 0.0),
     ),
-    Claim(
-        "ldvs-periodic", "5.3", "only periodic oscillations, LDVS", "all",
-        Band(Regime("ldvs", "aperiodic", accelerated=True), (0.1, 0.95), 0.0, 0.0),
+    *_both(
+        "one-period", "5.3", "the same period for all legs", "one period",
+        lambda model: Band(Scatter(model, "periods"), (0.1, 0.95), most=0.01),
     ),
-    Claim(
-        "hws-one-period", "5.3", "the same period for all legs, HWS", "one period",
-        Band(Scatter("hws", "periods"), (0.1, 0.95), most=0.01),
-    ),
-    Claim(
-        "ldvs-one-period", "5.3", "the same period for all legs, LDVS", "one period",
-        Band(Scatter("ldvs", "periods"), (0.1, 0.95), most=0.01),
-    ),
-    Claim(
-        "hws-peak", "5.3", "one narrow peak of phases for each pair, HWS", "one peak",
-        Band(Scatter("hws", "phases"), (0.1, 0.95), 0.0, 0.0),
-        COEXIST,
-    ),
-    Claim(
-        "ldvs-peak", "5.3", "one narrow peak of phases for each pair, LDVS", "one peak",
-        Band(Scatter("ldvs", "phases"), (0.1, 0.95), 0.0, 0.0),
+    *_both(
+        "peak", "5.3", "one narrow peak of phases for each pair", "one peak",
+        lambda model: Band(Scatter(model, "phases"), (0.1, 0.95), 0.0, 0.0),
         COEXIST,
     ),
     Claim(

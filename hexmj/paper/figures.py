@@ -3,7 +3,7 @@
 Each function takes the measurements it names (`hexmj.paper.reproduce.measure`) and returns a figure and the data in it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -37,45 +37,25 @@ CIRCLES: dict[str, Any] = {"color": UNCOORDINATED, "marker": "o", "markerfacecol
 BARS: dict[str, Any] = {"marker": "_", "markersize": 7, "markeredgewidth": 1.5}
 IDEALS: dict[str, Any] = {"color": IDEAL, "marker": "x", "linestyle": "none", "markersize": 6.5, "markeredgewidth": 1.5}
 
-
-def figure_2(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
-    """FLSS without coordination (circles) and with the set optimised for each velocity (bars)."""
-    return _flss_figure(
-        measured,
-        window,
-        {
-            "uncoordinated": ("no coordination", CIRCLES),
-            "ideal": ("HWS, optimised for each $V$", BARS | {"color": HWS}),
-        },
-    )
-
-
-def figure_3(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
-    """FLSS of the HWS set: the ideal (x), none (circles), Problem 2 (crosses), accelerated (bars)."""
-    return _flss_figure(
-        measured,
-        window,
-        {
-            "uncoordinated": ("no coordination", CIRCLES),
-            "hws": ("HWS", {"color": HWS, "marker": "+", "markersize": 9, "markeredgewidth": 1.5}),
-            "ideal": ("ideal", IDEALS),
-            "hws accelerated": ("HWS, accelerated", BARS | {"color": ACCELERATED}),
-        },
-    )
-
-
-def figure_4(measured: Measured, window: str) -> "tuple[Figure, xr.Dataset]":
-    """FLSS of the LDVS set: the ideal (x), none (circles), Problem 2 (bars), accelerated (stars)."""
-    return _flss_figure(
-        measured,
-        window,
-        {
-            "uncoordinated": ("no coordination", CIRCLES),
-            "ldvs": ("LDVS", BARS | {"color": LDVS}),
-            "ideal": ("ideal", IDEALS),
-            "ldvs accelerated": ("LDVS, accelerated", {"color": ACCELERATED, "marker": "*", "markersize": 9}),
-        },
-    )
+CURVES: dict[int, dict[str, tuple[str, dict[str, Any]]]] = {
+    2: {
+        "uncoordinated": ("no coordination", CIRCLES),
+        "ideal": ("HWS, optimised for each $V$", BARS | {"color": HWS}),
+    },
+    3: {
+        "uncoordinated": ("no coordination", CIRCLES),
+        "hws": ("HWS", {"color": HWS, "marker": "+", "markersize": 9, "markeredgewidth": 1.5}),
+        "ideal": ("ideal", IDEALS),
+        "hws accelerated": ("HWS, accelerated", BARS | {"color": ACCELERATED}),
+    },
+    4: {
+        "uncoordinated": ("no coordination", CIRCLES),
+        "ldvs": ("LDVS", BARS | {"color": LDVS}),
+        "ideal": ("ideal", IDEALS),
+        "ldvs accelerated": ("LDVS, accelerated", {"color": ACCELERATED, "marker": "*", "markersize": 9}),
+    },
+}
+"""Figures of FLSS: by their numbers, the measurements drawn, each with its label and the symbols of the paper."""
 
 
 def figure_5(measured: Measured) -> "tuple[Figure, xr.Dataset]":
@@ -144,13 +124,11 @@ def footfall_diagrams(measured: Measured, model: str) -> "tuple[Figure, xr.Datas
     return figure, data
 
 
-def _flss_figure(
-    measured: Measured, window: str, curves: Mapping[str, tuple[str, dict[str, Any]]]
-) -> "tuple[Figure, xr.Dataset]":
-    """FLSS against velocity: means of the samples of starts, error bars of one standard deviation over them."""
+def flss_figure(measured: Measured, number: int, window: str) -> "tuple[Figure, xr.Dataset]":
+    """Figs. 2-4, FLSS against velocity: means of the samples of starts, bars of one standard deviation over them."""
     import xarray as xr
 
-    figure = _figure(6.4, 4.6)
+    figure, curves = _figure(6.4, 4.6), CURVES[number]
     axes = figure.subplots()
     data = xr.concat(
         [_samples(measured[name].lost.sel(window=window)) for name in curves],
@@ -231,12 +209,8 @@ Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]
 
 FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{
-        f"figure-{number}-{window}": (("uncoordinated", "ideal", *names), partial(draw, window=window))
-        for number, draw, names in (
-            (2, figure_2, ()),
-            (3, figure_3, ("hws", "hws accelerated")),
-            (4, figure_4, ("ldvs", "ldvs accelerated")),
-        )
+        f"figure-{number}-{window}": (tuple(curves), partial(flss_figure, number=number, window=window))
+        for number, curves in CURVES.items()
         for window in WINDOWS
     },
     "figure-5": (("hws gaits",), figure_5),

@@ -78,23 +78,29 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Phase:
-    """Relative phases in the main peak of the accelerated gaits that are periodic and never lost static stability."""
+class _OfModel:
+    """Base of the quantities of a preset's gaits, for which no window matters."""
 
     model: str
-    pairs: Literal["ipsilateral", "contralateral"]
-    minus_wilson: bool = False
     windowed = False
-
-    @property
-    def words(self) -> str:
-        """For a rule's sentence."""
-        return f"{self.pairs} phase({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Measurements."""
         return (f"{self.model} gaits",)
+
+
+@dataclass(frozen=True)
+class Phase(_OfModel):
+    """Relative phases in the main peak of the accelerated gaits that are periodic and never lost static stability."""
+
+    pairs: Literal["ipsilateral", "contralateral"]
+    minus_wilson: bool = False
+
+    @property
+    def words(self) -> str:
+        """For a rule's sentence."""
+        return f"{self.pairs} phase({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
     def points(self, measured: Measured, window: str) -> Iterator[Point]:
         """One for each pair."""
@@ -106,13 +112,11 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Regime:
+class Regime(_OfModel):
     """Part of all starts whose limit regime is not as said, without acceleration or with it."""
 
-    model: str
     fault: Literal["aperiodic", "unstable"]
     accelerated: bool = False
-    windowed = False
 
     @property
     def words(self) -> str:
@@ -134,12 +138,10 @@ class Regime:
 
 
 @dataclass(frozen=True)
-class Scatter:
+class Scatter(_OfModel):
     """Spread of the accelerated gaits: of periods over legs, of phases over ipsilateral pairs or over starts."""
 
-    model: str
     of: Literal["periods", "pairs", "phases"]
-    windowed = False
 
     @property
     def words(self) -> str:
@@ -149,11 +151,6 @@ class Scatter:
         if self.of == "pairs":
             return f"largest - smallest phase of the ipsilateral pairs({self.model})"
         return f"part of starts outside the main peak of a pair({self.model})"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Measurements."""
-        return (f"{self.model} gaits",)
 
     def points(self, measured: Measured, window: str) -> Iterator[Point]:
         """One for each velocity, or for each pair."""
@@ -169,22 +166,15 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Named:
+class Named(_OfModel):
     """Part of the accelerated gaits that have a name."""
 
-    model: str
     name: GaitName
-    windowed = False
 
     @property
     def words(self) -> str:
         """For a rule's sentence."""
         return f"part of gaits that are {self.name}({self.model})"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Measurements."""
-        return (f"{self.model} gaits",)
 
     def points(self, measured: Measured, window: str) -> Iterator[Point]:
         """One for each velocity; the left side and the front legs name the gait."""

@@ -11,7 +11,7 @@ from hexmj.paper.figures import FIGURES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
 from hexmj.results import json_text, results_folder, save_dataset, write_whole
-from hexmj.sweeps import How, along, finish, run
+from hexmj.sweeps import Execution, finish, over_axes, run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +22,7 @@ KEPT = "measurements"
 
 
 def reproduce(
-    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), **how: Unpack[How]
+    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), **how: Unpack[Execution]
 ) -> tuple[list[Row], list[Path]]:
     """Measure what the claims need, judge them, draw the figures.
 
@@ -33,7 +33,7 @@ def reproduce(
         out: folder for ``claims.md``, ``claims.json``, figures (PDF, PNG and their data as NetCDF) and measurements.
         protocol: how much is simulated.
         only: keys of the claims to judge, all unless given; figures are drawn only with all.
-        how: see `sweeps.How`.
+        how: see `sweeps.Execution`.
 
     Returns:
         The rows in the paper's order, and the files written.
@@ -57,7 +57,7 @@ def reproduce(
     return _rows(claims, judged), files
 
 
-def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[How]) -> "xr.Dataset":
+def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """One measurement of `MEASUREMENTS`, (velocity, ...); folder and `how` as of `sweeps.finish`."""
     return _over_velocities(name, protocol, run(cells(name, protocol), folder, **how))
 
@@ -71,7 +71,7 @@ def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
 
 
 def _measurements(
-    names: Sequence[str], protocol: Protocol, folder: Path, how: How
+    names: Sequence[str], protocol: Protocol, folder: Path, how: Execution
 ) -> "Iterator[tuple[str, xr.Dataset]]":
     """Measurements, each as soon as it has come together, from one sweep over the velocities of all."""
     parts = {name: cells(name, protocol) for name in names}
@@ -87,7 +87,7 @@ def _measurements(
 
 def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]") -> "xr.Dataset":
     velocities = list(MEASUREMENTS[name].velocities(protocol))
-    return along({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(velocity=velocities)
+    return over_axes({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(velocity=velocities)
 
 
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:

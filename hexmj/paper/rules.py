@@ -1,6 +1,6 @@
 """How a claim of the paper is judged: a quantity, velocities, and a band that its 95 % intervals must reach."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -8,6 +8,9 @@ from typing import Literal
 import numpy as np
 
 from hexmj.paper.quantities import Measured, Point, Quantity
+
+Estimate = tuple[float, float, float]
+"""A value and its 95 % interval."""
 
 END = 0.05
 """A range of velocities is covered if its ends are met this closely."""
@@ -51,12 +54,10 @@ class Band:
         points = _within(self.quantity.points(measured, window), self.velocities)
         if points is None:
             return None
-        estimates = [point.estimate for point in points]
-        strain = [max(value - self.most, self.least - value) for value, _, _ in estimates]
-        worst = int(np.argmax(np.nan_to_num(strain, nan=np.inf)))
-        agrees = all(low <= self.most and high >= self.least for _, low, high in estimates)
-        value, low, high = estimates[worst]
-        return Answer(value, low, high, _where(points[worst]), agrees)
+        estimates = [(point.estimate, _where(point)) for point in points]
+        strain = [max(value - self.most, self.least - value) for (value, _, _), _ in estimates]
+        agrees = all(low <= self.most and high >= self.least for (_, low, high), _ in estimates)
+        return _worst(estimates, strain, agrees)
 
 
 @dataclass(frozen=True)
@@ -81,19 +82,22 @@ class Trend:
         points = _within(self.quantity.points(measured, window), self.velocities)
         if points is None:
             return None
-        steps = []
-        for name in dict.fromkeys(point.of for point in points):
-            row = [point for point in points if point.of == name]
-            for one, following in pairwise(row):
-                steps.append((_difference(one, following), f"{_where(one)} to {following.velocity:g}"))
-        estimates = [estimate for estimate, _ in steps]
-        worst = int(np.argmin([np.nan_to_num(self.sign * value, nan=-np.inf) for value, _, _ in estimates]))
-        agrees = all((high if self.sign > 0 else -low) >= 0 for _, low, high in estimates)
-        value, low, high = estimates[worst]
-        return Answer(value, low, high, steps[worst][1], agrees)
+        steps = [
+            (_difference(one, following), f"{_where(one)} to {following.velocity:g}")
+            for name in dict.fromkeys(point.of for point in points)
+            for one, following in pairwise(point for point in points if point.of == name)
+        ]
+        agrees = all((high if self.sign > 0 else -low) >= 0 for (_, low, high), _ in steps)
+        return _worst(steps, [-self.sign * value for (value, _, _), _ in steps], agrees)
 
 
 Rule = Band | Trend
+
+
+def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], agrees: bool) -> Answer:
+    """The answer at the first of the estimates, each with its place, that strains the rule most."""
+    (value, low, high), where = estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))]
+    return Answer(value, low, high, where, agrees)
 
 
 def _within(points: Iterator[Point], velocities: tuple[float, float]) -> list[Point] | None:
@@ -106,7 +110,7 @@ def _within(points: Iterator[Point], velocities: tuple[float, float]) -> list[Po
     return inside if min(met) <= low + END + 1e-9 and max(met) >= high - END - 1e-9 else None
 
 
-def _difference(one: Point, other: Point) -> tuple[float, float, float]:
+def _difference(one: Point, other: Point) -> Estimate:
     """Change of the mean and its 95 % interval, as of independent samples."""
     (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
     return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))

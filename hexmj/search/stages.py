@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
 from hexmj.search.problems import Problem, Sample
-from hexmj.sweeps import Cell, Ledger
+from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps.plain import plain
 
 if TYPE_CHECKING:
@@ -72,10 +72,6 @@ class Effort:
         if self.refine_budget < 0:
             raise InputError(f"refine_budget = {self.refine_budget}; expected 0 or more evaluations")
 
-    def settings(self) -> dict[str, Any]:
-        """The effort as plain data."""
-        return plain(self)
-
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -118,12 +114,12 @@ def search(
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if effort.refine_budget else {})
     samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
     searcher = ALGORITHMS[effort.algorithm](domain, effort.population, effort.seed)
-    ledgers = {
-        stage: Ledger(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
+    kept = {
+        stage: KeptValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
     }
 
     def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
-        result = ledgers[stage](candidates)
+        result = kept[stage](candidates)
         history.add(stage, candidates, result)
         if progress:
             progress(len(candidates) * sizes[stage] / work)
@@ -133,8 +129,8 @@ def search(
     if effort.refine_budget:
         best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget)
     asked = history.dataset(problem.form.names)
-    settings = json.dumps({"problem": problem.settings(), "effort": effort.settings()}, sort_keys=True)
-    replayed = min(sum(ledger.known for ledger in ledgers.values()), asked.sizes["evaluation"])
+    settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
+    replayed = min(sum(one.known for one in kept.values()), asked.sizes["evaluation"])
     return Found(best, cost, asked.assign_attrs(settings=settings), replayed)
 
 

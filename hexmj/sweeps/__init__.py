@@ -7,17 +7,17 @@ A folder of a sweep holds
   `settings`, the `sources` of every module within reach (module -> digest) and the `versions` of Python and of the
   packages that compute.  The digest in the name is that of the record, so an edit, another version or another setting
   is another file; none is ever overwritten by other numbers, and one that is damaged or foreign is refused.
-- `<name>-<digest>.jsonl` for each `Ledger`: the same record, then a line for each value.
+- `<name>-<digest>.jsonl` for each `KeptValues`: the same record, then a line for each value.
 - `.part-*` of runs that were killed while they wrote; they may be deleted.
 
 There is no index: the names are all that a run needs to go on, and several runs may share a folder.
 """
 
 from hexmj.sweeps.cells import Cell as Cell
-from hexmj.sweeps.grid import How as How
+from hexmj.sweeps.grid import Execution as Execution
 from hexmj.sweeps.grid import Study as Study
-from hexmj.sweeps.grid import along as along
 from hexmj.sweeps.grid import conduct as conduct
 from hexmj.sweeps.grid import finish as finish
+from hexmj.sweeps.grid import over_axes as over_axes
 from hexmj.sweeps.grid import run as run
-from hexmj.sweeps.ledger import Ledger as Ledger
+from hexmj.sweeps.kept_values import KeptValues as KeptValues

@@ -28,7 +28,7 @@ class Study(Protocol):
         ...
 
 
-class How(TypedDict, total=False):
+class Execution(TypedDict, total=False):
     """How cells are computed; what comes of them does not depend on it."""
 
     executor: Executor | None
@@ -40,18 +40,20 @@ class How(TypedDict, total=False):
     """For each cell; one per core unless given, and a single one with an executor."""
 
 
-def conduct(study: Study, folder: Path | None = None, **how: Unpack[How]) -> "xr.Dataset":
+def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """The result of a study; arguments and errors as of `finish`."""
     return study.result(run(study.cells(), folder, **how))
 
 
-def run(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]) -> list["xr.Dataset"]:
+def run(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[Execution]) -> list["xr.Dataset"]:
     """What the cells give, in their order; arguments and errors as of `finish`."""
     found = dict(finish(cells, folder, **how))
     return [found[i] for i in range(len(cells))]
 
 
-def finish(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]) -> Iterator[tuple[int, "xr.Dataset"]]:
+def finish(
+    cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[Execution]
+) -> Iterator[tuple[int, "xr.Dataset"]]:
     """Compute cells, and give each with its place as soon as it is there; the bits do not depend on who computes it.
 
     After an error, at Ctrl-C or when the caller goes away, cells that have not begun are cancelled; finished ones stay.
@@ -59,13 +61,13 @@ def finish(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]
     Args:
         cells: to be computed; what is finished in the folder is not.
         folder: keeps a file for each cell, and several runs may work in it at once; None keeps nothing.
-        how: see `How`.
+        how: see `Execution`.
 
     Raises:
         InputError: a cell cannot be named, sent, written or believed.  And whatever the first cell to fail raises.
     """
-    if unknown := set(how) - set(How.__annotations__):
-        raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(How.__annotations__)}")
+    if unknown := set(how) - set(Execution.__annotations__):
+        raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
     folder = None if folder is None else Path(folder)
     executor, progress, threads = how.get("executor"), how.get("progress"), how.get("threads")
     records = [cell.record() if folder else "" for cell in cells]
@@ -106,7 +108,7 @@ def finish(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[How]
             future.cancel()
 
 
-def along(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
+def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
     """The data of cells over named axes as one dataset.
 
     Args:

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.studies.drawing import frequency_curve, tidy
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
@@ -36,14 +38,11 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
             continue
         axes.plot(one.velocity, one[measure].isel(case=0), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
-            low, middle, high = (one[measure + end].isel(case=case).values for end in ("_low", "", "_high"))
-            axes.errorbar(
-                one.velocity + shifts[strategies[case]], middle, [middle - low, high - middle],
-                color=COLOURS[strategies[case]], marker="o", markersize=4, linewidth=1.6, capsize=2.5,
-            )  # fmt: skip
+            strategy = strategies[case]
+            x, colour = one.velocity + shifts[strategy], COLOURS[strategy]
+            frequency_curve(axes, x, one.isel(case=case), measure, color=colour)
         axes.set(ylim=(-0.03, 1.03))
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(color="0.9", linewidth=0.8)
+        tidy(axes)
     for column, kind in enumerate(kinds):
         panels[0, column].set_title(_title(kind), fontsize=10)
         panels[-1, column].set_xlabel("velocity $V_r / V_p$")

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.starts import check_draw, checked_list
+from hexmj.starts import checked_list
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
-from hexmj.sweeps import Cell, along
-from hexmj.timing import Acceleration, Stride
+from hexmj.studies.same_starts import SameStarts
+from hexmj.sweeps import Cell, over_axes
+from hexmj.timing import Acceleration
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,11 +27,12 @@ units; `docs/laboratory.md` tells what was tried."""
 
 
 @dataclass(frozen=True)
-class DisturbedWalks:
-    """The same starts in every case, an undisturbed one among them, at every velocity."""
+class DisturbedWalks(SameStarts):
+    """The same starts in every case, an undisturbed one among them, at every velocity.
 
-    controller: Controller
-    """Plans the walks: a `SteerableController`, or `ReadsLegs` around one."""
+    The controller is a `SteerableController`, or `ReadsLegs` around one; `window` is that of `frequencies.WINDOWS`.
+    """
+
     velocities: Sequence[float] = (0.3, 0.5, 0.7)
     """V_r, each 0 < V < 1, and at least V_r(0) of the recovery where a case slows down."""
     disturbances: Sequence[Kind] = ("halt", "leg", "push")
@@ -47,19 +47,12 @@ class DisturbedWalks:
     """As `FootContact.grasp`, of the strategy 'grasp'."""
     physical: bool = True
     """Walk in MuJoCo too."""
-    n_starts: int = 40
+    n_starts: int = field(default=40, kw_only=True)
     """Number of starts that reach their disturbance, the same in every case."""
-    window: str | float = "walk"
-    """'walk', 'start' or the observation time itself [time units]; see `frequencies.WINDOWS`."""
-    seed: int = 0
-    """Of starts, times, legs and postures."""
-    conditions: Conditions = field(default_factory=Conditions)
-    """Of the physical walks."""
-    stride: Stride = field(default_factory=Stride)
-    """Step range, lines of the tips and time step."""
+    acceleration: None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        check_draw(self.n_starts, self.seed)
+        super().__post_init__()
         v, slows = checked_list(self.velocities), "slow_down" in self.strategies
         low = self.recovery.start if slows else 0.0
         if not ((v > 0) & (v >= low)).all():
@@ -88,7 +81,7 @@ class DisturbedWalks:
 
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""
-        from hexmj.studies.disturbance.walks import StableWalks
+        from hexmj.studies.disturbance.stable_walks import StableWalks
 
         def walks(velocity: float) -> StableWalks:
             return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, self.grid)
@@ -111,25 +104,17 @@ class DisturbedWalks:
         """When what happened, and how often.
 
         Returns:
-            Over (velocity, case, start) the `walks.TIMES`; a case has the coordinates `disturbance` and `strategy`, the
-            first is undisturbed.  Over velocity the observation time `duration` [time units] and the number of starts
-            `drawn` to find these.  And the frequencies of `frequencies.with_flss_after`.
+            Over (velocity, case, start) the `stable_walks.TIMES`; a case has the coordinates `disturbance` and
+            `strategy`, the first is undisturbed.  Over velocity the observation time `duration` [time units] and the
+            number of starts `drawn` to find these.  And the frequencies of `frequencies.with_flss_after`.
         """
-        from hexmj.measures.kinematic import settings
         from hexmj.studies.disturbance.frequencies import with_flss_after
 
-        table = along({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
+        table = over_axes({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
             **velocity_axis(*self.observed),
             disturbance=("case", [case.disturbance for case in self.cases]),
             strategy=("case", [case.strategy for case in self.cases]),
         )
         drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
-        named = {self.controller.name: self.controller}
-        attributes = settings(named, self.window, self.n_starts, self.seed, self.stride, None) | {
-            "conditions": self.conditions.settings(),
-            "grid": self.grid,
-            "recovery": asdict(self.recovery),
-            "adhesion": self.adhesion,
-            "physical": self.physical,
-        }
-        return with_flss_after(table.assign(drawn=drawn)).assign_attrs(attributes)
+        own = {"recovery": asdict(self.recovery), "adhesion": self.adhesion, "physical": self.physical}
+        return with_flss_after(table.assign(drawn=drawn)).assign_attrs(self.attributes(grid=self.grid, **own))

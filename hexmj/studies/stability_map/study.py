@@ -1,18 +1,18 @@
 """Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type
+from hexmj.controllers.protocol import ReadingPlan
 from hexmj.errors import InputError, check_distinct
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.starts import check_draw, draw_starts
-from hexmj.sweeps import Cell, along
-from hexmj.timing import Acceleration, Stride
+from hexmj.starts import draw_starts
+from hexmj.studies.same_starts import SameStarts
+from hexmj.sweeps import Cell, over_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,44 +43,36 @@ CONDITIONS: dict[Over, Condition] = {
 
 
 @dataclass(frozen=True)
-class StabilityMap:
-    """The same starts at every value of a condition and every velocity."""
+class StabilityMap(SameStarts):
+    """The same starts at every value of a condition and every velocity.
 
-    controller: Controller
-    """Plans the walks; none that reads the legs, since mechanisms are told from the plan alone."""
+    No controller that reads the legs: mechanisms are told from the plan alone.  Starts that cannot stand on six feet at
+    every value are left out of the result.
+    """
+
     over: Over = "vp"
     """The condition that is varied, one of `CONDITIONS`."""
     values: Sequence[float] = ()
     """Of that condition in its unit, each once; those of `CONDITIONS` unless given."""
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
     """V_r (when accelerating, its final value), each 0 <= V < 1."""
-    n_starts: int = 100
-    """Number of starts; those that cannot stand on six feet at every value are left out of the result."""
-    window: str | float = "walk"
-    """'walk', 'start' or the observation time itself [time units]."""
-    seed: int = 0
-    """Of the starts."""
-    conditions: Conditions = field(default_factory=Conditions)
-    """All others."""
-    stride: Stride = field(default_factory=Stride)
-    """Step range, lines of the tips and time step."""
-    acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
 
     def __post_init__(self) -> None:
         if self.over not in CONDITIONS:
             raise InputError(f"over = {self.over!r}; valid names: {', '.join(get_args(Over))}")
-        if (given := self.conditions.flat()[self.over]) != _usual(self.over):
-            raise InputError(f"{self.over} = {given:g}; expected values, which takes all of them")
+        super().__post_init__()
         check_distinct("values", self.chosen)
         _ = self.varied, self.observed
-        check_draw(self.n_starts, self.seed)
-        check_controller_type(self.controller)
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
         if isinstance(self.controller.begin(start, v, self.stride, self.acceleration), ReadingPlan):
             raise InputError(
                 "a controller that reads the legs; expected another: mechanisms are told from the plan alone"
             )
+
+    @property
+    def lists(self) -> Mapping[str, str]:
+        """See `SameStarts.lists`."""
+        return {self.over: "values"}
 
     @property
     def chosen(self) -> list[float]:
@@ -99,15 +91,13 @@ class StabilityMap:
 
     def cells(self) -> list[Cell]:
         """A cell for each value and velocity; see `sweeps.Study`."""
-        from hexmj.studies.stability_map.walks import fates
-
-        names = "controller", "n_starts", "seed", "over", "stride", "acceleration"
-        same = {name: getattr(self, name) for name in names}
+        from hexmj.studies.stability_map.fates import fates
 
         def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
-            own = {"conditions": conditions, "velocity": velocity, "duration": time}
             name = f"{self.over}-{conditions.flat()[self.over]:g}-V-{velocity:g}"
-            return Cell(name, fates, own | same, work=time * conditions.substeps(self.stride))
+            work = time * conditions.substeps(self.stride)
+            own = {"velocity": velocity, "duration": time, "conditions": conditions, "over": self.over}
+            return self.cell(name, fates, work, **own)
 
         return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
 
@@ -125,7 +115,6 @@ class StabilityMap:
         Raises:
             InputError: no start stands at every value.
         """
-        from hexmj.measures.kinematic import settings
         from hexmj.studies.stability_map.differences import froude, with_differences
 
         table = self._over_values(data)
@@ -133,17 +122,14 @@ class StabilityMap:
         reference = usual if usual in self.chosen else self.chosen[0]
         numbers = np.array([froude(one, self.observed[0]) for one in self.varied])
         table = with_differences(table, reference).assign(froude=(("value", "velocity"), numbers, {"units": "1"}))
-        others = {name: value for name, value in self.conditions.settings().items() if name != self.over}
-        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
-        attributes = settings({self.controller.name: self.controller}, *same)
-        return table.assign_attrs(attributes | {"over": self.over, "reference": reference, "conditions": others})
+        return table.assign_attrs(self.attributes(over=self.over, reference=reference))
 
     def _over_values(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """What happened to the starts that stand at every value, over (value, velocity, start)."""
         from hexmj.studies.stability_map.mechanisms import MECHANISMS
 
         sizes, condition = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
-        table = along(sizes, data, join="inner", combine_attrs="override")
+        table = over_axes(sizes, data, join="inner", combine_attrs="override")
         if not table.sizes["start"]:
             raise InputError(
                 f"{self.over} = {self.chosen}; none of {self.n_starts} starts stands on six feet at all of them"

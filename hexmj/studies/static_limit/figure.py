@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from hexmj.measures.figures import CONTROLLER_LINES, MEASURE_COLOURS
+from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +43,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     for panel in ("margin", "drift"):
         axes[panel].set(ylim=(0.0, None))
     for panel, one in axes.items():
-        _tidy(one, result)
+        _v_axis(one, result)
         if panel in ("margin", "drift"):
             one.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
     masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
@@ -63,18 +64,14 @@ def _frequencies(axes: "Axes", one: "xr.Dataset", line: str, first: bool) -> Non
         axes.axhline(middle, color=MEASURE_COLOURS["kinematic"], linewidth=1.6, label="kinematic")
     shift = 0.97 if first else 1.03
     for measure in ("measured", "physical"):
-        low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
-        axes.errorbar(
-            one.vp * shift, middle, [middle - low, high - middle], linestyle=line, color=MEASURE_COLOURS[measure],
-            marker="o", markersize=4, linewidth=1.6, capsize=2.5, label=measure if first else None,
-        )  # fmt: skip
+        style = {"linestyle": line, "color": MEASURE_COLOURS[measure], "label": measure if first else None}
+        frequency_curve(axes, one.vp * shift, one, measure, **style)
 
 
-def _tidy(axes: "Axes", result: "xr.Dataset") -> None:
+def _v_axis(axes: "Axes", result: "xr.Dataset") -> None:
     axes.set_xscale("log")
     axes.set_xticks(result.vp.values, [f"{vp:g}" for vp in result.vp.values])
     axes.minorticks_off()
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.9", linewidth=0.8)
+    tidy(axes)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(frameon=False, fontsize=9)

@@ -4,19 +4,17 @@ The same starts walk at smaller and smaller V_p, with the insect's own legs and 
 as the paper has them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import check_distinct
 from hexmj.measures.compare import with_flss
 from hexmj.measures.velocities import observed
-from hexmj.starts import check_draw
-from hexmj.sweeps import Cell, along
-from hexmj.timing import Acceleration, Stride
+from hexmj.studies.same_starts import SameStarts
+from hexmj.sweeps import Cell, over_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,39 +27,28 @@ FINE = Conditions.of(longest_substep=0.5)
 
 
 @dataclass(frozen=True)
-class StaticLimit:
+class StaticLimit(SameStarts):
     """The same starts at every V_p, with every mass of the legs."""
 
-    controller: Controller
-    """Plans the walks."""
     velocity: float = 0.5
     """V_r (when accelerating, its final value), 0 <= V < 1."""
     vps: Sequence[float] = (400.0, 200.0, 100.0, 50.0, 25.0)
     """Velocities V_p of a protracting tip [mm/s], each once."""
     leg_masses: Sequence[float] = (1.0, 0.01)
     """As `Masses.leg_mass`, each once."""
-    n_starts: int = 200
-    """Number of starts, the same for every V_p and mass."""
-    window: str | float = "walk"
-    """'walk', 'start' or the observation time itself [time units]."""
-    seed: int = 0
-    """Of the starts."""
-    conditions: Conditions = FINE
-    """All others."""
-    stride: Stride = field(default_factory=Stride)
-    """Step range, lines of the tips and time step."""
-    acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    n_starts: int = field(default=200, kw_only=True)
+    conditions: Conditions = field(default=FINE, kw_only=True)
 
     def __post_init__(self) -> None:
-        check_controller_type(self.controller)
-        check_draw(self.n_starts, self.seed)
-        given, usual = self.conditions.flat(), Conditions().flat()
-        for name, several in VARIED.items():
+        super().__post_init__()
+        for several in VARIED.values():
             check_distinct(several, getattr(self, several))
-            if given[name] != usual[name]:
-                raise InputError(f"{name} = {given[name]:g}; expected {several}, which takes all of them")
         _ = self.varied, self.duration
+
+    @property
+    def lists(self) -> Mapping[str, str]:
+        """See `SameStarts.lists`."""
+        return VARIED
 
     @property
     def varied(self) -> list[Conditions]:
@@ -77,13 +64,12 @@ class StaticLimit:
         """A cell for each mass of the legs and V_p; see `sweeps.Study`."""
         from hexmj.studies.static_limit.distances import distance_table
 
-        names = "controller", "velocity", "duration", "n_starts", "seed", "stride", "acceleration"
-        same = {name: getattr(self, name) for name in names}
-
         def cell(conditions: Conditions) -> Cell:
             name = f"leg-mass-{conditions.masses.leg_mass:g}-vp-{conditions.time.vp:g}"
-            work = conditions.substeps(self.stride)
-            return Cell(name, distance_table, same | {"conditions": conditions}, work)
+            return self.cell(
+                name, distance_table, conditions.substeps(self.stride),
+                velocity=self.velocity, duration=self.duration, conditions=conditions,
+            )  # fmt: skip
 
         return [cell(one) for one in self.varied]
 
@@ -95,17 +81,10 @@ class StaticLimit:
             the fraction of starts for which kinematic and physical answer are the same; over (leg_mass, vp, start) the
             outcomes behind them, `DISTANCES` and `REPORTED`.
         """
-        from hexmj.measures.kinematic import settings
-
         sizes = {"leg_mass": len(self.leg_masses), "vp": len(self.vps)}
         mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
-        table = along(sizes, data).assign_coords(
+        table = over_axes(sizes, data).assign_coords(
             vp=("vp", list(self.vps), {"units": "mm/s", "long_name": "velocity V_p of a protracting tip"}),
             leg_mass=("leg_mass", list(self.leg_masses), mass),
         )
-        named = {self.controller.name: self.controller}
-        attributes = settings(named, self.window, self.n_starts, self.seed, self.stride, self.acceleration)
-        others = {name: value for name, value in self.conditions.settings().items() if name not in VARIED}
-        return with_flss(table).assign_attrs(
-            attributes | {"velocity": self.velocity, "duration": self.duration, "conditions": others}
-        )
+        return with_flss(table).assign_attrs(self.attributes(velocity=self.velocity, duration=self.duration))

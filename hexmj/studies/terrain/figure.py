@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.studies.drawing import frequency_curve, tidy
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
@@ -51,12 +53,7 @@ def _curves(axes: "Axes", one: "xr.Dataset") -> None:
     sizes, count = one["size"].values, one.sizes["velocity"]
     shifts = (np.arange(count) - (count - 1) / 2) * 0.02 * sizes.max()
     for v, colour, shift in zip(one.velocity.values, COLOURS * count, shifts, strict=False):
-        low, middle, high = (one[name].sel(velocity=v).values for name in ("flss_low", "flss", "flss_high"))
-        axes.errorbar(
-            sizes + shift, middle, [middle - low, high - middle], color=colour,
-            marker="o", markersize=4, linewidth=1.6, capsize=2.5, label=f"V = {v:g}",
-        )  # fmt: skip
+        frequency_curve(axes, sizes + shift, one.sel(velocity=v), "flss", color=colour, label=f"V = {v:g}")
     axes.set(ylim=(-0.02, 1.02))
     axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.9", linewidth=0.8)
+    tidy(axes)

@@ -4,15 +4,15 @@ The same starts walk on flat ground and towards every obstacle, the same way unt
 walk so far that the hindmost foot could be one stride beyond the longest obstacle.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError, check_distinct
-from hexmj.starts import check_draw, checked_list
-from hexmj.sweeps import Cell, along
+from hexmj.starts import checked_list
+from hexmj.studies.same_starts import SameStarts
+from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -37,11 +37,9 @@ FARTHER = Conditions.of(ground_at=80.0)
 
 
 @dataclass(frozen=True)
-class Terrain:
+class Terrain(SameStarts):
     """The same starts on flat ground and to every obstacle, with and without grasping feet, at every velocity."""
 
-    controller: Controller
-    """Plans the walks."""
     velocities: Sequence[float] = (0.2, 0.4, 0.6)
     """V_r, each 0 < V < 1."""
     grounds: Sequence[ObstacleKind] = ("step", "gap", "hurdle", "rough")
@@ -52,34 +50,39 @@ class Terrain:
     """Of gaps [mm], each once."""
     grasps: Sequence[float] = (0.0, 1.0)
     """As `FootContact.grasp`, each once."""
-    n_starts: int = 30
-    """Number of starts, the same for every obstacle."""
-    seed: int = 0
-    """Of the starts."""
-    conditions: Conditions = FARTHER
-    """All others."""
-    stride: Stride = field(default_factory=Stride)
-    """Step range, lines of the tips and time step."""
+    n_starts: int = field(default=30, kw_only=True)
+    conditions: Conditions = field(default=FARTHER, kw_only=True)
+    window: str = field(default="distance", init=False)
+    """All are told to walk as far."""
+    acceleration: None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        check_controller_type(self.controller)
-        check_draw(self.n_starts, self.seed)
+        super().__post_init__()
         v = checked_list(self.velocities)
         if not (v > 0).all():
             raise InputError(f"velocities = {v.tolist()}; expected V > 0, or no obstacle is ever reached")
-        given, usual = self.conditions.flat(), Conditions().flat()
-        if wrong := [name for name in VARIED if given[name] != usual[name]]:
-            name = wrong[0]
-            raise InputError(f"{name} = {given[name]}; expected {VARIED[name]}, which takes all of them")
-        check_distinct("grasps", self.grasps)
+        for name in ("grounds", "heights", "lengths", "grasps"):
+            check_distinct(name, getattr(self, name))
+        valid = get_args(ObstacleKind)
+        if wrong := [one for one in self.grounds if one not in valid]:
+            raise InputError(f"grounds = {list(self.grounds)}; {wrong[0]!r} is none of {', '.join(valid)}")
         for grasp in self.grasps:
             self.conditions.but(grasp=grasp)
         _ = self.obstacles
 
     @property
+    def lists(self) -> Mapping[str, str]:
+        """See `SameStarts.lists`."""
+        return VARIED
+
+    @property
     def obstacles(self) -> dict[str, Conditions]:
         """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'."""
-        return obstacles(self.conditions, self.grounds, self.heights, self.lengths)
+        named = {"flat": self.conditions}
+        for ground in self.grounds:
+            name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
+            named |= {f"{ground} {size:g} mm": self.conditions.but(ground=ground, **{name: size}) for size in sizes}
+        return named
 
     @property
     def distance(self) -> float:
@@ -91,13 +94,12 @@ class Terrain:
         """A cell for each obstacle, grasp and velocity; see `sweeps.Study`."""
         from hexmj.measures.outcome_table import outcome_table
 
-        same = {name: getattr(self, name) for name in ("controller", "n_starts", "seed", "stride")}
-        before, distance = self.obstacles, self.distance
+        before = self.obstacles
 
         def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
-            own: Any = {"conditions": before[obstacle].but(grasp=grasp), "velocity": velocity}
-            own["duration"] = distance / velocity
-            return Cell(f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", outcome_table, own | same, work=1 / velocity)
+            name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", before[obstacle].but(grasp=grasp)
+            own = {"velocity": velocity, "duration": self.distance / velocity, "conditions": conditions}
+            return self.cell(name, outcome_table, 1 / velocity, **own)
 
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 
@@ -111,22 +113,18 @@ class Terrain:
             are beyond, on rough ground wherever they stand.  Over starts too: `OUTCOMES`, the `distance` walked [mm],
             and `after`, whether the start fell after it had reached the obstacle.
         """
-        from hexmj.measures.kinematic import settings
         from hexmj.studies.terrain.crossings import with_crossings
 
         (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
         table = with_crossings(self._over_obstacles(data), self.distance, at - ahead, behind)
-        others = {name: value for name, value in self.conditions.settings().items() if name not in VARIED}
-        named = {self.controller.name: self.controller}
-        attributes = settings(named, "distance", self.n_starts, self.seed, self.stride, None)
-        return table.assign_attrs(attributes | {"distance": self.distance, "conditions": others})
+        return table.assign_attrs(self.attributes(distance=self.distance))
 
     def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """The outcomes over (obstacle, grasp, velocity, start)."""
         before = self.obstacles
         sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
         end = [_end(one) for one in before.values()]
-        table = along(sizes, [one[list(OUTCOMES)] for one in data]).assign_coords(
+        table = over_axes(sizes, [one[list(OUTCOMES)] for one in data]).assign_coords(
             obstacle=list(before),
             ground=("obstacle", [one.ground.ground for one in before.values()]),
             size=("obstacle", [_size(one) for one in before.values()], {"units": "mm"}),
@@ -141,26 +139,6 @@ class Terrain:
         for name, (units, long_name) in OUTCOMES.items():
             table[name].attrs = {"units": units, "long_name": long_name}
         return table
-
-
-def obstacles(
-    conditions: Conditions, grounds: Sequence[ObstacleKind], heights: Sequence[float], lengths: Sequence[float]
-) -> dict[str, Conditions]:
-    """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'.
-
-    Raises:
-        InputError: none, or one twice; a ground, height or length that makes no sense.
-    """
-    for name, values in {"grounds": grounds, "heights": heights, "lengths": lengths}.items():
-        check_distinct(name, values)
-    if wrong := [ground for ground in grounds if ground not in get_args(ObstacleKind)]:
-        raise InputError(f"grounds = {list(grounds)}; {wrong[0]!r} is none of {', '.join(get_args(ObstacleKind))}")
-    named = {"flat": conditions}
-    for ground in grounds:
-        for size in lengths if ground == "gap" else heights:
-            sized = {"ground_length": size} if ground == "gap" else {"ground_height": size}
-            named[f"{ground} {size:g} mm"] = conditions.but(ground=ground, **sized)
-    return named
 
 
 def reach(stride: Stride) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from hexmj.errors import InputError
 from hexmj.sweeps.cells import Cell
 
 
-class Ledger:
+class KeptValues:
     """A function of rows that never computes one twice, in this run or in a later one.
 
     It is called as `function(rows, **settings)`, (row, number) -> (row,), and must treat every row by itself.  The file

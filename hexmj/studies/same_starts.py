@@ -1,0 +1,66 @@
+"""What studies have in common: one controller plans, and the same starts walk in every cell."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.errors import InputError
+from hexmj.measures.kinematic import settings
+from hexmj.starts import check_draw
+from hexmj.sweeps import Cell
+from hexmj.timing import Acceleration, Stride
+
+
+@dataclass(frozen=True)
+class SameStarts:
+    """Base of the studies."""
+
+    controller: Controller
+    """Plans the walks."""
+    _: KW_ONLY
+    n_starts: int = 100
+    """Number of starts, the same in every cell."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]."""
+    seed: int = 0
+    """Of the starts."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """All that are not varied."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
+        check_draw(self.n_starts, self.seed)
+        given, usual = self.conditions.flat(), Conditions().flat()
+        for name, several in self.lists.items():
+            if (value := given[name]) != usual[name]:
+                told = value if isinstance(value, str) else f"{value:g}"
+                raise InputError(f"{name} = {told}; expected {several}, which takes all of them")
+
+    @property
+    def lists(self) -> Mapping[str, str]:
+        """Conditions that are varied, and the names of the lists in which they are given."""
+        return {}
+
+    def cell(self, name: str, function: Callable[..., Any], work: float, **own: Any) -> Cell:
+        """A cell whose function walks all starts.
+
+        Args:
+            name: for people.
+            function: takes what `measures.outcome_table.outcome_table` takes, and whatever else is its own.
+            work: relative cost.
+            own: `velocity`, `duration` and `conditions`, and further settings.
+        """
+        same = "controller", "n_starts", "seed", "stride", "acceleration"
+        return Cell(name, function, {name: getattr(self, name) for name in same} | own, work)
+
+    def attributes(self, **own: Any) -> dict[str, Any]:
+        """All that is needed to run the study again: what all studies have, and its own; conditions but for lists."""
+        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        conditions = {name: value for name, value in self.conditions.settings().items() if name not in self.lists}
+        return settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
