@@ -38,9 +38,8 @@ class SameStarts:
         check_draw(self.n_starts, self.seed)
         given, usual = self.conditions.flat(), Conditions().flat()
         for name, several in self.lists.items():
-            if (value := given[name]) != usual[name]:
-                told = value if isinstance(value, str) else f"{value:g}"
-                raise InputError(f"{name} = {told}; expected {several}, which takes all of them")
+            if given[name] != usual[name]:
+                raise InputError(f"{name} = {given[name]}; expected {several}, which takes all of them")
 
     @property
     def lists(self) -> Mapping[str, str]:
