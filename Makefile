@@ -1,5 +1,6 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       the tests
+# make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
 # make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types
 # PYTHON=...      the Python, 3.11 or newer, that .venv is made from
@@ -9,7 +10,7 @@ PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 
-.PHONY: compare test bench lint system
+.PHONY: compare test soak bench lint system
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
@@ -18,6 +19,10 @@ compare: .venv/project system
 test: export MUJOCO_GL ?= egl
 test: .venv/dev system
 	.venv/bin/python -m pytest -p no:benchmark --numprocesses 2 --dist worksteal $(ARGS)
+
+soak: export MUJOCO_GL ?= egl
+soak: .venv/dev system
+	.venv/bin/python -m tests.soak $(ARGS)
 
 bench: export MUJOCO_GL ?= egl
 bench: .venv/dev system

@@ -249,7 +249,12 @@ FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "window": 30.0}
 
 
 def test_disturbed_walks_can_read_their_legs():
-    halted: dict[str, Any] = FEW | {"disturbances": ["halt"], "strategies": ["reorganise"], "n_starts": 2, "window": 15.0}
+    halted: dict[str, Any] = FEW | {
+        "disturbances": ["halt"],
+        "strategies": ["reorganise"],
+        "n_starts": 2,
+        "window": 15.0,
+    }
     alone, reading = (conduct(DisturbedWalks(one, **halted)) for one in (LDVS, ReadsLegs(LDVS)))
     assert np.isfinite(reading.physical.sel(window="whole")).all()
     assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
