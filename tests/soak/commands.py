@@ -29,14 +29,14 @@ SMALL = {
 
 NUMBERS = (
     "0", "1", "2", "3", "0.5", "0.1", "0.9", "0.25", "-1", "-0.0", "1.5", "nan", "inf", "-inf", "1e-320", "1e-9",
-    "1e15", "1e23", "1e308", "-1e308", "1e309", "1" + 23 * "0", "-1" + 23 * "0", 5000 * "9", "0x10", "1_0", "½", "٣", "1,5",
-    "1e",
+    "1e15", "1e23", "1e308", "-1e308", "1e309", "1" + 23 * "0", "-1" + 23 * "0", 5000 * "9", "0x10", "1_0", "½", "٣",
+    "1,5", "1e",
 )  # fmt: skip
 WORDS = (
     "", " ", ".", "..", "/", "-", "--", "None", "true", "walk", "start", "ldvs", "hws", "own", "own-0.3", "mine.py",
     ":", "mine.py:Nobody", "os:system", "sys:argv", "nowhere.toml", "[red]", "[red].toml", "[/]", "$$", "$$.toml",
-    "$x_{$", "\x1b[31m", "a\nb", "a\tb", "\x07", "é", "字", "\udcff", "a" * 300, "x" * 5000, "2026-11-22T12:30", "%s %d",
-    "{}", "{0}", "~", "/proc/none", "/proc/self", "/dev/full", "/dev/null", "/dev/null/x", "/etc/shadow",
+    "$x_{$", "\x1b[31m", "a\nb", "a\tb", "\x07", "é", "字", "\udcff", "a" * 300, "x" * 5000, "2026-11-22T12:30",
+    "%s %d", "{}", "{0}", "~", "/proc/none", "/proc/self", "/dev/full", "/dev/null", "/dev/null/x", "/etc/shadow",
     "/root/none", "|", "out/deep/er", "vp", "friction", "flat", "rough", "planned", "printed", "sequential",
     "push", "cmaes", "high", "top",
 )  # fmt: skip

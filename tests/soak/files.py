@@ -75,3 +75,4 @@ def damaged(damage: tuple[str, bytes]) -> None:
         READERS[name](Path(name))
     except hexmj.InputError as error:
         print(error, file=sys.stderr)
+        raise SystemExit(1) from None
