@@ -13,7 +13,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type, settin
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval, wilson_intervals
 from hexmj.progress import Progress
-from hexmj.starts import SAMPLE, check_draw, checked_list, checked_starts, checked_velocities, draw_slabs
+from hexmj.starts import SAMPLE, check_draw, checked_list, draw_slabs
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk
 
@@ -65,13 +65,11 @@ def first_loss(
     The walks are those of `walk`, but none is kept; `duration` may be (start,).
     """
     stride = stride or Stride()
-    check_controller_type(controller)
-    x = checked_starts(starts, stride)
-    v = checked_velocities(velocity, len(x), acceleration)
-    steps = steps_within(duration, stride)
-    if steps.shape not in ((), (len(x),)):
-        raise InputError(f"durations have the shape {steps.shape}; expected one number or ({len(x)},)")
-    lost = first_losses(controller, x, v, np.broadcast_to(steps, len(x)).copy(), stride, acceleration, threads)
+    plan = begin(controller, starts, velocity, stride, acceleration, threads)
+    steps, count = steps_within(duration, stride), len(plan.starts)
+    if steps.shape not in ((), (count,)):
+        raise InputError(f"durations have the shape {steps.shape}; expected one number or ({count},)")
+    lost = first_losses(plan, steps, threads)
     return np.where(lost > 0, lost * stride.dt, np.inf)
 
 
