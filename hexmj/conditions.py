@@ -5,7 +5,7 @@ by itself.
 """
 
 import math
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any, Literal, get_args
 
@@ -26,15 +26,15 @@ class Bound:
     most: float
     unit: str
     """And what else there is to say of the greatest value."""
-    least_itself: bool = False
+    closed: bool = False
     """Whether the least value is allowed, too."""
 
     def check(self, name: str, value: float) -> None:
         """Refuse a value that is not allowed, or no number."""
         if not isinstance(value, Real) or isinstance(value, bool):
             raise InputError(f"{name} = {value!r}; expected a number, in {self.unit or '1'}")
-        if not (self.least <= value if self.least_itself else self.least < value) or not value <= self.most:
-            low = f"{self.least:g} to" if self.least_itself else f"above {self.least:g} and at most"
+        if not (self.least <= value if self.closed else self.least < value) or not value <= self.most:
+            low = f"{self.least:g} to" if self.closed else f"above {self.least:g} and at most"
             raise InputError(f"{name} = {value}; expected {low} {self.most:g} {self.unit}".rstrip())
 
 
@@ -164,15 +164,15 @@ class Conditions:
         """
         if unknown := set(values) - set(self.flat()):
             raise InputError(f"condition {min(unknown)!r}; valid names: {', '.join(self.flat())}")
-        parts = {}
-        for part, old in self._parts().items():
-            if mine := {key: values[key] for key in asdict(old).keys() & values.keys()}:
-                parts[part] = replace(old, **mine)
+        parts = {
+            name: replace(part, **{key: value for key, value in values.items() if key in vars(part)})
+            for name, part in self._parts().items()
+        }
         return replace(self, **parts)
 
     def flat(self) -> dict[str, Any]:
         """Every condition by its own name."""
-        return {key: value for part in self._parts().values() for key, value in asdict(part).items()}
+        return {key: value for part in self._parts().values() for key, value in vars(part).items()}
 
     def settings(self) -> dict[str, Any]:
         """The conditions and the body's name as plain data."""
@@ -200,19 +200,17 @@ def bounds(body: Body) -> dict[str, Bound]:
         "standing_height": Bound(0.0, lengths.highest_stand, "mm"),
         "lift_time": Bound(0.0, 1000.0, "ms"),
         "landing_time": Bound(0.0, 1000.0, "ms"),
-        "load": Bound(0.0, 10.0, "times the insect's weight", least_itself=True),
-        "centre_of_mass": Bound(
-            -lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, "mm", least_itself=True
-        ),
+        "load": Bound(0.0, 10.0, "times the insect's weight", closed=True),
+        "centre_of_mass": Bound(-lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, "mm", closed=True),
         "leg_mass": Bound(0.0, 2.0, "times the insect's own"),
-        "friction": Bound(0.0, 1000.0, "", least_itself=True),
-        "grasp": Bound(0.0, 100.0, "times the insect's weight", least_itself=True),
+        "friction": Bound(0.0, 1000.0, "", closed=True),
+        "grasp": Bound(0.0, 100.0, "times the insect's weight", closed=True),
         "ground_height": Bound(0.0, lengths.shortest_leg, "mm, the length of the shortest leg"),
         "ground_at": Bound(
-            lengths.nearest_obstacle, lengths.farthest_obstacle, "mm, ahead of the front feet", least_itself=True
+            lengths.nearest_obstacle, lengths.farthest_obstacle, "mm, ahead of the front feet", closed=True
         ),
         "ground_length": Bound(0.0, lengths.longest_obstacle, "mm"),
         "longest_substep": Bound(0.001, 1000.0 * body.longest_step, "ms, which the contacts are made for"),
-        "contact_gap": Bound(0.0, 1000.0, "ms", least_itself=True),
+        "contact_gap": Bound(0.0, 1000.0, "ms", closed=True),
         "settling_time": Bound(0.0, 10000.0, "ms"),
     }

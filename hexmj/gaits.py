@@ -85,7 +85,8 @@ def gait(walk: Walk) -> Gait:
     if len(walk.time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
-    return _with_stability(regimes, _upright(walk, int(_steps(regimes["period"], walk.time).max())), walk.time)
+    longest = int(_steps(regimes["period"], walk.time).max())
+    return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
 
 
 def limit_gait(
@@ -131,7 +132,7 @@ def limit_gait(
         changes.append((row + done, foot, down))
         stance = part.stance[-1:]
         if done >= tail:
-            upright.append(_upright(part, len(part.time)))
+            upright.append(walk_margin(part) > 0)
     time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
     return _with_stability(_regimes(row, foot, down, time, n_starts), np.concatenate(upright), time)
@@ -187,13 +188,6 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     if all(0.0 < phase < 0.5 for phase in along):
         return "negative metachrony"
     return "other"
-
-
-def _upright(walk: Walk, steps: int) -> np.ndarray:
-    """Whether each start is statically stable in each of the last steps, (step, start)."""
-    size = len(walk.time)
-    parts = [slice(first, min(first + PART, size)) for first in range(size - steps, size, PART)]
-    return np.concatenate([walk_margin(part_of(walk, part)) > 0 for part in parts])
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

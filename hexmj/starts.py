@@ -73,7 +73,7 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
     return np.broadcast_to(v, n_starts).copy()
 
 
-def checked_list(velocities: Sequence[float]) -> np.ndarray:
+def checked_list(velocities: Sequence[float], acceleration: Acceleration | None = None) -> np.ndarray:
     """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
     try:
         v = np.array(velocities, dtype=float)
@@ -81,6 +81,4 @@ def checked_list(velocities: Sequence[float]) -> np.ndarray:
         raise InputError(f"velocities = {velocities!r}; expected a list of numbers") from None
     if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
         raise InputError(f"velocities = {velocities}; expected a list of at least one, and none of them twice")
-    if not ((v >= 0) & (v < 1)).all():
-        raise InputError(f"velocities = {v.tolist()}; expected 0 <= V < 1, fractions of V_p")
-    return v
+    return checked_velocities(v, len(v), acceleration)

@@ -28,7 +28,7 @@ from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, commanded_velocities
-from hexmj.walks import PLANNED, PlannedWalk, joined
+from hexmj.walks import PLANNED, PlannedWalk, joined, of_starts
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
 """V_r of the starts of a trial, in turn."""
@@ -217,7 +217,7 @@ def _divided(trial: Trial) -> None:
 def _batch(trial: Trial) -> None:
     n = len(trial.starts)
     for which in ([0], [n - 2], [*range(n)[::-1]], np.arange(3 * n) % n):
-        _same(_starts(trial.walk, which), trial.of(which).walk, "a start alone, in another order, or among others")
+        _same(of_starts(trial.walk, which), trial.of(which).walk, "a start alone, in another order, or among others")
 
 
 def _fast_losses(trial: Trial) -> None:
@@ -248,7 +248,7 @@ def _reading(trial: Trial) -> None:
                 raise InputError(f"sense changes what it is told, {one.name}; expected it to work on a copy")
         parts.append(advanced(plan, 1))
     by_itself = advanced(trial.begin(), len(parts))
-    _same(_starts(by_itself, others), _starts(joined(parts), others), "starts it is told nothing of")
+    _same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
 
 
 LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
@@ -282,11 +282,6 @@ def _sliding(trials: list[Trial]) -> str:
             where = place(walk, (step + 1, start, leg))
             found = f"feet slide: standing tips are up to {worst:.2g} V_p from V_r straight back, in {where}"
     return found
-
-
-def _starts(walk: PlannedWalk, which: Any) -> PlannedWalk:
-    """The walks of some starts."""
-    return replace(walk, **{name: getattr(walk, name)[:, which] for name in ("velocity", *PLANNED)})
 
 
 def _same(one: PlannedWalk, other: PlannedWalk, what: str) -> None:

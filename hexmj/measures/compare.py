@@ -65,16 +65,16 @@ class Comparison:
         return observed(self.velocities, self.window, self.stride, self.acceleration)
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`."""
+        """See `sweeps.Study`; each is an `outcome_table`."""
         from hexmj.measures.outcome_table import outcome_table
 
         same = {name: getattr(self, name) for name in ("n_starts", "seed", "conditions", "stride", "acceleration")}
 
-        def cell(name: str, velocity: float, time: float) -> Cell:
-            own = {"controller": self.controllers[name], "velocity": velocity, "duration": time}
-            return Cell(f"{name}-V-{velocity:g}", outcome_table, own | same, work=time)
-
-        return [cell(name, v, time) for name in self.controllers for v, time in zip(*self.observed, strict=True)]
+        return [
+            Cell(f"{name}-V-{v:g}", outcome_table, same | {"controller": one, "velocity": v, "duration": t}, work=t)
+            for name, one in self.controllers.items()
+            for v, t in zip(*self.observed, strict=True)
+        ]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """As `compare` gives it."""

@@ -12,8 +12,9 @@ from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval, wilson_intervals
+from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.progress import Progress
-from hexmj.starts import SAMPLE, check_draw, checked_list, draw_slabs
+from hexmj.starts import SAMPLE, check_draw, draw_slabs
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk
 
@@ -105,18 +106,16 @@ def flss(
         Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
         of 1000 starts, and the observation time `duration`.
     """
-    stride, v = stride or Stride(), checked_list(velocities)
+    stride = stride or Stride()
     check_controller_type(controller)
     check_draw(n_starts, seed)
-    duration = observation_time(window, v, stride, acceleration)
+    v, duration = observed(velocities, window, stride, acceleration)
+    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     counts = []
     for x in draw_slabs(n_starts, seed, stride):
         lost = np.empty((len(v), len(x)), dtype=bool)
-        for i, one in enumerate(v):
-            times = first_loss(
-                x, controller, one, duration[i], stride=stride, acceleration=acceleration, threads=threads
-            )
-            lost[i] = np.isfinite(times)
+        for i in range(len(v)):
+            lost[i] = np.isfinite(first_loss(x, controller, v[i], duration[i], **how))
             if progress:
                 progress(len(x) / n_starts / len(v))
         counts.append(losses_by_sample(lost))
@@ -198,14 +197,11 @@ def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, d
     low, high = wilson_intervals(total, n_starts)
     samples = losses[:, : n_starts // SAMPLE] / SAMPLE
     spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
-    unit = {"units": "1"}
-    return xr.Dataset(
-        {
-            "flss": ("velocity", total / n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
-            "low": ("velocity", low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
-            "high": ("velocity", high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
-            "sample_sd": ("velocity", spread, unit | {"long_name": "standard deviation over samples of 1000 starts"}),
-            "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
-        },
-        coords={"velocity": ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})},
-    )
+    columns = {
+        "flss": (total / n_starts, "frequency of the loss of static stability"),
+        "low": (low, "lower end of the 95 % Wilson interval"),
+        "high": (high, "upper end of the 95 % Wilson interval"),
+        "sample_sd": (spread, "standard deviation over samples of 1000 starts"),
+    }
+    told = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
+    return xr.Dataset(told).assign(velocity_axis(velocities, duration))

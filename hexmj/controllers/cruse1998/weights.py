@@ -5,7 +5,7 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Literal
 
@@ -25,9 +25,9 @@ def pairs(kind: str) -> list[tuple[int, int]]:
     return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
 
 
-def _kinds(size: int, with_velocity: int) -> list[str]:
-    """Kinds of weight in a vector of `size` numbers; the short form leaves out P^{3,4}."""
-    return [kind for kind in NEIGHBOURS if kind != "p34" or size == with_velocity]
+def _in_vector(size: int) -> list[tuple[str, tuple[int, int]]]:
+    """Kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
+    return [(kind, pair) for kind in NEIGHBOURS if kind != "p34" or size == 58 for pair in pairs(kind)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,21 +71,24 @@ class Weights:
             object.__setattr__(self, kind, matrix)
 
     @classmethod
+    def of(cls, numbers: Mapping[tuple[str, tuple[int, int]], float]) -> "Weights":
+        """From numbers by kind and (destination, source) leg; what is not given is 0."""
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for (kind, pair), value in numbers.items():
+            matrices[kind][pair] = value
+        return cls(**matrices)
+
+    @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
         """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
         size = len(vector)
         if size not in (48, 58):
             raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
-        values = iter(vector)
-        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for kind in _kinds(size, 58):
-            for pair in pairs(kind):
-                matrices[kind][pair] = next(values)
-        return cls(**matrices)
+        return cls.of(dict(zip(_in_vector(size), vector, strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
         """The inverse of `from_vector`."""
-        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in pairs(kind)])
+        return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,7 @@ class Symmetric:
 
     def expand(self) -> Weights:
         """Appendix A: the general weights, equal on both sides and along each side."""
-        by_kind = {
+        sides = {  # ipsilateral, contralateral
             "p1": (self.p1_i, self.p1_c),
             "p2": (self.p2, 0.0),
             "p31": (self.p31_i, self.p31_c),
@@ -145,11 +148,7 @@ class Symmetric:
             "p34": (self.p34_i, 0.0),
             "p4": (self.p4_i, 0.0),
         }
-        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for kind, (ipsilateral, contralateral) in by_kind.items():
-            for d, e in pairs(kind):
-                matrices[kind][d, e] = contralateral if abs(d - e) == 3 else ipsilateral
-        return Weights(**matrices)
+        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in _in_vector(58)})
 
 
 AnyWeights = Symmetric | Weights
