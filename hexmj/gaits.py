@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -114,6 +115,7 @@ def limit_gait(
         periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
         threads: one per core unless given; the result does not depend on it.
     """
+    velocity, periods = typed("velocity", velocity, float), typed("periods", periods, int)
     if not 0 < velocity < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, since V = 0 has no period")
     if not periods >= CYCLES + 2:

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
 
@@ -70,7 +71,7 @@ def one_start(walk: AnyWalk, start: int) -> AnyWalk:
         InputError: there is no such start.
     """
     count = walk.stance.shape[1]
-    if not 0 <= start < count:
+    if not 0 <= typed("start", start, int) < count:
         raise InputError(f"start = {start}; expected 0 to {count - 1}")
     return of_starts(walk, slice(start, start + 1))
 

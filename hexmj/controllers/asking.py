@@ -10,10 +10,12 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import typed
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk
 
@@ -32,6 +34,9 @@ def begin(
         InputError: a controller, start, velocity or plan that makes no sense.
     """
     check_controller_type(controller)
+    typed("stride", stride, Stride)
+    typed("acceleration", acceleration, Acceleration | None)
+    thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
     with said(f"{controller.name}, begin"):

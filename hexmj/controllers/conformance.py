@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hexmj.checks import given
 from hexmj.controllers.asking import advanced, begin, place, said, tell
 from hexmj.controllers.losses import first_losses, planned_losses
 from hexmj.controllers.protocol import (
@@ -117,7 +118,7 @@ def findings(controller: object, stride: Stride | None = None) -> Iterator[Findi
         InputError: no controller.
     """
     check_controller_type(controller)
-    trials = [*_trials(controller, stride or Stride())]  # pyright: ignore[reportArgumentType]
+    trials = [*_trials(controller, given("stride", stride, Stride))]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
         if wrong and name in FIRST:

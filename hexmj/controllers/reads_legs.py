@@ -17,7 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, SteerablePlan, claims_mirrored
+from hexmj.controllers.protocol import (
+    Controller,
+    ReadingPlan,
+    Sensed,
+    SteerablePlan,
+    check_controller_type,
+    claims_mirrored,
+)
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, joined
@@ -32,6 +39,9 @@ class ReadsLegs:
 
     controller: Controller
     """What plans."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
 
     @property
     def name(self) -> str:

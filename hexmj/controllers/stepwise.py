@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import whole
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
@@ -49,8 +50,7 @@ class StepwisePlan:
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps."""
-        if steps < 1:
-            raise InputError(f"steps = {steps}; expected at least 1")
+        steps = whole("steps", steps, 1)
         stride, shape = self.stride, self.starts.shape
         v = commanded_velocities(self.velocity, self.done, steps, stride, self.acceleration)
         usual = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from hexmj.checks import check_types, given
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -52,6 +53,7 @@ class Comparison:
     """The accelerating procedure of Eq. 11."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not self.controllers:
             raise InputError("no controller was given; expected at least one")
         for controller in self.controllers.values():
@@ -133,8 +135,8 @@ def compare(
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}
-    whole = conditions or Conditions(), stride or Stride(), acceleration
-    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *whole), folder, **how)
+    walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
+    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *walks), folder, **how)
 
 
 def physical_flss(

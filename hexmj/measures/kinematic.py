@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import given, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
@@ -46,9 +47,9 @@ def walk(
     Raises:
         InputError: a start, velocity or duration that makes no sense.
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
-    return advanced(plan, int(steps_within(duration, stride)))
+    return advanced(plan, int(steps_within(typed("duration", duration, float), stride)))
 
 
 def first_loss(
@@ -65,7 +66,7 @@ def first_loss(
 
     The walks are those of `walk`, but none is kept; `duration` may be (start,).
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
     steps, count = steps_within(duration, stride), len(plan.starts)
     if steps.shape not in ((), (count,)):
@@ -106,9 +107,10 @@ def flss(
         Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
         of 1000 starts, and the observation time `duration`.
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
+    typed("progress", progress, Progress | None)
     check_controller_type(controller)
-    check_draw(n_starts, seed)
+    n_starts, seed = check_draw(n_starts, seed)
     v, duration = observed(velocities, window, stride, acceleration)
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     counts = []
@@ -153,10 +155,11 @@ def flss_over_range(
     Raises:
         InputError: a range, window, seed or number of starts that makes no sense.
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
+    low, high = typed("low", low, float), typed("high", high, float)
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
-    check_draw(n_starts, seed)
+    n_starts, seed = check_draw(n_starts, seed)
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in draw_slabs(n_starts, seed, stride):
         v = rng.uniform(low, high, len(x))

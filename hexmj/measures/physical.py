@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
@@ -68,6 +69,7 @@ def physical_outcomes(
     Raises:
         InputError, SimulationError: see `drive.drive`.
     """
+    duration = typed("duration", duration, float)
     how: Any = {"stride": settled.stride, "acceleration": acceleration}
     plan = begin(controller, settled.starts, velocity, **how, threads=1)
     planned_loss = first_loss(settled.starts, controller, velocity, duration, **how, threads=threads)
@@ -85,6 +87,7 @@ def outcomes_of_plan(
     progress: Progress | None = None,
 ) -> Outcomes:
     """The same for any plan that is at time 0, whose own losses, (start,) [time units], are known."""
+    typed("progress", progress, Progress | None)
     tally = Tally(settled, planned_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
         tally.add(chunk)
@@ -119,7 +122,8 @@ def physical_walk(
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
-    stride = stride or Stride()
+    stride, conditions = given("stride", stride, Stride), given("conditions", conditions, Conditions)
+    typed("progress", progress, Progress | None)
     planned = walk(starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
     plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     settled = settle(starts, conditions, stride, threads)

@@ -11,9 +11,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, general
-from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
@@ -39,10 +39,7 @@ class Cruse1998:
     name: str = "cruse1998"
     """Of the set of weights."""
 
-    def __post_init__(self) -> None:
-        general(self.weights)
-        if self.order not in get_args(Order):
-            raise InputError(f"order = {self.order!r}; valid names: {', '.join(get_args(Order))}")
+    __post_init__ = check_types
 
     @property
     def mirrored(self) -> bool:

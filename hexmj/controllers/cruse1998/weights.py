@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from hexmj.checks import check_types, numbers
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4
 
@@ -55,7 +56,7 @@ class Weights:
 
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
-            matrix = np.array(getattr(self, kind), dtype=float)
+            matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6):
                 raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
             if not np.isfinite(matrix).all():
@@ -81,10 +82,10 @@ class Weights:
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
         """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
-        size = len(vector)
-        if size not in (48, 58):
+        numbered = numbers("weights", vector)
+        if (size := numbered.size) not in (48, 58):
             raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
-        return cls.of(dict(zip(_in_vector(size), vector, strict=True)))
+        return cls.of(dict(zip(_in_vector(size), numbered.ravel(), strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
         """The inverse of `from_vector`."""
@@ -117,6 +118,7 @@ class Symmetric:
     """P_i^4: mechanism 4 off (0) or on (1)."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         for key, value in asdict(self).items():
             if not math.isfinite(value):
                 raise InputError(f"{key} = {value}; expected a finite number")
@@ -127,11 +129,12 @@ class Symmetric:
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
         """Read ten numbers in the order of the fields, or nine without p34_i."""
         names = [f.name for f in fields(cls)]
-        if len(vector) == 9:
+        values = numbers("weights", vector).ravel().tolist()
+        if len(values) == 9:
             names.remove("p34_i")
-        elif len(vector) != 10:
-            raise InputError(f"{len(vector)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
-        return cls(**{name: float(value) for name, value in zip(names, vector, strict=True)})
+        elif len(values) != 10:
+            raise InputError(f"{len(values)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
+        return cls(**dict(zip(names, values, strict=True)))
 
     def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
         """The inverse of `from_vector`."""
@@ -166,13 +169,5 @@ NO_WEIGHTS = Symmetric()
 
 
 def general(weights: AnyWeights) -> Weights:
-    """The general weights of either form.
-
-    Raises:
-        InputError: no weights.
-    """
-    if isinstance(weights, Symmetric):
-        return weights.expand()
-    if isinstance(weights, Weights):
-        return weights
-    raise InputError(f"weights = {weights!r:.200}; expected Symmetric or Weights")
+    """The general weights of either form."""
+    return weights.expand() if isinstance(weights, Symmetric) else weights
