@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import typed
+from hexmj.checks import numbers, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -83,7 +83,7 @@ def gait(walk: Walk) -> Gait:
     Raises:
         InputError: a walk of fewer than two steps.
     """
-    if len(walk.time) < 2:
+    if len(typed("walk", walk, Walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
     longest = int(_steps(regimes["period"], walk.time).max())
@@ -142,14 +142,14 @@ def limit_gait(
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     """Mean direction of phases on the circle [0, 1)."""
-    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    angle = 2.0 * np.pi * numbers("phase", phase)
     mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
 
 def circular_sd(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     """Circular standard deviation sqrt(-2 ln R) of phases on [0, 1), R the mean resultant length, as parts of 1."""
-    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    angle = 2.0 * np.pi * numbers("phase", phase)
     resultant = np.hypot(np.sin(angle).mean(axis), np.cos(angle).mean(axis))
     with np.errstate(divide="ignore"):  # opposite phases: R = 0, no deviation is large enough
         return np.sqrt(-2.0 * np.log(np.minimum(resultant, 1.0))) / (2.0 * np.pi)
@@ -162,7 +162,7 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
     of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
     V / (1 + V) of the period, and by that part the front leg lags behind.
     """
-    return 1.0 / (1.0 + np.asarray(v, dtype=float))
+    return 1.0 / (1.0 + numbers("velocity", v))
 
 
 def graham_phase(v: ArrayLike) -> np.ndarray:

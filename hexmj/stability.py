@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from hexmj.checks import numbers, states
+from hexmj.checks import numbers, states, typed
 from hexmj.errors import InputError
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
@@ -52,6 +52,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where the walk is unknown (after a fall)."""
+    typed("walk", walk, Walk)
     margin = stability_margin(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x).any(axis=-1), np.nan, margin)
 

@@ -16,7 +16,7 @@ from hexmj.conditions import Ground, Masses, TimeScale
 from hexmj.controllers.asking import begin
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
-from hexmj.gaits import limit_gait
+from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import settle
@@ -169,6 +169,12 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.stability_margin(np.ma.masked_greater(FEET, 20.0), STANDS), "feet = masked_array("),
     (lambda: hexmj.stability_margin(FEET, np.ma.masked_array(STANDS, STANDS)), "stance = masked_array("),
     (lambda: hexmj.stability_margin(FEET, STANDS, threads=1.5), "threads = 1.5; expected a whole number"),  # pyright: ignore
+    (lambda: hexmj.loss_time(STARTS), "walk = array([[0., 0., "),  # pyright: ignore
+    (lambda: gait(3), "walk = 3; expected a Walk"),  # pyright: ignore
+    (lambda: circular_mean([0.1 + 1j]), "phase = [(0.1+1j)]; expected numbers"),  # pyright: ignore
+    (lambda: wilson_phase("slow"), "velocity = 'slow'; expected numbers"),  # pyright: ignore
+    (lambda: hexmj.load_controller(3), "name = 3; expected a text"),  # pyright: ignore
+    (lambda: compare(folder=3), "folder = 3; expected a Path or a text or None"),
     (lambda: hexmj.support_polygon("feet", STANDS[0]), "feet = 'feet'; expected numbers"),
 ]
 

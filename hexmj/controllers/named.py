@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
 from hexmj.controllers.cruse1998.presets import read_toml, read_weights
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -30,7 +31,7 @@ def load_controller(name: str) -> Controller:
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
     """
-    if name in PRESETS:
+    if typed("name", name, str) in PRESETS:
         return PRESETS[name]
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():

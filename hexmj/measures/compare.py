@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from hexmj.checks import check_types, given
+from hexmj.checks import check_types, given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -135,6 +135,7 @@ def compare(
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}
+    typed("folder", folder, Path | str | None)
     walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
     return conduct(Comparison(controllers, velocities, n_starts, window, seed, *walks), folder, **how)
 
