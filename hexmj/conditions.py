@@ -5,12 +5,12 @@ by itself.
 """
 
 import math
-from dataclasses import asdict, dataclass, field, fields, replace
-from numbers import Real
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
 
 from hexmj.bodies.description import Body
 from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.checks import check_types, whole
 from hexmj.errors import InputError
 from hexmj.timing import Stride
 
@@ -26,15 +26,13 @@ class Bound:
     most: float
     unit: str
     """And what else there is to say of the greatest value."""
-    least_itself: bool = False
+    closed: bool = False
     """Whether the least value is allowed, too."""
 
     def check(self, name: str, value: float) -> None:
-        """Refuse a value that is not allowed, or no number."""
-        if not isinstance(value, Real) or isinstance(value, bool):
-            raise InputError(f"{name} = {value!r}; expected a number, in {self.unit or '1'}")
-        if not (self.least <= value if self.least_itself else self.least < value) or not value <= self.most:
-            low = f"{self.least:g} to" if self.least_itself else f"above {self.least:g} and at most"
+        """Refuse a value that is not allowed."""
+        if not (self.least <= value if self.closed else self.least < value) or not value <= self.most:
+            low = f"{self.least:g} to" if self.closed else f"above {self.least:g} and at most"
             raise InputError(f"{name} = {value}; expected {low} {self.most:g} {self.unit}".rstrip())
 
 
@@ -45,6 +43,8 @@ class TimeScale:
     vp: float = 80.0
     """Velocity V_p of a protracting tip relative to the body [mm/s]; links the plan's time unit, 1 mm / V_p,
     to seconds."""
+
+    __post_init__ = check_types
 
     def seconds(self, stride: Stride) -> float:
         """Duration of one step of a plan [s]."""
@@ -65,6 +65,8 @@ class FootPath:
     landing_time: float = 20.0
     """Time in which a foot is lowered, from before its AEP [ms]; shorter ones let it strike the ground."""
 
+    __post_init__ = check_types
+
     def landing_distance(self, time: TimeScale) -> float:
         """How far before its AEP a tip begins to be lowered [mm]."""
         return time.vp * self.landing_time / 1000.0
@@ -82,6 +84,8 @@ class Masses:
     leg_mass: float = 1.0
     """Mass of the legs as a fraction of the insect's own; the trunk makes up for it.  The paper's legs have none."""
 
+    __post_init__ = check_types
+
 
 @dataclass(frozen=True)
 class FootContact:
@@ -91,6 +95,8 @@ class FootContact:
     """Coefficient of sliding friction between the ground and feet or trunk."""
     grasp: float = 0.0
     """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight."""
+
+    __post_init__ = check_types
 
 
 @dataclass(frozen=True)
@@ -108,6 +114,8 @@ class Ground:
     ground_seed: int = 0
     """Of the bumps of rough ground."""
 
+    __post_init__ = check_types
+
 
 @dataclass(frozen=True)
 class Numerics:
@@ -120,6 +128,8 @@ class Numerics:
     """A foot that leaves the ground for no longer still stands in the measured polygon [ms]; 0 counts every bounce."""
     settling_time: float = 200.0
     """Time for which the insect stands before it walks [ms]; whether it has come to rest is checked."""
+
+    __post_init__ = check_types
 
 
 @dataclass(frozen=True)
@@ -136,16 +146,14 @@ class Conditions:
     """What walks; its lengths bound the other conditions."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         flat = self.flat()
         for name, bound in bounds(self.body).items():
             bound.check(name, flat[name])
-        kind, lengths = self.ground.ground, self.body.lengths
-        if kind not in get_args(GroundKind):
-            raise InputError(f"ground = {kind!r}; valid names: {', '.join(get_args(GroundKind))}")
-        if kind == "rough":
-            Bound(0.0, lengths.highest_bump, "mm where rough").check("ground_height", self.ground.ground_height)
-        if not (isinstance(seed := self.ground.ground_seed, int) and seed >= 0):
-            raise InputError(f"ground_seed = {seed}; expected an integer of at least 0")
+        if self.ground.ground == "rough":
+            highest = Bound(0.0, self.body.lengths.highest_bump, "mm where rough")
+            highest.check("ground_height", self.ground.ground_height)
+        whole("ground_seed", self.ground.ground_seed, 0)
 
     @classmethod
     def of(cls, **values: Any) -> "Conditions":
@@ -164,15 +172,15 @@ class Conditions:
         """
         if unknown := set(values) - set(self.flat()):
             raise InputError(f"condition {min(unknown)!r}; valid names: {', '.join(self.flat())}")
-        parts = {}
-        for part, old in self._parts().items():
-            if mine := {key: values[key] for key in asdict(old).keys() & values.keys()}:
-                parts[part] = replace(old, **mine)
+        parts = {
+            name: replace(part, **{key: value for key, value in values.items() if key in vars(part)})
+            for name, part in self._parts().items()
+        }
         return replace(self, **parts)
 
     def flat(self) -> dict[str, Any]:
         """Every condition by its own name."""
-        return {key: value for part in self._parts().values() for key, value in asdict(part).items()}
+        return {key: value for part in self._parts().values() for key, value in vars(part).items()}
 
     def settings(self) -> dict[str, Any]:
         """The conditions and the body's name as plain data."""
@@ -200,19 +208,17 @@ def bounds(body: Body) -> dict[str, Bound]:
         "standing_height": Bound(0.0, lengths.highest_stand, "mm"),
         "lift_time": Bound(0.0, 1000.0, "ms"),
         "landing_time": Bound(0.0, 1000.0, "ms"),
-        "load": Bound(0.0, 10.0, "times the insect's weight", least_itself=True),
-        "centre_of_mass": Bound(
-            -lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, "mm", least_itself=True
-        ),
+        "load": Bound(0.0, 10.0, "times the insect's weight", closed=True),
+        "centre_of_mass": Bound(-lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, "mm", closed=True),
         "leg_mass": Bound(0.0, 2.0, "times the insect's own"),
-        "friction": Bound(0.0, 1000.0, "", least_itself=True),
-        "grasp": Bound(0.0, 100.0, "times the insect's weight", least_itself=True),
+        "friction": Bound(0.0, 1000.0, "", closed=True),
+        "grasp": Bound(0.0, 100.0, "times the insect's weight", closed=True),
         "ground_height": Bound(0.0, lengths.shortest_leg, "mm, the length of the shortest leg"),
         "ground_at": Bound(
-            lengths.nearest_obstacle, lengths.farthest_obstacle, "mm, ahead of the front feet", least_itself=True
+            lengths.nearest_obstacle, lengths.farthest_obstacle, "mm, ahead of the front feet", closed=True
         ),
         "ground_length": Bound(0.0, lengths.longest_obstacle, "mm"),
         "longest_substep": Bound(0.001, 1000.0 * body.longest_step, "ms, which the contacts are made for"),
-        "contact_gap": Bound(0.0, 1000.0, "ms", least_itself=True),
+        "contact_gap": Bound(0.0, 1000.0, "ms", closed=True),
         "settling_time": Bound(0.0, 10000.0, "ms"),
     }

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import numbers, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -82,10 +83,11 @@ def gait(walk: Walk) -> Gait:
     Raises:
         InputError: a walk of fewer than two steps.
     """
-    if len(walk.time) < 2:
+    if len(typed("walk", walk, Walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
-    return _with_stability(regimes, _upright(walk, int(_steps(regimes["period"], walk.time).max())), walk.time)
+    longest = int(_steps(regimes["period"], walk.time).max())
+    return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
 
 
 def limit_gait(
@@ -113,6 +115,7 @@ def limit_gait(
         periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
         threads: one per core unless given; the result does not depend on it.
     """
+    velocity, periods = typed("velocity", velocity, float), typed("periods", periods, int)
     if not 0 < velocity < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, since V = 0 has no period")
     if not periods >= CYCLES + 2:
@@ -131,7 +134,7 @@ def limit_gait(
         changes.append((row + done, foot, down))
         stance = part.stance[-1:]
         if done >= tail:
-            upright.append(_upright(part, len(part.time)))
+            upright.append(walk_margin(part) > 0)
     time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
     return _with_stability(_regimes(row, foot, down, time, n_starts), np.concatenate(upright), time)
@@ -139,14 +142,14 @@ def limit_gait(
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     """Mean direction of phases on the circle [0, 1)."""
-    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    angle = 2.0 * np.pi * numbers("phase", phase)
     mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
 
 def circular_sd(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     """Circular standard deviation sqrt(-2 ln R) of phases on [0, 1), R the mean resultant length, as parts of 1."""
-    angle = 2.0 * np.pi * np.asarray(phase, dtype=float)
+    angle = 2.0 * np.pi * numbers("phase", phase)
     resultant = np.hypot(np.sin(angle).mean(axis), np.cos(angle).mean(axis))
     with np.errstate(divide="ignore"):  # opposite phases: R = 0, no deviation is large enough
         return np.sqrt(-2.0 * np.log(np.minimum(resultant, 1.0))) / (2.0 * np.pi)
@@ -159,7 +162,7 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
     of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
     V / (1 + V) of the period, and by that part the front leg lags behind.
     """
-    return 1.0 / (1.0 + np.asarray(v, dtype=float))
+    return 1.0 / (1.0 + numbers("velocity", v))
 
 
 def graham_phase(v: ArrayLike) -> np.ndarray:
@@ -187,13 +190,6 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     if all(0.0 < phase < 0.5 for phase in along):
         return "negative metachrony"
     return "other"
-
-
-def _upright(walk: Walk, steps: int) -> np.ndarray:
-    """Whether each start is statically stable in each of the last steps, (step, start)."""
-    size = len(walk.time)
-    parts = [slice(first, min(first + PART, size)) for first in range(size - steps, size, PART)]
-    return np.concatenate([walk_margin(part_of(walk, part)) > 0 for part in parts])
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

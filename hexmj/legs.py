@@ -7,6 +7,7 @@ paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
 import math
 from dataclasses import dataclass
 
+from hexmj.checks import check_types
 from hexmj.errors import InputError
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
@@ -41,6 +42,7 @@ class Geometry:
     """Distance of the lines of legs 1, 2, 3 from the body axis [mm]; Fig. 1's D1, D2, D3."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not all(map(math.isfinite, self.origins + self.lateral)) or not min(self.lateral) > 0:
             raise InputError(f"{self}; expected finite origins and lateral distances above 0 mm")
 

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
+from hexmj.checks import numbers, states, typed
 from hexmj.errors import InputError
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
@@ -29,14 +30,15 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
         negative outside, where fewer than three feet stand too; -inf where none does.
 
     Raises:
-        InputError: shapes that do not fit.
+        InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
-    points = np.ascontiguousarray(feet, dtype=float)
-    stands = np.ascontiguousarray(stance, dtype=bool)
+    points, stands = numbers("feet", feet), states("stance", stance)
     if points.shape[-2:] != (6, 2) or stands.shape != points.shape[:-1]:
         raise InputError(
             f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
         )
+    if not np.isfinite(points[stands]).all():
+        raise InputError("a foot that stands is at NaN or infinity; expected all that stand to be somewhere")
     shape = stands.shape[:-1]
     points, stands = points.reshape(-1, *points.shape[-2:]), stands.reshape(-1, stands.shape[-1])
     margin = np.empty(len(points))
@@ -50,6 +52,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where the walk is unknown (after a fall)."""
+    typed("walk", walk, Walk)
     margin = stability_margin(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x).any(axis=-1), np.nan, margin)
 
@@ -67,7 +70,7 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
         feet: tips, (leg, 2) [mm].
         stance: which of them stand, (leg,).
     """
-    points = np.asarray(feet, dtype=float)[np.asarray(stance, dtype=bool)]
+    points = numbers("feet", feet)[states("stance", stance)]
     if len(points) < 3 or np.linalg.matrix_rank(points - points[0]) < 2:
         return points
     from scipy.spatial import ConvexHull

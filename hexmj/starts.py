@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import given, numbers, whole
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 
@@ -30,10 +31,10 @@ def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.nd
     Raises:
         InputError: a number of starts or a seed that makes no sense.
     """
-    check_draw(n_starts, seed)
+    n_starts, seed = check_draw(n_starts, seed)
     if n_starts > MOST_DRAWN:
         raise InputError(f"starts = {n_starts}; expected at most {MOST_DRAWN} in one array")
-    return np.concatenate(list(draw_slabs(n_starts, seed, stride or Stride())))
+    return np.concatenate(list(draw_slabs(n_starts, seed, given("stride", stride, Stride))))
 
 
 def draw_slabs(n_starts: int, seed: int, stride: Stride) -> Iterator[np.ndarray]:
@@ -43,17 +44,14 @@ def draw_slabs(n_starts: int, seed: int, stride: Stride) -> Iterator[np.ndarray]
         yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - first), 6))
 
 
-def check_draw(n_starts: int, seed: int) -> None:
-    """Refuse a number of starts or a seed that makes no sense."""
-    if not (isinstance(n_starts, int) and 1 <= n_starts <= MOST_STARTS):
-        raise InputError(f"starts = {n_starts}; expected a whole number of at least 1 and at most {MOST_STARTS}")
-    if not (isinstance(seed, int) and seed >= 0):
-        raise InputError(f"seed = {seed}; expected an integer of at least 0")
+def check_draw(n_starts: int, seed: int) -> tuple[int, int]:
+    """A number of starts and a seed, unless they make no sense."""
+    return whole("starts", n_starts, 1, MOST_STARTS), whole("seed", seed, 0)
 
 
 def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
     """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0."""
-    x = np.array(starts, dtype=float)
+    x = numbers("starts", starts)
     if x.ndim != 2 or x.shape[1] != 6 or len(x) == 0:
         raise InputError(f"starts have the shape {x.shape}; expected (start, leg) with at least one start and 6 legs")
     if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
@@ -63,7 +61,7 @@ def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:
     """A copy of V_r for each start, (start,), if it lies in [0, 1[ and an acceleration can reach it."""
-    v = np.array(velocity, dtype=float)
+    v = numbers("velocity", velocity)
     if not ((v >= 0) & (v < 1)).all():
         raise InputError(f"velocity = {velocity}; expected 0 <= V < 1, a fraction of the protraction velocity V_p")
     if acceleration and not (v >= acceleration.start).all():
@@ -73,14 +71,9 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
     return np.broadcast_to(v, n_starts).copy()
 
 
-def checked_list(velocities: Sequence[float]) -> np.ndarray:
+def checked_list(velocities: Sequence[float], acceleration: Acceleration | None = None) -> np.ndarray:
     """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
-    try:
-        v = np.array(velocities, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"velocities = {velocities!r}; expected a list of numbers") from None
+    v = numbers("velocities", velocities)
     if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
         raise InputError(f"velocities = {velocities}; expected a list of at least one, and none of them twice")
-    if not ((v >= 0) & (v < 1)).all():
-        raise InputError(f"velocities = {v.tolist()}; expected 0 <= V < 1, fractions of V_p")
-    return v
+    return checked_velocities(v, len(v), acceleration)

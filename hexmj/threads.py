@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from hexmj.errors import InputError
+from hexmj.checks import whole
 
 
 def cores() -> int:
@@ -18,12 +18,12 @@ def cores() -> int:
 
 
 def thread_count(threads: int | None = None) -> int:
-    """The number of threads asked for, by default one per core."""
-    if threads is None:
-        return cores()
-    if threads < 1:
-        raise InputError(f"threads = {threads}; expected at least 1, or nothing for one per core")
-    return threads
+    """The number of threads asked for, by default one per core.
+
+    Raises:
+        InputError: no whole number of at least 1.
+    """
+    return cores() if threads is None else whole("threads", threads, 1, more=", or nothing for one per core")
 
 
 def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads: int | None = None) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import check_types, numbers, typed
 from hexmj.errors import InputError
-from hexmj.legs import FIG1, GEOMETRIES, Geometry
+from hexmj.legs import FIG1, Geometry
 
 WINDOWS = ("walk", "start")
 """Named observation times, see `observation_time`."""
@@ -36,6 +37,7 @@ class Stride:
     """Lines of the tips: 'fig1', or 'centred' with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not all(math.isfinite(v) for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
             raise InputError(f"aep0, pep0, pep_min and dt must be finite; given {self}")
         if not self.pep_min <= self.pep0 < self.aep0:
@@ -44,10 +46,6 @@ class Stride:
             )
         if not 0 < self.dt <= 1:
             raise InputError(f"dt = {self.dt}; expected a time step above 0 and at most 1 time unit")
-        if not isinstance(self.geometry, Geometry):
-            raise InputError(
-                f"geometry = {self.geometry!r}; expected a Geometry, as {', '.join(GEOMETRIES)} in hexmj.legs"
-            )
 
     def periods(self, velocity: Any, count: float = 1.0) -> Any:
         """Duration of some periods of a single leg at V_r, (AEP_0 - PEP_0) (1 + 1/V) each [time units]."""
@@ -64,6 +62,7 @@ class Acceleration:
     """V_r(0), as a fraction of V_p; inferred."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not (math.isfinite(self.rate) and self.rate > 0):
             raise InputError(f"acceleration = {self.rate}; expected a finite number above 0 per time unit")
         if not 0 <= self.start < 1:
@@ -86,8 +85,8 @@ def observation_time(
     Raises:
         InputError: no such window, or V = 0 with the window 'walk'.
     """
-    v = np.asarray(velocity, dtype=float)
-    if not isinstance(window, str):
+    v = numbers("velocity", velocity)
+    if not isinstance(typed("window", window, str | float), str):
         return np.full(v.shape, float(window))
     if window not in WINDOWS:
         raise InputError(f"window = {window!r}; valid names: {', '.join(WINDOWS)}, or a number of time units")
@@ -103,7 +102,7 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
     Raises:
         InputError: less than a step, or more than `MOST_STEPS`.
     """
-    duration, dt = np.asarray(duration, dtype=float), stride.dt
+    duration, dt = numbers("duration", duration), stride.dt
     if not ((duration >= dt) & (duration <= MOST_STEPS * dt)).all():
         raise InputError(
             f"duration = {duration}; expected at least one step, {dt:g}, and at most {MOST_STEPS * dt:g} time units"

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
 
@@ -58,8 +59,9 @@ def joined(walks: Sequence[AnyWalk]) -> AnyWalk:
     """One walk of the same starts out of those that follow each other."""
     if len(walks) == 1:
         return walks[0]
-    names = [one.name for one in fields(walks[0]) if one.name != "geometry"]
-    return replace(walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in names})
+    return replace(
+        walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in _arrays(walks[0])}
+    )
 
 
 def one_start(walk: AnyWalk, start: int) -> AnyWalk:
@@ -69,13 +71,21 @@ def one_start(walk: AnyWalk, start: int) -> AnyWalk:
         InputError: there is no such start.
     """
     count = walk.stance.shape[1]
-    if not 0 <= start < count:
+    if not 0 <= typed("start", start, int) < count:
         raise InputError(f"start = {start}; expected 0 to {count - 1}")
-    names = [one.name for one in fields(walk) if one.name not in ("time", "geometry")]
-    return replace(walk, **{name: getattr(walk, name)[:, start : start + 1] for name in names})
+    return of_starts(walk, slice(start, start + 1))
+
+
+def of_starts(walk: AnyWalk, which: Any) -> AnyWalk:
+    """The walks of some starts."""
+    return replace(walk, **{name: getattr(walk, name)[:, which] for name in _arrays(walk) if name != "time"})
 
 
 def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
     """Some steps of a walk."""
-    names = [one.name for one in fields(walk) if one.name != "geometry"]
-    return replace(walk, **{name: getattr(walk, name)[steps] for name in names})
+    return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(walk)})
+
+
+def _arrays(walk: Walk) -> list[str]:
+    """Names of what a walk holds of every step."""
+    return [one.name for one in fields(walk) if one.name != "geometry"]

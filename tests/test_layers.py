@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("errors", "intervals", "legs", "loaded", "progress", "results", "rotations", "threads"),
+    ("checks", "errors", "intervals", "legs", "loaded", "progress", "results", "rotations", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("timing",),
     ("stability", "walks"),

@@ -153,7 +153,7 @@ def test_strides_that_make_no_sense(change, words):
 def test_networks_that_make_no_sense():
     with pytest.raises(InputError, match="order = 'random'; valid names: printed, undelayed, sequential"):
         Cruse1998(HWS.weights, order="random")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(InputError, match="expected Symmetric or Weights"):
+    with pytest.raises(InputError, match="weights = 'hws'; expected a Symmetric or a Weights"):
         Cruse1998("hws")  # pyright: ignore[reportArgumentType]
 
 

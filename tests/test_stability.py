@@ -111,7 +111,7 @@ def test_mirrored_postures_have_equal_margins():
 
 def test_unknown_after_a_fall():
     walked = walk(np.zeros((2, 6)), LDVS, 0.3, 10.0)
-    walked.x[50:, 1] = np.nan
+    walked.x[50:, 1], walked.stance[50:, 1] = np.nan, False
     margin = walk_margin(walked)
     assert np.isnan(margin[50:, 1]).all()
     assert not np.isnan(margin[:, 0]).any()

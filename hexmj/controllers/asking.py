@@ -4,15 +4,18 @@ What a user's code raises becomes one sentence that says where.
 """
 
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import typed
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
 from hexmj.errors import InputError
+from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk
 
@@ -31,9 +34,12 @@ def begin(
         InputError: a controller, start, velocity or plan that makes no sense.
     """
     check_controller_type(controller)
+    typed("stride", stride, Stride)
+    typed("acceleration", acceleration, Acceleration | None)
+    thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
-    with _said(f"{controller.name}, begin"):
+    with said(f"{controller.name}, begin"):
         plan = controller.begin(x.copy(), v, stride, acceleration, threads)
     check_plan(plan, x, stride)
     return plan
@@ -62,24 +68,31 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
         InputError: it does not, or it raised something.
     """
     end = plan.done + steps
-    with _said("a plan, advance"):
+    with said("a plan, advance"):
         walk = plan.advance(steps)
     if not isinstance(walk, PlannedWalk):
         raise InputError(f"a plan gave {walk!r:.80}; expected a PlannedWalk")
     if plan.done != end:
         raise InputError(f"a plan is at step {plan.done} after it was asked for {steps} more; expected {end}")
     shape = steps, *np.shape(plan.starts)
-    shapes = {"time": shape[:1], "velocity": shape[:2]} | dict.fromkeys(PLANNED, shape)
-    for name, expected in shapes.items():
-        values = np.asarray(getattr(walk, name))
-        if values.shape != expected or values.dtype != (bool if name == "stance" else float):
+    for name, expected in ({"time": shape[:1], "velocity": shape[:2]} | dict.fromkeys(PLANNED, shape)).items():
+        values, kind = np.asarray(getattr(walk, name)), np.dtype(bool if name == "stance" else float)
+        if values.shape != expected or values.dtype != kind:
             raise InputError(
                 f"a plan was asked for {steps} steps, and its {name} is {values.dtype} of the shape {values.shape};"
-                f" expected {'bool' if name == 'stance' else 'float64'} of the shape {expected}"
+                f" expected {kind} of the shape {expected}"
             )
-        if (name in ("x", "y", "velocity") and not np.isfinite(values).all()) or np.isinf(values).any():
-            raise InputError(f"a plan's {name} holds a number that is not finite, before step {end}")
+        may_be_unknown = name in ("aep", "height")
+        if (bad := np.argwhere(np.isinf(values) if may_be_unknown else ~np.isfinite(values))).size:
+            known = "a number, or NaN where nothing tells" if may_be_unknown else "a number"
+            raise InputError(f"a plan's {name} is {values[tuple(bad[0])]} in {place(walk, bad[0])}; expected {known}")
     return walk
+
+
+def place(walk: PlannedWalk, at: Sequence[int]) -> str:
+    """Where in a walk something is, for a sentence: step, start and leg, as far as they are given."""
+    names = [f"step {at[0]}", *(f"start {start} (V = {walk.velocity[at[0], start]:.3g})" for start in at[1:2])]
+    return ", ".join(names + [f"leg {LEGS[leg]}" for leg in at[2:]])
 
 
 def tell(plan: ReadingPlan, sensed: Sensed) -> None:
@@ -88,12 +101,12 @@ def tell(plan: ReadingPlan, sensed: Sensed) -> None:
     Raises:
         InputError: it raised something.
     """
-    with _said("a plan, sense"):
+    with said("a plan, sense"):
         plan.sense(sensed)
 
 
 @contextmanager
-def _said(what: str) -> Iterator[None]:
+def said(what: str) -> Iterator[None]:
     """Say in one sentence what a user's code raises, and where."""
     try:
         yield

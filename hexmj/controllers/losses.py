@@ -1,56 +1,49 @@
-"""First losses of static stability (Eq. 7) of any controller: its own fast way, or its plan looked at."""
+"""First losses of static stability (Eq. 7) of any plan: by a fast way of its own, or by looking at every step."""
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, begin
-from hexmj.controllers.protocol import Controller, FastLosses, Plan
+from hexmj.controllers.asking import advanced, said
+from hexmj.controllers.protocol import FastLosses, Plan
 from hexmj.errors import InputError
 from hexmj.stability import walk_margin
-from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk
 
-CHUNK, BLOCK = 200, 2000
-"""Steps and starts of a plan held in memory at a time."""
+HELD = 400_000
+"""Steps times starts of a plan held in memory at a time."""
+
+MOST = 200
+"""Steps at a time, at most: a few starts that are lost early shall not walk on for long."""
 
 
-def first_losses(
-    controller: Controller,
-    starts: np.ndarray,
-    velocity: np.ndarray,
-    steps: np.ndarray,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-    threads: int | None = None,
-) -> np.ndarray:
-    """The first of each start's `steps`, (start,), that is statically unstable, counted from 1; 0 where none is."""
-    if isinstance(controller, FastLosses):
-        lost = np.asarray(controller.first_losses(starts, velocity, steps, stride, acceleration, threads))
-        if lost.shape != steps.shape or not ((lost >= 0) & (lost <= steps)).all():
-            raise InputError(
-                f"first_losses of {controller.name}: {lost!r:.80}; expected a step from 0 on for each start"
-            )
-        return lost
-    lost = np.empty(len(starts), dtype=int)
-    for first in range(0, len(starts), BLOCK):
-        block = slice(first, first + BLOCK)
-        plan = begin(controller, starts[block], velocity[block], stride, acceleration, threads)
-        lost[block] = planned_losses(plan, steps[block], threads)
+def first_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> np.ndarray:
+    """The first of each start's steps that is statically unstable, (start,), counted from 1; 0 where none is.
+
+    Args:
+        plan: at time 0; nobody goes on with it.
+        steps: how far to look, (start,), or one number for all.
+        threads: one per core unless given; the losses do not depend on it.
+
+    Raises:
+        InputError: a plan that makes no sense.
+    """
+    if not isinstance(plan, FastLosses):
+        return planned_losses(plan, steps, threads)
+    steps = np.broadcast_to(steps, len(plan.starts)).copy()
+    with said("a plan, first_losses"):
+        lost = np.asarray(plan.first_losses(steps))
+    if lost.shape != steps.shape or not ((lost >= 0) & (lost <= steps)).all():
+        raise InputError(f"first_losses of a plan gave {lost!r:.80}; expected a step from 0 on for each start")
     return lost
 
 
 def planned_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> np.ndarray:
-    """The same of a plan at time 0; one number of steps stands for all starts."""
+    """The same of any plan, which is advanced and looked at."""
     steps = np.broadcast_to(steps, len(plan.starts))
     lost = np.zeros(len(steps), dtype=int)
+    at_a_time = min(MOST, max(1, HELD // len(steps)))
     while plan.done < (end := steps[lost == 0].max(initial=0)):
         first = plan.done + 1
-        unstable = unstable_steps(advanced(plan, int(min(CHUNK, end - plan.done))), threads)
+        unstable = walk_margin(advanced(plan, int(min(at_a_time, end - plan.done))), threads) <= 0.0
         unstable &= (first + np.arange(len(unstable)))[:, np.newaxis] <= steps
         new = (lost == 0) & unstable.any(axis=0)
         lost[new] = first + np.argmax(unstable, axis=0)[new]
     return lost
-
-
-def unstable_steps(walk: PlannedWalk, threads: int | None = None) -> np.ndarray:
-    """Which steps end statically unstable, (step, start)."""
-    return walk_margin(walk, threads) <= 0.0

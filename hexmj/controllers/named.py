@@ -1,16 +1,17 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import entry_points
+from os.path import isfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
-from hexmj.controllers.cruse1998.presets import read_weights
+from hexmj.controllers.cruse1998.presets import read_toml, read_weights
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.loaded import importable
@@ -30,20 +31,22 @@ def load_controller(name: str) -> Controller:
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
     """
-    if name in PRESETS:
+    if typed("name", name, str) in PRESETS:
         return PRESETS[name]
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():
-        return _controller(_object(_module(where, name), what, name), name)
+        return _found(where, what, name)
     for point in entry_points(group=ENTRY_POINTS, name=name):
-        return _controller(_object(_module(point.module, name), point.attr, name), name)
-    path = Path(name)
-    if _is_file(path):
-        return _with_fields(path) or Cruse1998(read_weights(path), name=path.stem)
-    raise InputError(
-        f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
-        " nor module:object or file.py:object"
-    )
+        return _found(point.module, point.attr, name)
+    if not isfile(name):
+        raise InputError(
+            f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
+            " nor module:object or file.py:object"
+        )
+    table, path = read_toml(Path(name)), Path(name)
+    if set(table) == {"controller", "fields"} and isinstance(table["fields"], dict):
+        return _with_fields(path, str(table["controller"]), table["fields"])
+    return Cruse1998(read_weights(table, name), name=path.stem)
 
 
 def known_names() -> Iterator[str]:
@@ -52,63 +55,45 @@ def known_names() -> Iterator[str]:
     yield from (point.name for point in entry_points(group=ENTRY_POINTS))
 
 
-def _with_fields(path: Path) -> Controller | None:
-    """The controller that a file names, with its fields; None of other files."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError):
-        return None  # `read_weights` says what is wrong
-    if set(table) != {"controller", "fields"} or not isinstance(table["fields"], dict):
-        return None
-    if ":" not in (named := str(table["controller"])):
+def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
+    """The controller that a file names, with these fields."""
+    if ":" not in named:
         raise InputError(f"{path}: controller = {named!r}; expected module:object or file.py:object")
     found: Any = load_controller(named)
     try:
-        return replace(found, **table["fields"])
+        return replace(found, **values)
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 
 
+def _found(where: str, what: str, name: str) -> Controller:
+    """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
+    module = _module(where, name)
+    if not hasattr(module, what):
+        classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
+        raise InputError(f"controller {name!r}: no {what} there; controllers there: {', '.join(classes) or 'none'}")
+    found = getattr(module, what)
+    try:
+        found = found() if isinstance(found, type) else found
+    except Exception as error:  # whatever the user's code raises
+        raise InputError(
+            f"controller {name!r}: {what} cannot be made: {error}; expected a class with defaults for all fields"
+        ) from None
+    try:
+        check_controller_type(found)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    return found
+
+
 def _module(where: str, name: str) -> ModuleType:
-    """A module by its name, or from a file that ends in .py."""
     try:
         if not where.endswith(".py"):
             return import_module(where)
-        if _is_file(Path(where)):
-            return importable(Path(where))
+        if isfile(where):
+            return importable(where)
     except InputError as error:
         raise InputError(f"controller {name!r}: {error}") from None
     except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
     raise InputError(f"controller {name!r}: {where} is no file; expected one that ends in .py")
-
-
-def _object(module: ModuleType, what: str, name: str) -> object:
-    if not hasattr(module, what):
-        found = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
-        raise InputError(f"controller {name!r}: no {what} there; controllers there: {', '.join(found) or 'none'}")
-    return getattr(module, what)
-
-
-def _controller(found: object, name: str) -> Controller:
-    """A controller, or one of a class with its defaults."""
-    if isinstance(found, type):
-        try:
-            found = found()
-        except Exception as error:  # whatever the user's code raises
-            raise InputError(
-                f"controller {name!r}: {found.__name__} cannot be made: {error};"
-                " expected a class with defaults for all fields"
-            ) from None
-    try:
-        check_controller_type(found)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
-    return found  # pyright: ignore[reportReturnType]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False

@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
@@ -104,6 +105,18 @@ class SteerablePlan(Plan, Protocol):
 
 
 @runtime_checkable
+class FastLosses(Plan, Protocol):
+    """A plan with a faster way to its first losses of static stability than being advanced."""
+
+    def first_losses(self, steps: np.ndarray) -> np.ndarray:
+        """The first of each start's `steps`, (start,), that is statically unstable, counted from 1; 0 where none is.
+
+        Asked of a plan at time 0, which nobody goes on with.  The same bits as `losses.planned_losses` finds.
+        """
+        ...
+
+
+@runtime_checkable
 class Controller(Protocol):
     """A frozen dataclass: its fields are its settings, plain data that tell two controllers apart.
 
@@ -133,26 +146,6 @@ class Controller(Protocol):
             stride: step range, lines of the tips and time step.
             acceleration: Eq. 11; `timing.commanded_velocities` gives V_r at each step.
             threads: one per core unless given; the plan does not depend on it.
-        """
-        ...
-
-
-@runtime_checkable
-class FastLosses(Protocol):
-    """A controller with a faster way to its first losses of static stability than planning the walk."""
-
-    def first_losses(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        steps: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> np.ndarray:
-        """The first of each start's `steps`, (start,), that is statically unstable, counted from 1; 0 where none is.
-
-        The same bits as `losses.planned_losses` finds in the plan.
         """
         ...
 
@@ -192,14 +185,10 @@ def claims_mirrored(controller: Controller) -> bool:
 
 
 def settings_of(controller: Controller) -> dict[str, Any]:
-    """A controller's settings as plain data: numbers, texts, lists and dicts."""
+    """A controller's settings as plain data: numbers, texts, lists and dicts.
+
+    Raises:
+        InputError: no controller, or a field that is no plain data.
+    """
     check_controller_type(controller)
-    return _plain(asdict(controller))  # pyright: ignore[reportArgumentType]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+    return plain(asdict(controller))  # pyright: ignore[reportArgumentType]

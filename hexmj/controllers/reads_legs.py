@@ -17,7 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, SteerablePlan, claims_mirrored
+from hexmj.controllers.protocol import (
+    Controller,
+    ReadingPlan,
+    Sensed,
+    SteerablePlan,
+    check_controller_type,
+    claims_mirrored,
+)
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, joined
@@ -32,6 +39,9 @@ class ReadsLegs:
 
     controller: Controller
     """What plans."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
 
     @property
     def name(self) -> str:
@@ -64,21 +74,9 @@ class ReadsLegs:
         if not isinstance(plan, SteerablePlan):
             raise InputError(
                 f"feedback around {self.controller.name}; expected a controller whose plans can go on from the legs as"
-                f" they are, with {', '.join(('tips', 'standing', 'see', 'restart', 'slow_down'))}"
+                " they are, with tips, standing, see, restart, slow_down"
             )
         return SensedPlan(plan)
-
-    def first_losses(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        steps: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> np.ndarray:
-        """On paper, where nothing is read: those of the controller that plans."""
-        return first_losses(self.controller, starts, velocity, steps, stride, acceleration, threads)
 
 
 class SensedPlan:
@@ -93,6 +91,10 @@ class SensedPlan:
         self._plan = plan
         self._tips = self._targets = self._ordered = plan.starts
         self._stance = np.ones(plan.starts.shape, dtype=bool)
+
+    def first_losses(self, steps: np.ndarray) -> np.ndarray:
+        """See `protocol.FastLosses`: on paper, where nothing is read, those of the plan within."""
+        return first_losses(self._plan, steps)
 
     def sense(self, sensed: Sensed) -> None:
         """Take in the tips, and which feet have met the ground."""

@@ -1,17 +1,18 @@
 """A plan made from a function of one step, and for one that reads the legs from a function of what is sensed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import whole
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride, commanded_velocities
-from hexmj.walks import PlannedWalk
+from hexmj.walks import PLANNED, PlannedWalk
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,36 +31,32 @@ class Step:
     """Of the tips above the ground [mm], NaN for those that the body shall lift; it lifts all unless given."""
 
 
-_KINDS = {"x": float, "y": float, "stance": bool, "aep": float, "height": float}
-"""What a step says of every start and leg, and its type."""
-
-
+@dataclass(eq=False)
 class StepwisePlan:
     """A `protocol.Plan` that asks for one step after the other."""
 
-    def __init__(
-        self,
-        step: Callable[[np.ndarray], Step],
-        starts: ArrayLike,
-        velocity: ArrayLike,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-    ) -> None:
-        """Begin at time 0; see `stepwise`."""
-        self.starts, self.stride, self.done = checked_starts(starts, stride), stride, 0
-        self._step, self._acceleration = step, acceleration
-        self._velocity = checked_velocities(velocity, len(self.starts), acceleration)
+    step: Callable[[np.ndarray], Step]
+    """See `stepwise`."""
+    starts: np.ndarray
+    """(start, leg) tips at time 0 [mm]."""
+    velocity: np.ndarray
+    """(start,) final V_r."""
+    stride: Stride
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None
+    """Eq. 11."""
+    done: int = 0
+    """Steps planned so far."""
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps."""
-        if steps < 1:
-            raise InputError(f"steps = {steps}; expected at least 1")
+        steps = whole("steps", steps, 1)
         stride, shape = self.stride, self.starts.shape
-        v = commanded_velocities(self._velocity, self.done, steps, stride, self._acceleration)
+        v = commanded_velocities(self.velocity, self.done, steps, stride, self.acceleration)
         usual = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
-        planned = {name: np.empty((steps, *shape), dtype=kind) for name, kind in _KINDS.items()}
+        planned = {name: np.empty((steps, *shape), dtype=bool if name == "stance" else float) for name in PLANNED}
         for n, now in enumerate(v):
-            step = self._step(now.copy())
+            step = self.step(now.copy())
             if not isinstance(step, Step):
                 raise InputError(f"a step gave {step!r:.80}; expected a Step")
             given = usual | {name: value for name, value in vars(step).items() if value is not None}
@@ -70,25 +67,12 @@ class StepwisePlan:
         return PlannedWalk(time, np.array(v), **planned, geometry=stride.geometry)
 
 
+@dataclass(eq=False)
 class ReadingStepwisePlan(StepwisePlan):
     """A `protocol.ReadingPlan` that hands on what it is told."""
 
-    def __init__(
-        self,
-        step: Callable[[np.ndarray], Step],
-        starts: ArrayLike,
-        velocity: ArrayLike,
-        stride: Stride,
-        acceleration: Acceleration | None,
-        sense: Callable[[Sensed], None],
-    ) -> None:
-        """Begin at time 0; see `stepwise`."""
-        super().__init__(step, starts, velocity, stride, acceleration)
-        self._sense = sense
-
-    def sense(self, sensed: Sensed) -> None:
-        """Take in what is known before the next step is planned."""
-        self._sense(sensed)
+    sense: Callable[[Sensed], None] = field(kw_only=True)
+    """Takes in what is known before the next step is planned."""
 
 
 def stepwise(
@@ -112,9 +96,9 @@ def stepwise(
     Raises:
         InputError: starts or a velocity that make no sense; while the plan goes on, a step that makes none.
     """
-    if sense:
-        return ReadingStepwisePlan(step, starts, velocity, stride, acceleration, sense)
-    return StepwisePlan(step, starts, velocity, stride, acceleration)
+    x = checked_starts(starts, stride)
+    asked = step, x, checked_velocities(velocity, len(x), acceleration), stride, acceleration
+    return ReadingStepwisePlan(*asked, sense=sense) if sense else StepwisePlan(*asked)
 
 
 def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -123,10 +107,9 @@ def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
         values = np.asarray(value)
     except ValueError:
         raise InputError(f"{name} of a step is {value!r:.80}; expected one array") from None
-    if values.dtype.kind not in ("b" if name == "stance" else "fiu"):
-        raise InputError(
-            f"{name} of a step is of type {values.dtype}; expected {'booleans' if name == 'stance' else 'numbers'}"
-        )
+    kinds, expected = ("b", "booleans") if name == "stance" else ("fiu", "numbers")
+    if values.dtype.kind not in kinds:
+        raise InputError(f"{name} of a step is of type {values.dtype}; expected {expected}")
     try:
         return np.broadcast_to(values, shape)
     except ValueError:

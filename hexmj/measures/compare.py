@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from hexmj.checks import check_types, given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -52,6 +53,7 @@ class Comparison:
     """The accelerating procedure of Eq. 11."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not self.controllers:
             raise InputError("no controller was given; expected at least one")
         for controller in self.controllers.values():
@@ -65,16 +67,16 @@ class Comparison:
         return observed(self.velocities, self.window, self.stride, self.acceleration)
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`."""
+        """See `sweeps.Study`; each is an `outcome_table`."""
         from hexmj.measures.outcome_table import outcome_table
 
         same = {name: getattr(self, name) for name in ("n_starts", "seed", "conditions", "stride", "acceleration")}
 
-        def cell(name: str, velocity: float, time: float) -> Cell:
-            own = {"controller": self.controllers[name], "velocity": velocity, "duration": time}
-            return Cell(f"{name}-V-{velocity:g}", outcome_table, own | same, work=time)
-
-        return [cell(name, v, time) for name in self.controllers for v, time in zip(*self.observed, strict=True)]
+        return [
+            Cell(f"{name}-V-{v:g}", outcome_table, same | {"controller": one, "velocity": v, "duration": t}, work=t)
+            for name, one in self.controllers.items()
+            for v, t in zip(*self.observed, strict=True)
+        ]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """As `compare` gives it."""
@@ -133,8 +135,9 @@ def compare(
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}
-    whole = conditions or Conditions(), stride or Stride(), acceleration
-    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *whole), folder, **how)
+    typed("folder", folder, Path | str | None)
+    walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
+    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *walks), folder, **how)
 
 
 def physical_flss(

@@ -16,10 +16,7 @@ CONTROLLER_MARKERS = ("o", "s", "^", "D")
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
     """FLSS against velocity, every measure and controller with its 95 % intervals, from `compare.compare`."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _flss_axes(7.2, 4.6)
     shift = 0.004
     styles: list[Any] = list(zip(CONTROLLER_LINES, CONTROLLER_MARKERS, strict=True)) * result.sizes["controller"]
     for (line, marker), name in zip(styles, result.controller.values, strict=False):
@@ -31,7 +28,6 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
                 color=colour, linestyle=line, marker=marker, markersize=4, capsize=2.5, linewidth=1.6,
                 label=f"{name}, {measure}",
             )  # fmt: skip
-    _flss_axes(axes)
     axes.legend(frameon=False, fontsize=9)
     conditions = result.attrs["conditions"]
     axes.set_title(
@@ -46,13 +42,9 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
 
 def flss_figure(table: "xr.Dataset", title: str) -> "Figure":
     """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.frequency_table`."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _flss_axes(6.4, 4.2)
     error = [table.flss - table.low, table.high - table.flss]
     axes.errorbar(table.velocity, table.flss, error, marker="o", markersize=4, capsize=2.5, color="#1b6ca8")
-    _flss_axes(axes)
     axes.set_title(title, fontsize=10)
     return figure
 
@@ -64,7 +56,13 @@ def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
     return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _flss_axes(axes: "Axes") -> None:
+def _flss_axes(width: float, height: float) -> "tuple[Figure, Axes]":
+    """A figure of FLSS against velocity, with nothing in it yet; its size in inches."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots()
     axes.set(xlabel="velocity $V_r / V_p$", ylabel="FLSS", ylim=(-0.02, 1.02), xlim=(0.0, 1.0))
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
+    return figure, axes

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import given, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval, wilson_intervals
+from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.progress import Progress
-from hexmj.starts import SAMPLE, check_draw, checked_list, checked_starts, checked_velocities, draw_slabs
+from hexmj.starts import SAMPLE, check_draw, draw_slabs
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk
 
@@ -45,9 +47,9 @@ def walk(
     Raises:
         InputError: a start, velocity or duration that makes no sense.
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
-    return advanced(plan, int(steps_within(duration, stride)))
+    return advanced(plan, int(steps_within(typed("duration", duration, float), stride)))
 
 
 def first_loss(
@@ -64,14 +66,12 @@ def first_loss(
 
     The walks are those of `walk`, but none is kept; `duration` may be (start,).
     """
-    stride = stride or Stride()
-    check_controller_type(controller)
-    x = checked_starts(starts, stride)
-    v = checked_velocities(velocity, len(x), acceleration)
-    steps = steps_within(duration, stride)
-    if steps.shape not in ((), (len(x),)):
-        raise InputError(f"durations have the shape {steps.shape}; expected one number or ({len(x)},)")
-    lost = first_losses(controller, x, v, np.broadcast_to(steps, len(x)).copy(), stride, acceleration, threads)
+    stride = given("stride", stride, Stride)
+    plan = begin(controller, starts, velocity, stride, acceleration, threads)
+    steps, count = steps_within(duration, stride), len(plan.starts)
+    if steps.shape not in ((), (count,)):
+        raise InputError(f"durations have the shape {steps.shape}; expected one number or ({count},)")
+    lost = first_losses(plan, steps, threads)
     return np.where(lost > 0, lost * stride.dt, np.inf)
 
 
@@ -107,18 +107,17 @@ def flss(
         Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
         of 1000 starts, and the observation time `duration`.
     """
-    stride, v = stride or Stride(), checked_list(velocities)
+    stride = given("stride", stride, Stride)
+    typed("progress", progress, Progress | None)
     check_controller_type(controller)
-    check_draw(n_starts, seed)
-    duration = observation_time(window, v, stride, acceleration)
+    n_starts, seed = check_draw(n_starts, seed)
+    v, duration = observed(velocities, window, stride, acceleration)
+    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     counts = []
     for x in draw_slabs(n_starts, seed, stride):
         lost = np.empty((len(v), len(x)), dtype=bool)
-        for i, one in enumerate(v):
-            times = first_loss(
-                x, controller, one, duration[i], stride=stride, acceleration=acceleration, threads=threads
-            )
-            lost[i] = np.isfinite(times)
+        for i in range(len(v)):
+            lost[i] = np.isfinite(first_loss(x, controller, v[i], duration[i], **how))
             if progress:
                 progress(len(x) / n_starts / len(v))
         counts.append(losses_by_sample(lost))
@@ -156,10 +155,11 @@ def flss_over_range(
     Raises:
         InputError: a range, window, seed or number of starts that makes no sense.
     """
-    stride = stride or Stride()
+    stride = given("stride", stride, Stride)
+    low, high = typed("low", low, float), typed("high", high, float)
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
-    check_draw(n_starts, seed)
+    n_starts, seed = check_draw(n_starts, seed)
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in draw_slabs(n_starts, seed, stride):
         v = rng.uniform(low, high, len(x))
@@ -200,14 +200,11 @@ def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, d
     low, high = wilson_intervals(total, n_starts)
     samples = losses[:, : n_starts // SAMPLE] / SAMPLE
     spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
-    unit = {"units": "1"}
-    return xr.Dataset(
-        {
-            "flss": ("velocity", total / n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
-            "low": ("velocity", low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
-            "high": ("velocity", high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
-            "sample_sd": ("velocity", spread, unit | {"long_name": "standard deviation over samples of 1000 starts"}),
-            "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
-        },
-        coords={"velocity": ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})},
-    )
+    columns = {
+        "flss": (total / n_starts, "frequency of the loss of static stability"),
+        "low": (low, "lower end of the 95 % Wilson interval"),
+        "high": (high, "upper end of the 95 % Wilson interval"),
+        "sample_sd": (spread, "standard deviation over samples of 1000 starts"),
+    }
+    told = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
+    return xr.Dataset(told).assign(velocity_axis(velocities, duration))

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
-from hexmj.physics.outcomes import Outcomes, Tally, measured_walk
+from hexmj.physics.outcomes import Outcomes, RunningOutcomes, measured_walk
 from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress
 from hexmj.stability import loss_time
@@ -68,6 +69,7 @@ def physical_outcomes(
     Raises:
         InputError, SimulationError: see `drive.drive`.
     """
+    duration = typed("duration", duration, float)
     how: Any = {"stride": settled.stride, "acceleration": acceleration}
     plan = begin(controller, settled.starts, velocity, **how, threads=1)
     planned_loss = first_loss(settled.starts, controller, velocity, duration, **how, threads=threads)
@@ -85,10 +87,11 @@ def outcomes_of_plan(
     progress: Progress | None = None,
 ) -> Outcomes:
     """The same for any plan that is at time 0, whose own losses, (start,) [time units], are known."""
-    tally = Tally(settled, planned_loss)
+    typed("progress", progress, Progress | None)
+    running = RunningOutcomes(settled, planned_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
-        tally.add(chunk)
-    return tally.outcomes()
+        running.add(chunk)
+    return running.outcomes()
 
 
 def physical_walk(
@@ -119,7 +122,8 @@ def physical_walk(
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
-    stride = stride or Stride()
+    stride, conditions = given("stride", stride, Stride), given("conditions", conditions, Conditions)
+    typed("progress", progress, Progress | None)
     planned = walk(starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
     plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     settled = settle(starts, conditions, stride, threads)
@@ -137,13 +141,13 @@ def physical_walk_of_plan(
 ) -> PhysicalWalk:
     """The same for any plan that is at time 0, which goes as `planned`."""
     conditions, stride = settled.conditions, settled.stride
-    tally = Tally(settled, loss_time(planned, threads=threads))
+    running = RunningOutcomes(settled, loss_time(planned, threads=threads))
     shape = planned.stance.shape
     x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
     told: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
-        tally.add(chunk)
+        running.add(chunk)
         told += [chunk.plan] if isinstance(plan, ReadingPlan) else []
         columns, seen, seen_centre = measured_walk(chunk, settled)
         at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
@@ -152,4 +156,4 @@ def physical_walk_of_plan(
         qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
     measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
     ordered = joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]) if told else planned
-    return PhysicalWalk(planned, ordered, measured, tally.outcomes(), qpos, centre, conditions, stride)
+    return PhysicalWalk(planned, ordered, measured, running.outcomes(), qpos, centre, conditions, stride)

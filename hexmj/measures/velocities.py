@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.starts import checked_list, checked_velocities
+from hexmj.starts import checked_list
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 
 
@@ -17,15 +17,14 @@ def observed(
     Raises:
         InputError: a velocity that is none or comes twice, or a time without steps.
     """
-    v = checked_list(velocities)
-    checked_velocities(v, len(v), acceleration)
+    v = checked_list(velocities, acceleration)
     duration = observation_time(window, v, stride, acceleration)
     steps_within(duration, stride)
     return v, duration
 
 
 def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
-    """The coordinates `velocity` and `duration`, of both (velocity,)."""
+    """Velocities and their observation times, both (velocity,), as a table has them."""
     return {
         "velocity": ("velocity", v, {"units": "V_p", "long_name": "velocity V_r"}),
         "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),

@@ -104,7 +104,7 @@ def _look(
                 stance[n, i, leg] = standing[row, column, leg]
 
 
-class Tally:
+class RunningOutcomes:
     """Adds up the outcomes of all starts, chunk by chunk."""
 
     def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:

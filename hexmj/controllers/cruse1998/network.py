@@ -5,14 +5,15 @@ AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent
 `kernel`, compiled; ``tests/plain_network.py`` holds them in their readable form.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, general
-from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
@@ -21,6 +22,9 @@ from hexmj.walks import PlannedWalk
 
 Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
+
+Constants = tuple[int, tuple[float, ...], tuple[float, ...]]
+"""The order of updates, weights and constants, as the kernel reads them."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +39,7 @@ class Cruse1998:
     name: str = "cruse1998"
     """Of the set of weights."""
 
-    def __post_init__(self) -> None:
-        general(self.weights)
-        if self.order not in get_args(Order):
-            raise InputError(f"order = {self.order!r}; valid names: {', '.join(get_args(Order))}")
+    __post_init__ = check_types
 
     @property
     def mirrored(self) -> bool:
@@ -56,7 +57,10 @@ class Cruse1998:
         threads: int | None = None,
     ) -> "NetworkPlan":
         """See `protocol.Controller.begin`."""
-        return NetworkPlan(self, starts, velocity, stride, acceleration, threads)
+        x = checked_starts(starts, stride)
+        final = checked_velocities(velocity, len(x), acceleration)
+        slow = np.full(len(x), acceleration.start) if acceleration else final
+        return NetworkPlan(x, stride, self._constants(stride, acceleration), slow, slow, final, threads)
 
     def begin_at_speed(
         self,
@@ -67,67 +71,48 @@ class Cruse1998:
         threads: int | None = None,
     ) -> "NetworkPlan":
         """See `protocol.SteerableController.begin_at_speed`."""
-        return NetworkPlan(self, starts, velocity, stride, acceleration, threads, at_speed=True)
+        plan = self.begin(starts, velocity, stride, acceleration, threads)
+        return replace(plan, first=plan.final)
 
-    def first_losses(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        steps: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> np.ndarray:
-        """See `protocol.FastLosses.first_losses`; only the present state of a walk is kept."""
-        constants = self._constants(stride, acceleration)
-        first_velocity = _first_velocity(velocity, acceleration)
-        lost = np.empty(len(starts))
-
-        def work(begin: int, end: int) -> None:
-            part = slice(begin, end)
-            kernel.first_losses(starts[part], first_velocity[part], velocity[part], steps[part], *constants, lost[part])
-
-        run_blocks(work, len(starts), max(8 * kernel.LANES, -(-len(starts) // (4 * thread_count(threads)))), threads)
-        return lost
-
-    def _constants(
-        self, stride: Stride, acceleration: Acceleration | None
-    ) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
-        """The order of updates, weights and constants, as the kernel reads them."""
+    def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:
+        """As the kernel reads them."""
         w, d, g = general(self.weights), np.arange(6), stride.geometry
         span = stride.aep0 - stride.pep_min
         table = [(w.p1, kernel.REAR), (w.p1, kernel.CONTRA), (span * w.p2, kernel.REAR), (w.p4, kernel.FRONT)]
         table += [(p, source) for source in (kernel.FRONT, kernel.CONTRA) for p in (w.p31, w.p32, w.p33, w.p34)]
         p = np.concatenate([matrix[d, source] for matrix, source in table])
-        v_start, rate = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
-        k = np.concatenate(
-            [[stride.aep0, stride.pep0, stride.pep_min, stride.dt, v_start, rate], g.origin, 1 / np.abs(g.y)]
-        )
+        eq11 = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
+        k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y))])
         return get_args(Order).index(self.order), tuple(p.tolist()), tuple(k.tolist())
 
 
+@dataclass(eq=False)
 class NetworkPlan:
-    """A `protocol.SteerablePlan`: the network of many starts, advanced as far as asked for."""
+    """A `protocol.SteerablePlan` with `FastLosses`: the network of many starts, advanced as far as asked for."""
 
-    def __init__(
-        self,
-        controller: Cruse1998,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-        at_speed: bool = False,
-    ) -> None:
-        """Put every start at time 0; see `Cruse1998.begin` and `begin_at_speed`."""
-        self.starts, self.stride, self.done = checked_starts(starts, stride), stride, 0
-        velocity = checked_velocities(velocity, len(self.starts), acceleration)
-        self._constants = *_, k = controller._constants(stride, acceleration)
-        self._blocks = np.empty((-(-len(velocity) // kernel.LANES), kernel.ROWS * kernel.LANES))
-        first_velocity = _first_velocity(velocity, None if at_speed else acceleration)
-        kernel.begin_blocks(self._blocks, self.starts, first_velocity, velocity, k)
-        self._restart_velocity = _first_velocity(velocity, acceleration)
-        self._threads = threads
+    starts: np.ndarray
+    """(start, leg) tips at time 0 [mm]."""
+    stride: Stride
+    """Step range, lines of the tips and time step."""
+    constants: Constants
+    """Of the network."""
+    first: np.ndarray
+    """(start,) V_r at time 0."""
+    slow: np.ndarray
+    """(start,) V_r(0) of the acceleration; the final one where there is none."""
+    final: np.ndarray
+    """(start,) V_r that is accelerated to."""
+    threads: int | None = None
+    """One per core unless given."""
+    done: int = 0
+    """Steps planned so far."""
+
+    @cached_property
+    def _blocks(self) -> np.ndarray:
+        """The kernel's state of all starts, (block, row of lanes), from time 0 on."""
+        blocks = np.empty((-(-len(self.starts) // kernel.LANES), kernel.ROWS * kernel.LANES))
+        kernel.begin_blocks(blocks, self.starts, self.first, self.final, self.constants[-1])
+        return blocks
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps of the walk."""
@@ -135,14 +120,27 @@ class NetworkPlan:
         velocity, x, stance = np.empty(shape), np.empty((*shape, 6)), np.empty((*shape, 6), dtype=bool)
 
         def work(begin: int, end: int) -> None:
-            kernel.record(self._blocks, begin, end, *self._constants, velocity, x, stance)
+            kernel.record(self._blocks, begin, end, *self.constants, velocity, x, stance)
 
-        run_blocks(work, len(self._blocks), 1, self._threads)
+        run_blocks(work, len(self._blocks), 1, self.threads)
         self.done += steps
         time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
         geometry = self.stride.geometry
         y, aep, height = (np.broadcast_to(one, x.shape) for one in (geometry.y, self.stride.aep0, np.nan))
         return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
+
+    def first_losses(self, steps: np.ndarray) -> np.ndarray:
+        """See `protocol.FastLosses`; only the present state of a walk is kept."""
+        lost, size = np.empty(len(steps)), len(steps)
+        block = max(8 * kernel.LANES, -(-size // (4 * thread_count(self.threads))))
+
+        def work(begin: int, end: int) -> None:
+            part = slice(begin, end)
+            walks = self.starts[part], self.first[part], self.final[part], steps[part]
+            kernel.first_losses(*walks, *self.constants, lost[part])
+
+        run_blocks(work, size, block, self.threads)
+        return lost
 
     def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
         """Begin with `unseen` steps and go on by `seen` more.
@@ -152,9 +150,9 @@ class NetworkPlan:
         """
 
         def work(begin: int, end: int) -> None:
-            kernel.lose(self._blocks, begin, end, unseen, seen, *self._constants)
+            kernel.lose(self._blocks, begin, end, unseen, seen, *self.constants)
 
-        run_blocks(work, len(self._blocks), 1, self._threads)
+        run_blocks(work, len(self._blocks), 1, self.threads)
         self.done += unseen + seen
         return self._read(kernel.LOST, 1)[:, 0]
 
@@ -185,7 +183,7 @@ class NetworkPlan:
 
     def slow_down(self, which: np.ndarray) -> None:
         """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
-        for row, values in {kernel.V: self._restart_velocity, kernel.DONE: 0.0}.items():
+        for row, values in {kernel.V: self.slow, kernel.DONE: 0.0}.items():
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 
     def _read(self, row: int, rows: int = 6) -> np.ndarray:
@@ -198,8 +196,3 @@ class NetworkPlan:
 
     def _rows(self, row: int, rows: int) -> np.ndarray:
         return self._blocks.reshape(len(self._blocks), kernel.ROWS, kernel.LANES)[:, row : row + rows]
-
-
-def _first_velocity(velocity: np.ndarray, acceleration: Acceleration | None) -> np.ndarray:
-    """V_r(0) of each start, (start,)."""
-    return np.full(len(velocity), acceleration.start) if acceleration else velocity

@@ -3,8 +3,7 @@
 import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from hexmj.controllers.cruse1998.network import Cruse1998
 from hexmj.controllers.cruse1998.weights import (
@@ -23,24 +22,43 @@ OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""
 
 
-def read_weights(path: Path) -> AnyWeights:
-    """The weights in a TOML file.
-
-    It holds either a table ``[symmetric]`` with fields of `Symmetric`, or tables
-    ``[weights.p1]`` ... ``[weights.p4]`` with keys ``"d,e"`` (the paper's leg numbers).
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a file.
 
     Raises:
-        InputError: a file that cannot be read, or a key, type or value that makes no sense.
+        InputError: it cannot be read.
     """
     try:
-        table = tomllib.loads(path.read_text())
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise InputError(f"{path} cannot be read as TOML: {error}") from None
+
+
+def read_weights(table: dict[str, Any], where: str) -> AnyWeights:
+    """Weights from the tables of a file.
+
+    Args:
+        table: either ``[symmetric]`` with fields of `Symmetric`, or ``[weights.p1]`` ... ``[weights.p4]`` with keys
+            ``"d,e"`` (the paper's leg numbers).
+        where: the file, for a sentence.
+
+    Raises:
+        InputError: a key, type or value that makes no sense.
+    """
     if list(table) == ["symmetric"]:
-        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{path} [symmetric]"))
-    if list(table) == ["weights"] and isinstance(table["weights"], dict):
-        return _read_weights(table["weights"], str(path))
-    raise InputError(f"{path} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]")
+        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{where} [symmetric]"))
+    if list(table) != ["weights"] or not isinstance(weights := table["weights"], dict):
+        raise InputError(
+            f"{where} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]"
+        )
+    if unknown := set(weights) - set(NEIGHBOURS):
+        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
+    numbers = {}
+    for kind, entries in weights.items():
+        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
+        given = _numbers(entries, list(keys), f"{where} [weights.{kind}]")
+        numbers |= {(kind, keys[key]): value for key, value in given.items()}
+    return Weights.of(numbers)
 
 
 def weights_toml(weights: AnyWeights) -> str:
@@ -55,17 +73,6 @@ def weights_toml(weights: AnyWeights) -> str:
     return "\n".join(lines[1:]) + "\n"
 
 
-def _read_weights(table: dict[str, object], where: str) -> Weights:
-    if unknown := set(table) - set(NEIGHBOURS):
-        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
-    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    for kind, entries in table.items():
-        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
-        for key, value in _numbers(entries, list(keys), f"{where} [weights.{kind}]").items():
-            matrices[kind][keys[key]] = value
-    return Weights(**matrices)
-
-
 def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
     """The entries of a TOML table, all of which must be numbers with valid keys."""
     if not isinstance(table, dict):
@@ -78,16 +85,12 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
     return {key: float(value) for key, value in table.items()}
 
 
-def _own() -> dict[str, Weights]:
-    """The sets of `OWN` by their names."""
-    table = tomllib.loads(OWN.read_text(encoding="utf-8"))
-    return {name: _read_weights(entry["weights"], f"{OWN.name} [{name}]") for name, entry in table.items()}
-
-
-PRESETS: dict[str, Cruse1998] = {
-    name: Cruse1998(weights, name=name)
-    for name, weights in {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS, **_own()}.items()
+_PAPER = {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS}
+_OWN = {
+    name: read_weights({"weights": entry["weights"]}, f"{OWN.name} [{name}]") for name, entry in read_toml(OWN).items()
 }
+
+PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in (_PAPER | _OWN).items()}
 """The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once."""
 
 HWS, LDVS, UNCOORDINATED = (PRESETS[name] for name in ("hws", "ldvs", "uncoordinated"))

@@ -5,12 +5,13 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Literal
 
 import numpy as np
 
+from hexmj.checks import check_types, numbers
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4
 
@@ -25,9 +26,9 @@ def pairs(kind: str) -> list[tuple[int, int]]:
     return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
 
 
-def _kinds(size: int, with_velocity: int) -> list[str]:
-    """Kinds of weight in a vector of `size` numbers; the short form leaves out P^{3,4}."""
-    return [kind for kind in NEIGHBOURS if kind != "p34" or size == with_velocity]
+def _in_vector(size: int) -> list[tuple[str, tuple[int, int]]]:
+    """Kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
+    return [(kind, pair) for kind in NEIGHBOURS if kind != "p34" or size == 58 for pair in pairs(kind)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Weights:
 
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
-            matrix = np.array(getattr(self, kind), dtype=float)
+            matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6):
                 raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
             if not np.isfinite(matrix).all():
@@ -71,21 +72,24 @@ class Weights:
             object.__setattr__(self, kind, matrix)
 
     @classmethod
+    def of(cls, numbers: Mapping[tuple[str, tuple[int, int]], float]) -> "Weights":
+        """From numbers by kind and (destination, source) leg; what is not given is 0."""
+        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
+        for (kind, pair), value in numbers.items():
+            matrices[kind][pair] = value
+        return cls(**matrices)
+
+    @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
         """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
-        size = len(vector)
-        if size not in (48, 58):
+        numbered = numbers("weights", vector)
+        if (size := numbered.size) not in (48, 58):
             raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
-        values = iter(vector)
-        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for kind in _kinds(size, 58):
-            for pair in pairs(kind):
-                matrices[kind][pair] = next(values)
-        return cls(**matrices)
+        return cls.of(dict(zip(_in_vector(size), numbered.ravel(), strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
         """The inverse of `from_vector`."""
-        return np.array([getattr(self, kind)[pair] for kind in _kinds(size, 58) for pair in pairs(kind)])
+        return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,7 @@ class Symmetric:
     """P_i^4: mechanism 4 off (0) or on (1)."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         for key, value in asdict(self).items():
             if not math.isfinite(value):
                 raise InputError(f"{key} = {value}; expected a finite number")
@@ -124,11 +129,12 @@ class Symmetric:
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
         """Read ten numbers in the order of the fields, or nine without p34_i."""
         names = [f.name for f in fields(cls)]
-        if len(vector) == 9:
+        values = numbers("weights", vector).ravel().tolist()
+        if len(values) == 9:
             names.remove("p34_i")
-        elif len(vector) != 10:
-            raise InputError(f"{len(vector)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
-        return cls(**{name: float(value) for name, value in zip(names, vector, strict=True)})
+        elif len(values) != 10:
+            raise InputError(f"{len(values)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
+        return cls(**dict(zip(names, values, strict=True)))
 
     def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
         """The inverse of `from_vector`."""
@@ -136,7 +142,7 @@ class Symmetric:
 
     def expand(self) -> Weights:
         """Appendix A: the general weights, equal on both sides and along each side."""
-        by_kind = {
+        sides = {  # ipsilateral, contralateral
             "p1": (self.p1_i, self.p1_c),
             "p2": (self.p2, 0.0),
             "p31": (self.p31_i, self.p31_c),
@@ -145,11 +151,7 @@ class Symmetric:
             "p34": (self.p34_i, 0.0),
             "p4": (self.p4_i, 0.0),
         }
-        matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for kind, (ipsilateral, contralateral) in by_kind.items():
-            for d, e in pairs(kind):
-                matrices[kind][d, e] = contralateral if abs(d - e) == 3 else ipsilateral
-        return Weights(**matrices)
+        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in _in_vector(58)})
 
 
 AnyWeights = Symmetric | Weights
@@ -167,13 +169,5 @@ NO_WEIGHTS = Symmetric()
 
 
 def general(weights: AnyWeights) -> Weights:
-    """The general weights of either form.
-
-    Raises:
-        InputError: no weights.
-    """
-    if isinstance(weights, Symmetric):
-        return weights.expand()
-    if isinstance(weights, Weights):
-        return weights
-    raise InputError(f"weights = {weights!r:.200}; expected Symmetric or Weights")
+    """The general weights of either form."""
+    return weights.expand() if isinstance(weights, Symmetric) else weights

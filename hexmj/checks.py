@@ -1,0 +1,154 @@
+"""Whether a value is of the type that was asked for; if not, one sentence names it, shows it and says what is expected.
+
+NumPy's scalars are taken for the Python numbers that they are; True and False are no numbers.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.errors import InputError
+
+Of = TypeVar("Of")
+
+_NAMES = {
+    float: "a number",
+    int: "a whole number",
+    bool: "True or False",
+    str: "a text",
+    NoneType: "None",
+    Callable: "a function",
+}
+"""What is expected, by type; of any other class one of its objects."""
+
+
+def typed(name: str, value: Any, wanted: Any) -> Any:
+    """A value if it is of an annotated type: a class, a union, names (`Literal`) or a tuple.
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        return _fitted(value, wanted)
+    except TypeError:
+        raise InputError(f"{name} = {_shown(value)}; {_expected(wanted)}") from None
+
+
+def given(name: str, value: Of | None, usual: Callable[[], Of]) -> Of:
+    """What was given, an object of the class `usual`, or a usual one where nothing was.
+
+    Raises:
+        InputError: something else was given.
+    """
+    return usual() if value is None else typed(name, value, usual)
+
+
+def whole(name: str, value: Any, least: int, most: float = math.inf, more: str = "") -> int:
+    """A whole number within bounds; `more` is said of them, too.
+
+    Raises:
+        InputError: it is none.
+    """
+    with suppress(TypeError):
+        if least <= (number := _fitted(value, int)) <= most:
+            return number
+    bounds = f"at least {least}" + (f" and at most {most}" if most < math.inf else "")
+    raise InputError(f"{name} = {_shown(value)}; expected a whole number of {bounds}{more}")
+
+
+def numbers(name: str, values: ArrayLike) -> np.ndarray:
+    """A new array of real numbers.
+
+    Raises:
+        InputError: values that are none, some that are masked, or rows of different lengths.
+    """
+    with suppress(ValueError):
+        array = np.asarray(values)
+        if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
+            return np.array(array, dtype=float, order="C")
+    raise InputError(f"{name} = {_shown(values)}; expected numbers")
+
+
+def states(name: str, values: ArrayLike) -> np.ndarray:
+    """A new array of booleans, which may be given as 0 and 1.
+
+    Raises:
+        InputError: values that are none, or some that are masked.
+    """
+    with suppress(ValueError):
+        array = np.asarray(values)
+        known = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.isin(array, (0, 1)).all())
+        if known and not np.ma.is_masked(values):
+            return np.array(array, dtype=bool, order="C")
+    raise InputError(f"{name} = {_shown(values)}; expected True and False")
+
+
+def check_types(thing: Any) -> None:
+    """Refuse a frozen dataclass with a field that is not of the type it is annotated with; its `__post_init__`.
+
+    Raises:
+        InputError: such a field.
+    """
+    for name, wanted in _annotations(type(thing)).items():
+        object.__setattr__(thing, name, typed(name, getattr(thing, name), wanted))
+
+
+@cache
+def _annotations(of: type) -> dict[str, Any]:
+    return get_type_hints(of)
+
+
+def _fitted(value: Any, wanted: Any) -> Any:
+    """The value as its type has it; a TypeError where it is of another."""
+    origin, inner = get_origin(wanted), get_args(wanted)
+    if origin in (Union, UnionType):
+        for one in inner:
+            with suppress(TypeError):
+                return _fitted(value, one)
+        raise TypeError
+    if origin is tuple:
+        if isinstance(value, list | tuple | np.ndarray) and np.ndim(value):
+            kinds = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
+            if len(kinds) == len(value):
+                return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))
+    elif wanted in (int, float):
+        if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool):
+            return int(value) if isinstance(value, Integral) else float(value)
+    elif origin is Literal:
+        if isinstance(value, str | int) and value in inner:
+            return value
+    elif origin is Sequence or getattr(wanted, "_is_protocol", False) or wanted is Any:
+        return value  # looked at where it is used
+    elif isinstance(value, origin or wanted):
+        return value
+    elif wanted is bool and isinstance(value, np.bool_):
+        return bool(value)
+    raise TypeError
+
+
+def _expected(wanted: Any) -> str:
+    if get_origin(wanted) is Literal:
+        return f"valid names: {', '.join(map(str, get_args(wanted)))}"
+    return f"expected {_kind(wanted)}"
+
+
+def _kind(wanted: Any) -> str:
+    origin, inner = get_origin(wanted), get_args(wanted)
+    if origin is tuple:
+        count = "some" if inner[-1] is Ellipsis else len(inner)
+        return f"{count} values, each {_kind(inner[0])}"
+    if origin in (Union, UnionType):
+        return " or ".join(map(_kind, inner))
+    name = (origin or wanted).__name__
+    return _NAMES.get(origin or wanted, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
+
+
+def _shown(value: Any) -> str:
+    return f"{' '.join(repr(value).split()):.80}"

@@ -1,0 +1,224 @@
+"""A value of the wrong type gets one sentence that names it, wherever it is given; NumPy's scalars are numbers."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.checks import typed
+from hexmj.conditions import Ground, Masses, TimeScale
+from hexmj.controllers.asking import begin
+from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.protocol import settings_of
+from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
+from hexmj.measures.compare import Comparison
+from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.settling import settle
+from hexmj.walks import one_start
+
+anything: Any = hexmj
+LDVS, STRIDE = anything.LDVS, hexmj.Stride()
+STARTS = np.zeros((2, 6))
+FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
+STANDS = np.ones((2, 6), dtype=bool)
+FEW: Any = {"n_starts": 2, "window": 10.0}
+
+
+def walk(starts: Any = STARTS, controller: Any = LDVS, velocity: Any = 0.3, duration: Any = 5.0, **options: Any):
+    return hexmj.walk(starts, controller, velocity, duration, **options)
+
+
+def first_loss(starts: Any = STARTS, controller: Any = LDVS, velocity: Any = 0.3, duration: Any = 5.0, **options: Any):
+    return hexmj.first_loss(starts, controller, velocity, duration, **options)
+
+
+def flss(controller: Any = LDVS, velocities: Any = (0.3,), **options: Any):
+    return hexmj.flss(controller, velocities, **FEW | options)
+
+
+def over_range(low: Any = 0.1, high: Any = 0.5, **options: Any):
+    return hexmj.flss_over_range(LDVS, low, high, **FEW | options)
+
+
+def compare(controllers: Any = LDVS, velocities: Any = (0.3,), **options: Any):
+    return hexmj.compare(controllers, velocities, **FEW | options)
+
+
+def physical_walk(duration: Any = 5.0, **options: Any):
+    return hexmj.physical_walk(STARTS, LDVS, 0.3, duration, **options)
+
+
+def nan_tips() -> Any:
+    walked = walk()
+    return replace(walked, x=np.full_like(walked.x, np.nan))
+
+
+MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
+
+BAD: list[tuple[Callable[[], Any], str]] = [
+    (lambda: walk(stride=3), "stride = 3; expected a Stride"),
+    (lambda: walk(stride={}), "stride = {}; expected a Stride"),
+    (lambda: walk(stride=0), "stride = 0; expected a Stride"),
+    (lambda: walk(acceleration=0.1), "acceleration = 0.1; expected an Acceleration or None"),
+    (lambda: walk(acceleration=False), "acceleration = False; expected an Acceleration or None"),
+    (lambda: walk(duration="x"), "duration = 'x'; expected a number"),
+    (lambda: walk(duration=None), "duration = None; expected a number"),
+    (lambda: walk(duration=True), "duration = True; expected a number"),
+    (lambda: walk(duration=[5.0, 6.0]), "duration = [5.0, 6.0]; expected a number"),
+    (lambda: walk(velocity="fast"), "velocity = 'fast'; expected numbers"),
+    (lambda: walk(velocity=True), "velocity = True; expected numbers"),
+    (lambda: walk(velocity=None), "velocity = None; expected numbers"),
+    (lambda: walk(velocity=0.3 + 1j), "velocity = (0.3+1j); expected numbers"),
+    (lambda: walk(velocity=[[0.1], [0.1, 0.2]]), "velocity = [[0.1], [0.1, 0.2]]; expected numbers"),
+    (lambda: walk(starts="none"), "starts = 'none'; expected numbers"),
+    (lambda: walk(starts=STARTS > 0), "starts = array([[False, False, "),
+    (lambda: walk(starts=STARTS + 1j), "starts = array([[0.+1.j, "),
+    (lambda: walk(starts=MASKED), "starts = masked_array( data=[[--, --, --, "),
+    (lambda: walk(starts=[[1.0], [1.0, 2.0]]), "starts = [[1.0], [1.0, 2.0]]; expected numbers"),
+    (lambda: walk(starts=[[{}] * 6]), "starts = [[{}, {}, {}, {}, {}, {}]]; expected numbers"),
+    (lambda: walk(threads=1.5), "threads = 1.5; expected a whole number of at least 1, or nothing for one per core"),
+    (lambda: walk(threads=True), "threads = True; expected a whole number of at least 1"),
+    (lambda: walk(threads="two"), "threads = 'two'; expected a whole number of at least 1"),
+    (lambda: walk(controller="ldvs"), "controller = 'ldvs'; expected a controller"),
+    (lambda: first_loss(duration="x"), "duration = 'x'; expected numbers"),
+    (lambda: first_loss(duration=[True, False]), "duration = [True, False]; expected numbers"),
+    (lambda: first_loss(stride="fig1"), "stride = 'fig1'; expected a Stride"),
+    (lambda: first_loss(threads=0.5), "threads = 0.5; expected a whole number of at least 1"),
+    (lambda: first_loss(acceleration=STRIDE), "acceleration = Stride(aep0=10.0,"),
+    (lambda: begin(LDVS, STARTS, 0.3, anything), "stride = <module 'hexmj'"),
+    (lambda: flss(n_starts=2.0), "starts = 2.0; expected a whole number of at least 1 and at most 10000000000"),
+    (lambda: flss(n_starts=True), "starts = True; expected a whole number of at least 1"),
+    (lambda: flss(n_starts="7000"), "starts = '7000'; expected a whole number of at least 1"),
+    (lambda: flss(n_starts=None), "starts = None; expected a whole number of at least 1"),
+    (lambda: flss(seed=True), "seed = True; expected a whole number of at least 0"),
+    (lambda: flss(seed=0.0), "seed = 0.0; expected a whole number of at least 0"),
+    (lambda: flss(seed=None), "seed = None; expected a whole number of at least 0"),
+    (lambda: flss(window=None), "window = None; expected a text or a number"),
+    (lambda: flss(window=True), "window = True; expected a text or a number"),
+    (lambda: flss(window=[10.0]), "window = [10.0]; expected a text or a number"),
+    (lambda: flss(velocities="0.3"), "velocities = '0.3'; expected numbers"),
+    (lambda: flss(velocities=[True]), "velocities = [True]; expected numbers"),
+    (lambda: flss(velocities=None), "velocities = None; expected numbers"),
+    (lambda: flss(stride=[]), "stride = []; expected a Stride"),
+    (lambda: flss(progress=3), "progress = 3; expected a function or None"),
+    (lambda: flss(controller=None), "controller = None; expected a controller"),
+    (lambda: over_range(low="a"), "low = 'a'; expected a number"),
+    (lambda: over_range(high=None), "high = None; expected a number"),
+    (lambda: over_range(seed=1.5), "seed = 1.5; expected a whole number"),
+    (lambda: over_range(stride=3), "stride = 3; expected a Stride"),
+    (lambda: hexmj.draw_starts(anything, 0), "starts = <module 'hexmj'"),
+    (lambda: hexmj.draw_starts(3, np.bool_(True)), "seed = np.True_; expected a whole number"),  # pyright: ignore
+    (lambda: hexmj.draw_starts(3, 0, "fine"), "stride = 'fine'; expected a Stride"),  # pyright: ignore
+    (lambda: limit_gait(LDVS, "fast"), "velocity = 'fast'; expected a number"),  # pyright: ignore
+    (lambda: limit_gait(LDVS, 0.5, periods=20.5), "periods = 20.5; expected a whole number"),  # pyright: ignore
+    (lambda: limit_gait(LDVS, 0.5, stride=3), "stride = 3; expected a Stride"),  # pyright: ignore
+    (lambda: one_start(walk(), 0.5), "start = 0.5; expected a whole number"),  # pyright: ignore
+    (lambda: one_start(walk(), True), "start = True; expected a whole number"),
+    (lambda: hexmj.Stride(aep0="10"), "aep0 = '10'; expected a number"),  # pyright: ignore
+    (lambda: hexmj.Stride(dt=True), "dt = True; expected a number"),
+    (lambda: hexmj.Stride(dt=None), "dt = None; expected a number"),  # pyright: ignore
+    (lambda: hexmj.Stride(geometry="fig1"), "geometry = 'fig1'; expected a Geometry"),  # pyright: ignore
+    (lambda: hexmj.Acceleration(rate="slow"), "rate = 'slow'; expected a number"),  # pyright: ignore
+    (lambda: hexmj.Acceleration(start=False), "start = False; expected a number"),
+    (lambda: hexmj.Geometry(origins=(1.0, 2.0)), "origins = (1.0, 2.0); expected 3 values, each a number"),  # pyright: ignore
+    (lambda: hexmj.Geometry(lateral=18.0), "lateral = 18.0; expected 3 values, each a number"),  # pyright: ignore
+    (lambda: hexmj.Geometry(lateral=(1, 2, "3")), "lateral = (1, 2, '3'); expected 3 values"),  # pyright: ignore
+    (lambda: hexmj.Symmetric(p1_i="10"), "p1_i = '10'; expected a number"),  # pyright: ignore
+    (lambda: hexmj.Symmetric(p2=True), "p2 = True; expected a number"),
+    (lambda: hexmj.Cruse1998("hws"), "weights = 'hws'; expected a Symmetric or a Weights"),  # pyright: ignore
+    (lambda: replace(LDVS, order=1), "order = 1; valid names: printed, undelayed, sequential"),
+    (lambda: replace(LDVS, name=3), "name = 3; expected a text"),
+    (lambda: hexmj.Weights.from_vector(["0"] * 58), "weights = ['0', '0', "),  # pyright: ignore
+    (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
+    (lambda: hexmj.Conditions(time=3), "time = 3; expected a TimeScale"),  # pyright: ignore
+    (lambda: hexmj.Conditions(body="insect"), "body = 'insect'; expected a Body"),  # pyright: ignore
+    (lambda: hexmj.Conditions.of(vp="80"), "vp = '80'; expected a number"),
+    (lambda: hexmj.Conditions.of(load=True), "load = True; expected a number"),
+    (lambda: hexmj.Conditions.of(ground=3), "ground = 3; valid names: flat, step, gap, hurdle, rough"),
+    (lambda: hexmj.Conditions.of(ground_seed=1.0), "ground_seed = 1.0; expected a whole number"),
+    (lambda: TimeScale(vp=None), "vp = None; expected a number"),  # pyright: ignore
+    (lambda: Masses(load=[1.0]), "load = [1.0]; expected a number"),  # pyright: ignore
+    (lambda: Ground(ground="sand"), "ground = 'sand'; valid names: flat"),  # pyright: ignore
+    (lambda: compare(conditions=3), "conditions = 3; expected a Conditions"),
+    (lambda: compare(conditions={}), "conditions = {}; expected a Conditions"),
+    (lambda: compare(stride={}), "stride = {}; expected a Stride"),
+    (lambda: compare(acceleration=0), "acceleration = 0; expected an Acceleration or None"),
+    (lambda: compare(n_starts=1.5), "n_starts = 1.5; expected a whole number"),
+    (lambda: compare(seed=True), "seed = True; expected a whole number"),
+    (lambda: compare(window=None), "window = None; expected a text or a number"),
+    (lambda: compare(controllers=3), "controller = 3; expected a controller"),
+    (lambda: compare(controllers={"a": 3}), "controller = 3; expected a controller"),
+    (lambda: Comparison(LDVS), "controllers = Cruse1998("),
+    (lambda: physical_walk(conditions={}), "conditions = {}; expected a Conditions"),
+    (lambda: physical_walk(stride=3), "stride = 3; expected a Stride"),
+    (lambda: physical_walk(duration="x"), "duration = 'x'; expected a number"),
+    (lambda: physical_walk(progress=3), "progress = 3; expected a function or None"),
+    (lambda: physical_outcomes(settle(STARTS), LDVS, 0.3, "x"), "duration = 'x'; expected a number"),  # pyright: ignore
+    (lambda: check_controller(LDVS, 3), "stride = 3; expected a Stride"),  # pyright: ignore
+    (lambda: hexmj.loss_time(nan_tips()), "a foot that stands is at NaN or infinity"),
+    (lambda: hexmj.stability_margin(np.where(FEET > 0, np.nan, FEET), STANDS), "a foot that stands is at NaN"),
+    (lambda: hexmj.stability_margin(FEET + 1j, STANDS), "feet = array([[[ 28.+1.j, "),
+    (lambda: hexmj.stability_margin(FEET, STANDS * 0.5), "stance = array([[0.5, 0.5,"),
+    (lambda: hexmj.stability_margin(FEET, [["no"] * 6] * 2), "stance = [['no', 'no',"),
+    (lambda: hexmj.stability_margin(np.ma.masked_greater(FEET, 20.0), STANDS), "feet = masked_array("),
+    (lambda: hexmj.stability_margin(FEET, np.ma.masked_array(STANDS, STANDS)), "stance = masked_array("),
+    (lambda: hexmj.stability_margin(FEET, STANDS, threads=1.5), "threads = 1.5; expected a whole number"),  # pyright: ignore
+    (lambda: hexmj.loss_time(STARTS), "walk = array([[0., 0., "),  # pyright: ignore
+    (lambda: gait(3), "walk = 3; expected a Walk"),  # pyright: ignore
+    (lambda: circular_mean([0.1 + 1j]), "phase = [(0.1+1j)]; expected numbers"),  # pyright: ignore
+    (lambda: wilson_phase("slow"), "velocity = 'slow'; expected numbers"),  # pyright: ignore
+    (lambda: hexmj.load_controller(3), "name = 3; expected a text"),  # pyright: ignore
+    (lambda: compare(folder=3), "folder = 3; expected a Path or a text or None"),
+    (lambda: hexmj.support_polygon("feet", STANDS[0]), "feet = 'feet'; expected numbers"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), BAD, ids=[words[:40] for _, words in BAD])
+def test_a_wrong_type_gets_one_sentence(call: Callable[[], Any], words: str):
+    with pytest.raises(hexmj.InputError, match=f"^{re.escape(words)}") as wrong:
+        call()
+    sentence = str(wrong.value)
+    assert "\n" not in sentence
+    assert re.search("; expected |; valid names: ", sentence)
+
+
+def test_numbers_of_numpy_are_numbers():
+    """And stand in settings as Python's own."""
+    usual = flss(n_starts=30, seed=4, window=20.0, velocities=[0.5])
+    given = flss(n_starts=np.int64(30), seed=np.uint8(4), window=np.float64(20.0), velocities=np.array([0.5]))
+    assert given.equals(usual)
+    assert json.dumps(given.attrs) == json.dumps(usual.attrs)
+    assert hexmj.Conditions.of(vp=np.float32(40.0), ground_seed=np.int32(2)).flat()["vp"] == 40.0
+    stride = hexmj.Stride(dt=np.float32(0.25), geometry=hexmj.Geometry(origins=np.array([24, 0, -24])))  # pyright: ignore
+    assert stride == hexmj.Stride(dt=0.25, geometry=hexmj.CENTRED)
+    assert json.dumps(settings_of(replace(LDVS, weights=hexmj.Symmetric(np.float32(2.0)))))  # pyright: ignore
+    assert np.array_equal(first_loss(threads=np.int64(1)), first_loss())
+    assert one_start(walk(), np.int64(1)).x.shape == (50, 1, 6)  # pyright: ignore
+
+
+def test_states_may_be_given_as_0_and_1():
+    margin = hexmj.stability_margin(FEET, STANDS)
+    assert np.array_equal(hexmj.stability_margin(FEET.tolist(), STANDS.astype(int)), margin)
+    assert np.array_equal(hexmj.stability_margin(np.asfortranarray(FEET), np.ma.masked_array(STANDS)), margin)
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted", "kept"),
+    [
+        (np.float64(2.0), int | float, 2.0),
+        (np.bool_(True), bool | None, True),
+        (None, bool | None, None),
+        ([1, 2], tuple[int, ...], (1, 2)),
+        (Path("a"), Path, Path("a")),
+    ],
+)
+def test_what_fits_is_kept(value, wanted, kept):
+    found = typed("value", value, wanted)
+    assert found == kept
+    assert type(found) is type(kept)
