@@ -1,6 +1,7 @@
 """A compiled body: the one object that is asked for its model, its columns, its kinematics and its measures."""
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -11,6 +12,7 @@ from hexmj.bodies.additions import sensor_groups
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.numeric import HingeChains, hinge_chains
+from hexmj.bodies.reading import posed
 from hexmj.errors import InputError
 
 if TYPE_CHECKING:
@@ -73,29 +75,14 @@ class CompiledBody:
         return int(self.model.jnt_bodyid[0])
 
     @property
-    def gravity(self) -> float:
-        """Acceleration of gravity [mm/s^2]."""
-        return -float(self.model.opt.gravity[2])
-
-    @property
-    def mass(self) -> float:
-        """Of the body itself, without what it carries [g]."""
-        return self.body.mass
-
-    @property
     def weight(self) -> float:
-        """Of the body itself [g mm/s^2]."""
-        return self.mass * self.gravity
+        """Of the body itself, without what it carries [g mm/s^2]."""
+        return -self.body.mass * float(self.model.opt.gravity[2])
 
     @property
     def torque_limits(self) -> np.ndarray:
         """Greatest torque of each joint, (leg * joint,) [g mm^2/s^2]."""
         return self.model.actuator_forcerange[self.columns.ctrl, 1]
-
-    @property
-    def home_joints(self) -> np.ndarray:
-        """Angles of the joints in posture home, (leg, joint) [rad]."""
-        return self.home[self.columns.qpos].reshape(len(self.body.legs), -1)
 
     def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].
@@ -136,22 +123,19 @@ def columns(model: mujoco.MjModel, body: Body) -> Columns:
 def trunk_corners(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the trunk's capsules, middles of its spheres and corners of its boxes, (corner, axis) [mm], in the root
     frame, and the radius around each, (corner,) [mm]."""
-    data = mujoco.MjData(model)
-    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-    mujoco.mj_kinematics(model, data)
+    data, kinds = posed(model, model.qpos0), mujoco.mjtGeom
     ends, radii = [], []
     for part in body.trunk:
         geom = model.geom(part).id
-        size, place, axes = model.geom_size[geom], data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            corners, radius = [place - size[1] * axes[:, 2], place + size[1] * axes[:, 2]], size[0]
-        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
-            corners, radius = [place], size[0]
-        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
-            signs = np.stack(np.meshgrid(*3 * [[-1, 1]]), axis=-1).reshape(-1, 3)
-            corners, radius = list(place + (signs * size) @ axes.T), 0.0
+        kind, size, axes = model.geom_type[geom], model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+        if kind == kinds.mjGEOM_CAPSULE:
+            corners, radius = np.outer((-1, 1), (0, 0, size[1])), size[0]
+        elif kind == kinds.mjGEOM_SPHERE:
+            corners, radius = np.zeros((1, 3)), size[0]
+        elif kind == kinds.mjGEOM_BOX:
+            corners, radius = size * list(product((-1, 1), repeat=3)), 0.0
         else:
             raise InputError(f"body {body.name!r}: trunk part {part!r}; expected a capsule, a sphere or a box")
-        ends += corners
+        ends.append(data.geom_xpos[geom] + corners @ axes.T)
         radii += len(corners) * [radius]
-    return np.array(ends), np.array(radii)
+    return np.concatenate(ends), np.array(radii)

@@ -23,41 +23,30 @@ LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 
 def lay_ground(spec: mujoco.MjSpec, ground: "Ground", body: Body) -> None:
     """Add what lies ahead to a spec of a body on its plane."""
-    lengths = body.lengths
+    lengths, kinds = body.lengths, mujoco.mjtGeom
     near, length, height, far = ground.ground_at, ground.ground_length, ground.ground_height, lengths.ground_reach
-    boxes, caps = {}, {}
-    if ground.ground == "step":
-        boxes = {"step": (near, near + far, height)}
-    elif ground.ground == "hurdle":
-        boxes = {"hurdle": (near, near + length, height)}
-    elif ground.ground == "gap":
-        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
-        boxes = {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)}
-    elif ground.ground == "rough":
-        caps = {f"bump_{i}": bump for i, bump in enumerate(zip(*_bumps(ground, lengths), strict=True))}
-    look = LOOK | {"material": spec.geom(body.ground).material}
-    for name, (begin, end, top) in boxes.items():
+    boxes = {
+        "step": {"step": (near, near + far, height)},
+        "hurdle": {"hurdle": (near, near + length, height)},
+        "gap": {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)},
+    }
+    pieces = {}  # what lies ahead, its size and place by its name
+    for name, (begin, end, top) in boxes.get(ground.ground, {}).items():
         half = (top + lengths.shortest_leg) / 2
-        spec.worldbody.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[(end - begin) / 2, lengths.ground_half_width, half],
-            pos=[(begin + end) / 2, 0.0, top - half],
-            **look,
-        )
-    # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that is
-    # deeper than its distance from their sides sideways into the next, and there it stays.
-    for name, ((x, y), top, radius) in caps.items():
-        spec.worldbody.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[radius, 0.0, 0.0],
-            pos=[x, y, top - radius],
-            **look,
-        )
-    for piece in (*boxes, *caps):
+        size = (end - begin) / 2, lengths.ground_half_width, half
+        pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
+    if ground.ground == "gap":
+        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
+    if ground.ground == "rough":
+        # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that
+        # is deeper than its distance from their sides sideways into the next, and there it stays.
+        for i, ((x, y), top, radius) in enumerate(zip(*_bumps(ground, lengths), strict=True)):
+            pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
+    look = LOOK | {"material": spec.geom(body.ground).material}
+    for name, (kind, size, place) in pieces.items():
+        spec.worldbody.add_geom(name=name, type=kind, size=size, pos=place, **look)
         for touching in (*body.trunk, *body.feet):
-            spec.add_pair(name=f"{piece}_{touching}", geomname1=piece, geomname2=touching)
+            spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
 
 
 def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.ndarray:

@@ -8,19 +8,17 @@ angles are unique.
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mujoco
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from hexmj.bodies.description import Body
 from hexmj.bodies.numeric import HingeChains
+from hexmj.bodies.reading import joint_numbers
 from hexmj.legs import SIDE
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from hexmj.bodies.description import Body
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -73,13 +71,13 @@ class ThreeHinges:
         return self.coxa_position + np.stack([forward, left, up], axis=-1)
 
 
-def three_hinges(model: "mujoco.MjModel", body: "Body", chains: HingeChains) -> ThreeHinges | None:
+def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> ThreeHinges | None:
     """The closed form of a compiled body's legs, or none where they are arranged in another way.
 
     The segments are read as if they lay along the x axes of their bodies; whether they do, and whether angles are
     counted as here, is seen in random postures: there the closed form puts the feet where the chains do.
     """
-    joints = np.array([[model.joint(joint).id for joint in leg.joints] for leg in body.legs])
+    joints = joint_numbers(model, body)
     if joints.shape[1] != 3:
         return None
     coxa, femur, tibia = (model.body_pos[model.jnt_bodyid[hinge]] for hinge in joints.T)
@@ -91,12 +89,10 @@ def three_hinges(model: "mujoco.MjModel", body: "Body", chains: HingeChains) -> 
         side=np.array(SIDE, dtype=np.float64),
         joint_range=model.jnt_range[joints],
     )
-    low, high = np.moveaxis(legs.joint_range, -1, 0)
-    unique = (low >= -np.pi).all() and (high[:, :2] <= np.pi).all()
-    knee_up = (low[:, 2] >= 0).all() and (high[:, 2] <= np.pi).all()
-    postures = np.random.default_rng(0).uniform(low, high, (SAMPLES, *low.shape))
+    unique = (chains.low >= (-np.pi, -np.pi, 0.0)).all() and (chains.high <= np.pi).all()
+    postures = np.random.default_rng(0).uniform(chains.low, chains.high, (SAMPLES, *joints.shape))
     apart = np.abs(legs.forward(postures) - chains.forward(postures)).max()
-    return legs if unique and knee_up and apart <= SAME else None
+    return legs if unique and apart <= SAME else None
 
 
 @njit(cache=True, nogil=True)
@@ -119,16 +115,14 @@ def _solve(
                 protraction = math.atan2(forward, outward)
                 levation = math.atan2(up, along) + math.acos((a * a + c * c - b * b) / (2 * a * c))
                 knee = math.acos((a * a + b * b - c * c) / (2 * a * b))
+                angles = protraction, levation, knee
             else:
-                protraction = levation = knee = math.nan
-            limits = joint_range[leg]
-            within = (
-                limits[0, 0] <= protraction <= limits[0, 1]
-                and limits[1, 0] <= levation <= limits[1, 1]
-                and limits[2, 0] <= knee <= limits[2, 1]
-            )
+                angles = math.nan, math.nan, math.nan
+            within = True
+            for j in range(3):
+                joints[n, leg, j] = angles[j]
+                within &= joint_range[leg, j, 0] <= angles[j] <= joint_range[leg, j, 1]
             reachable[n, leg] = within
-            joints[n, leg, 0] = protraction if within else math.nan
-            joints[n, leg, 1] = levation if within else math.nan
-            joints[n, leg, 2] = knee if within else math.nan
+            if not within:
+                joints[n, leg] = math.nan
     return joints, reachable

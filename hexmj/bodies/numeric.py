@@ -8,18 +8,15 @@ Where a chain is all but singular a tip can be missed: of random postures of ran
 the stick insect's none in 10^5.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hexmj.bodies.description import ROOT_QPOS
+from hexmj.bodies.description import Body
 from hexmj.bodies.newton import reach
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from hexmj.bodies.description import Body
+from hexmj.bodies.reading import joint_numbers, posed
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -72,16 +69,10 @@ class HingeChains(NamedTuple):
         return place
 
 
-def hinge_chains(model: "mujoco.MjModel", body: "Body") -> HingeChains:
+def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:
     """The chains of a compiled body."""
-    import mujoco
-
-    joints = np.array([[model.joint(joint).id for joint in leg.joints] for leg in body.legs])
+    joints, data = joint_numbers(model, body), posed(model, model.qpos0)
     columns = model.jnt_qposadr[joints]
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-    mujoco.mj_kinematics(model, data)
     anchor, foot = data.xanchor[joints], np.array([data.site(foot).xpos for foot in body.feet])
     segments = np.diff(np.concatenate([anchor, foot[:, np.newaxis]], axis=1), axis=1)
     return HingeChains(
