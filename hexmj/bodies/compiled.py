@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.bodies.additions import sensor_groups
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
+from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.numeric import HingeChains, hinge_chains
 from hexmj.bodies.reading import posed
@@ -83,6 +84,10 @@ class CompiledBody:
     def torque_limits(self) -> np.ndarray:
         """Greatest torque of each joint, (leg * joint,) [g mm^2/s^2]."""
         return self.model.actuator_forcerange[self.columns.ctrl, 1]
+
+    def depth(self, feet: np.ndarray) -> np.ndarray:
+        """How deep feet in the world, (..., axis) [mm], are in the ground, (...) [mm]; negative above it."""
+        return depth_in_ground(self.conditions.ground, self.body.lengths, feet, self.foot_radius)
 
     def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].

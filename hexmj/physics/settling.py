@@ -41,6 +41,11 @@ class Settled:
         """(start, position)."""
         return self.state[:, : self.compiled.model.nq]
 
+    @property
+    def substeps(self) -> int:
+        """Physics steps in one step of a plan."""
+        return self.conditions.substeps(self.stride)
+
 
 def settle(
     starts: ArrayLike,
