@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -14,10 +13,8 @@ from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.numeric import HingeChains, hinge_chains
 from hexmj.bodies.reading import posed
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-
-if TYPE_CHECKING:
-    from hexmj.conditions import Conditions
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class CompiledBody:
 
     model: mujoco.MjModel
     """The caller's own."""
-    conditions: "Conditions"
+    conditions: Conditions
     """Those it was compiled for."""
     columns: Columns
     kinematics: ThreeHinges | HingeChains
@@ -100,6 +97,20 @@ class CompiledBody:
     def forward(self, joints: ArrayLike) -> np.ndarray:
         """Tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""
         return self.kinematics.forward(joints)
+
+
+def measured(model: mujoco.MjModel, conditions: Conditions) -> CompiledBody:
+    """A body compiled for some conditions."""
+    body = conditions.body
+    return CompiledBody(
+        model=model,
+        conditions=conditions,
+        columns=columns(model, body),
+        kinematics=kinematics(model, body),
+        foot_radius=float(model.geom(body.feet[0]).size[0]),
+        trunk_corners=trunk_corners(model, body),
+        home=model.key(body.home).qpos.copy(),
+    )
 
 
 def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:

@@ -4,15 +4,11 @@ Everywhere `ground` says what lies ahead: `ground.ground` is its kind, `ground_h
 `ground_seed` its measures (`hexmj.conditions.Ground`).
 """
 
-from typing import TYPE_CHECKING
-
 import mujoco
 import numpy as np
 
 from hexmj.bodies.description import Body, Lengths
-
-if TYPE_CHECKING:
-    from hexmj.conditions import Ground
+from hexmj.conditions import Ground
 
 BUMPS = (15, 9)
 """Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
@@ -21,7 +17,7 @@ LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
 
 
-def lay_ground(spec: mujoco.MjSpec, ground: "Ground", body: Body) -> None:
+def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
     """Add what lies ahead to a spec of a body on its plane."""
     lengths, kinds = body.lengths, mujoco.mjtGeom
     near, length, height, far = ground.ground_at, ground.ground_length, ground.ground_height, lengths.ground_reach
@@ -49,7 +45,7 @@ def lay_ground(spec: mujoco.MjSpec, ground: "Ground", body: Body) -> None:
             spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
 
 
-def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.ndarray:
+def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.ndarray:
     """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
     x = places[..., 0]
     if ground.ground == "rough":
@@ -62,7 +58,7 @@ def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.n
     return np.where((x > ground.ground_at) & (x < end), height, 0.0)
 
 
-def depth_in_ground(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
     """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
 
     Args:
@@ -88,7 +84,7 @@ def depth_in_ground(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius
     return radius - np.minimum(from_block, z - floor)
 
 
-def _depth_in_bumps(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def _depth_in_bumps(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
     """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
     centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(ground, lengths))
     corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
@@ -101,7 +97,7 @@ def _depth_in_bumps(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius
     return depth
 
 
-def _bumps(ground: "Ground", lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bumps(ground: Ground, lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
     along, across = BUMPS
     x = ground.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)

@@ -7,8 +7,7 @@ angles are unique.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,7 +15,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from hexmj.bodies.description import Body
-from hexmj.bodies.numeric import HingeChains
+from hexmj.bodies.numeric import HingeChains, over_tips
 from hexmj.bodies.reading import joint_numbers
 from hexmj.legs import SIDE
 
@@ -27,8 +26,7 @@ SAMPLES, SAME = 32, 1e-9
 """Postures in which a chain is compared with the closed form, and how far apart their tips may be [mm]."""
 
 
-@dataclass(frozen=True, eq=False)
-class ThreeHinges:
+class ThreeHinges(NamedTuple):
     """Six legs of three hinges in the root frame (x forward, y left, z up)."""
 
     coxa_position: Floats
@@ -54,11 +52,7 @@ class ThreeHinges:
             The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
             tip can be reached within the leg's length and the joints' ranges, (..., leg).
         """
-        tips = np.asarray(tips, dtype=np.float64)
-        flat = np.ascontiguousarray(tips).reshape(-1, *tips.shape[-2:])
-        lengths = self.coxa, self.femur, self.tibia
-        joints, reachable = _solve(flat, self.coxa_position, *lengths, self.side, self.joint_range)
-        return joints.reshape(tips.shape), reachable.reshape(tips.shape[:-1])
+        return over_tips(_solve, tips, self)
 
     def forward(self, joints: ArrayLike) -> Floats:
         """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
@@ -96,20 +90,18 @@ def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> Thre
 
 
 @njit(cache=True, nogil=True)
-def _solve(
-    tips: Any, coxa_position: Any, coxa: Any, femur: Any, tibia: Any, side: Any, joint_range: Any
-) -> tuple[Any, Any]:
+def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
     """`ThreeHinges.inverse` for tips shaped (n, leg, axis)."""
     joints = np.empty(tips.shape)
     reachable = np.empty(tips.shape[:2], dtype=np.bool_)
     for n in range(tips.shape[0]):
         for leg in range(tips.shape[1]):
-            a, b = femur[leg], tibia[leg]
-            forward = tips[n, leg, 0] - coxa_position[leg, 0]
-            outward = side[leg] * (tips[n, leg, 1] - coxa_position[leg, 1])
-            up = tips[n, leg, 2] - coxa_position[leg, 2]
+            coxa, a, b = legs.coxa[leg], legs.femur[leg], legs.tibia[leg]
+            forward = tips[n, leg, 0] - legs.coxa_position[leg, 0]
+            outward = legs.side[leg] * (tips[n, leg, 1] - legs.coxa_position[leg, 1])
+            up = tips[n, leg, 2] - legs.coxa_position[leg, 2]
             # The triangle of femur a, tibia b and c, from the coxa-trochanter joint to the tip.
-            along = math.sqrt(forward * forward + outward * outward) - coxa[leg]
+            along = math.sqrt(forward * forward + outward * outward) - coxa
             c = math.sqrt(along * along + up * up)
             if abs(a - b) <= c <= a + b:
                 protraction = math.atan2(forward, outward)
@@ -121,7 +113,7 @@ def _solve(
             within = True
             for j in range(3):
                 joints[n, leg, j] = angles[j]
-                within &= joint_range[leg, j, 0] <= angles[j] <= joint_range[leg, j, 1]
+                within &= legs.joint_range[leg, j, 0] <= angles[j] <= legs.joint_range[leg, j, 1]
             reachable[n, leg] = within
             if not within:
                 joints[n, leg] = math.nan

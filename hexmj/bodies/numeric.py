@@ -8,7 +8,8 @@ Where a chain is all but singular a tip can be missed: of random postures of ran
 the stick insect's none in 10^5.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -52,10 +53,7 @@ class HingeChains(NamedTuple):
             The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
             tip can be reached within the joints' ranges, (..., leg).
         """
-        tips = np.asarray(tips, dtype=np.float64)
-        flat = np.ascontiguousarray(tips).reshape(-1, *tips.shape[-2:])
-        joints, reachable = reach(flat, self)
-        return joints.reshape(*tips.shape[:-1], self.zero.shape[1]), reachable.reshape(tips.shape[:-1])
+        return over_tips(reach, tips, self)
 
     def forward(self, joints: ArrayLike) -> Floats:
         """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
@@ -67,6 +65,13 @@ class HingeChains(NamedTuple):
             along = axis * (axis * off).sum(axis=-1, keepdims=True)
             place = self.anchor[:, j] + along + cosine * (off - along) + sine * np.cross(axis, off)
         return place
+
+
+def over_tips(solve: Callable[..., Any], tips: ArrayLike, legs: Any) -> tuple[Floats, Bools]:
+    """What a compiled inverse says of tips with any leading axes."""
+    tips = np.asarray(tips, dtype=np.float64)
+    joints, reachable = solve(np.ascontiguousarray(tips).reshape(-1, *tips.shape[-2:]), legs)
+    return joints.reshape(*tips.shape[:-1], joints.shape[-1]), reachable.reshape(tips.shape[:-1])
 
 
 def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:
