@@ -29,6 +29,7 @@ that diverges raises dm_control's PhysicsError.  Contacts are those of the last 
 """
 
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -227,35 +228,34 @@ class InsectPhysics(mujoco.Physics):
         return self.data.sensordata[self.compiled.columns.foot].reshape(6, 3).copy()
 
 
+@dataclass(eq=False)
 class Walking(control.Task):
-    """Walk straight ahead; subclasses say what an action means."""
+    """Walk straight ahead; subclasses say what an action means.  The arguments are those of `load`."""
 
-    def __init__(
-        self,
-        velocity: float,
-        controller: Controller,
-        conditions: Conditions,
-        stride: Stride,
-        duration: float,
-        seed: int,
-    ) -> None:
-        """The arguments are those of `load`."""
-        self._velocity, self._controller, self._conditions, self._stride = velocity, controller, conditions, stride
-        self._command = velocity * conditions.time.vp
-        self._duration, self._seed = duration, seed
-        self._starts, self._episodes = draw_starts(16, seed, stride), 0
+    velocity: float
+    controller: Controller
+    conditions: Conditions
+    stride: Stride
+    duration: float
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Draw the first starts."""
+        self._starts, self._episodes = draw_starts(16, self.seed, self.stride), 0
+        self._command = self.velocity * self.conditions.time.vp
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
         if self._episodes == len(self._starts):
-            self._starts = draw_starts(2 * self._episodes, self._seed, self._stride)
+            self._starts = draw_starts(2 * self._episodes, self.seed, self.stride)
         start = self._starts[[self._episodes]]
         self._episodes += 1
-        settled = settle(start, self._conditions, self._stride, threads=1)
+        settled = settle(start, self.conditions, self.stride, threads=1)
         mujoco.mj_setState(physics.model.ptr, physics.data.ptr, settled.state[0], AFTER)
         physics.set_control(settled.ctrl[0])
-        self._plan = begin(self._controller, start, self._velocity, self._stride, threads=1)
-        self._orders, self._senses = OrdersFromPlan(settled, self._plan, self._duration), Senses(settled)
+        plan = begin(self.controller, start, self.velocity, self.stride, threads=1)
+        self._orders, self._senses = OrdersFromPlan(settled, plan, self.duration), Senses(settled)
+        self._reading = plan if isinstance(plan, ReadingPlan) else None
         self._planned_stance, self._out_of_reach = np.ones(6), np.zeros(6)
         self._fell = False
 
@@ -269,9 +269,9 @@ class Walking(control.Task):
             i = int(np.argmin(within))
             name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
             raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
-        if isinstance(self._plan, ReadingPlan):
+        if self._reading:
             here = physics.position()[np.newaxis], physics.velocity()[np.newaxis]
-            tell(self._plan, self._senses.sensed(ONLY, *here))
+            tell(self._reading, self._senses.sensed(ONLY, *here))
         if orders := self._orders.ahead(ONLY, steps=1, offset=self.tip_offsets(action)):
             self._planned_stance = orders.plan.stance[0, 0].astype(float)
             self._out_of_reach = orders.missed[0].sum(axis=0).astype(float)
@@ -358,7 +358,7 @@ class TipOffsets(Walking):
 
     def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
         """The specs of all observations by their names."""
-        most = float(self._conditions.substeps(self._stride))
+        most = float(self.conditions.substeps(self.stride))
         spec = specs.BoundedArray((6,), float, 0.0, most, "out_of_reach")
         return super().observation_spec(physics) | {"out_of_reach": spec}
 

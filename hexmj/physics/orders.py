@@ -75,8 +75,8 @@ class OrdersFromPlan:
             steps: of the plan; a chunk unless given.
             offset: what the feet do beside the plan, (leg, 3) [mm].
         """
-        first, m = self._plan.done * self._settled.substeps, self._settled.substeps
-        if self._plan.done == self._steps:
+        done, m = self._plan.done, self._settled.substeps
+        if done == self._steps:
             return None
         plan = advanced(self._plan, steps or self.steps_ahead())
         tips = self._follow(plan, ids)
@@ -91,7 +91,7 @@ class OrdersFromPlan:
             control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
         if self._plan.done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
-        return Orders(plan, first, ids, control, tips[:, : control.shape[1]], ~reachable)
+        return Orders(plan, done * m, ids, control, tips[:, : control.shape[1]], ~reachable)
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:

@@ -1,6 +1,7 @@
 """Every start is put on its six feet in MuJoCo and comes to rest before it walks."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +42,7 @@ class Settled:
         """(start, position)."""
         return self.state[:, : self.compiled.model.nq]
 
-    @property
+    @cached_property
     def substeps(self) -> int:
         """Physics steps in one step of a plan."""
         return self.conditions.substeps(self.stride)
