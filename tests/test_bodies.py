@@ -102,7 +102,7 @@ def test_gains_follow_weight_and_time_step(step: float):
 
 
 def test_home_puts_the_tips_on_the_lines(insect: CompiledBody):
-    joints = insect.home_joints
+    joints = insect.home[insect.columns.qpos].reshape(6, -1)
     tips = insect.forward(joints)
     assert STICK_INSECT.lines == FIG1
     assert_allclose(tips, np.stack([FIG1.origin, FIG1.y, 6 * [-STICK_INSECT.standing_height]], axis=-1), atol=1e-6)
@@ -156,7 +156,7 @@ def test_masses_are_where_they_are_asked_for(insect: CompiledBody, masses: dict[
     assert_allclose(changed.model.body_mass.sum(), 1.0 + masses.get("load", 0.0), rtol=1e-5)
     legs = [changed.model.body(part).id for leg in STICK_INSECT.legs for part in leg.parts]
     assert_allclose(changed.model.body_mass[legs], masses.get("leg_mass", 1.0) * insect.model.body_mass[legs])
-    assert changed.mass == insect.mass
+    assert changed.weight == insect.weight
 
 
 def test_conditions_change_only_what_they_are_about(insect: CompiledBody):
@@ -285,7 +285,7 @@ def stands_and_steps(compiled: CompiledBody) -> None:
     """Its kinematics are MuJoCo's, and inverse and forward are each other's."""
     body, data = compiled.body, mujoco.MjData(compiled.model)
     rng = np.random.default_rng(3)
-    home = compiled.home_joints
+    home = compiled.home[compiled.columns.qpos].reshape(6, -1)
     tips = compiled.forward(home + rng.uniform(-0.1, 0.1, (20, *home.shape)))
     joints, reachable = compiled.inverse(tips)
     assert reachable.all()

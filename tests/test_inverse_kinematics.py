@@ -184,7 +184,7 @@ def test_joint_ranges_bound_what_is_reachable(closed: ThreeHinges):
         for bound, outside in ((0, 1e-6), (1, -1e-6)):
             joint_range = closed.joint_range.copy()
             joint_range[3, joint, bound] = angles[3, joint] + outside
-            _, reachable = replace(closed, joint_range=joint_range).inverse(home)
+            _, reachable = closed._replace(joint_range=joint_range).inverse(home)
             assert reachable.tolist() == [True, True, True, False, True, True]
 
 

@@ -18,7 +18,7 @@ from hexmj.measures.compare import physical_flss
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import STATE
 from hexmj.physics.drive import drive
-from hexmj.physics.orders import JointTargets
+from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.settling import Settled, settle
 from hexmj.rotations import rotated
 from hexmj.starts import draw_starts
@@ -66,7 +66,7 @@ def walk_of(model: mujoco.MjModel, settled: Settled, control: np.ndarray, length
 
 def test_the_same_insect_in_si_units_walks_the_same_way():
     settled = settle(draw_starts(6, 0))
-    targets = JointTargets(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 60.0)
+    targets = OrdersFromPlan(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 60.0)
     orders = list(iter(lambda: targets.ahead(np.arange(6)), None))
     control = np.concatenate([one.control for one in orders], axis=1)
     model = settled.compiled.model

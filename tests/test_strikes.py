@@ -19,7 +19,7 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics import chunks
+from hexmj.physics import fine_steps
 from hexmj.physics.backend import Diverged, Engine, Rolled
 from hexmj.physics.drive import Chunk, Push, drive
 from hexmj.physics.fine_steps import FINER, FINEST, FineSteps, in_whole_steps, strikes
@@ -67,8 +67,7 @@ def allowed(settled: Settled) -> float:
 
 def never_finely(monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on no foot is ever too deep."""
-    for module in (chunks, dm):
-        monkeypatch.setattr(module, "SINK", np.inf)
+    monkeypatch.setattr(fine_steps, "SINK", np.inf)
 
 
 def measured(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:

@@ -37,11 +37,11 @@ class SensorGroup:
         fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.of) & (model.sensor_refid < 0)
         if self.kind == _SENSOR.mjSENS_CONTACT:
             fits &= model.sensor_intprm[:, 0] == _FOUND
+        there = np.where(fits, model.sensor_objid, -1)
         for first in range(model.nsensor - len(wanted) + 1):
-            these = slice(first, first + len(wanted))
-            if fits[these].all() and (model.sensor_objid[these] == wanted).all():
-                end = these.stop - 1
-                return slice(int(model.sensor_adr[first]), int(model.sensor_adr[end] + model.sensor_dim[end]))
+            last = first + len(wanted) - 1
+            if (there[first : last + 1] == wanted).all():
+                return slice(int(model.sensor_adr[first]), int(model.sensor_adr[last] + model.sensor_dim[last]))
         return None
 
 

@@ -1,5 +1,7 @@
 """Whether a compiled MJCF is what a description says of it; each answer is one sentence."""
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 
@@ -16,23 +18,12 @@ def check_described(model: mujoco.MjModel, body: Body) -> None:
     Raises:
         InputError: a name that is not there, joints in another order, or a mass, root, foot or ground that differs.
     """
-    _check_names(model, body)
-    _check_root_and_joints(model, body)
-    _check_legs(model, body)
-    _check_actuators(model, body)
-    ground = model.geom(body.ground)
-    if ground.type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
-        raise InputError(f"body {body.name!r}: the ground {body.ground!r} is no plane; expected a geom of type plane")
-    if model.opt.gravity[:2].any() or not model.opt.gravity[2] < 0:
-        raise InputError(f"body {body.name!r}: gravity = {model.opt.gravity.tolist()}; expected it to point down")
-    mass = model.body_subtreemass[model.body(body.root).id]
-    if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
-        raise InputError(
-            f"body {body.name!r}: mass = {body.mass:g} g, but its MJCF weighs {mass:.6g} g; expected the same"
-        )
+    for faults in (_in_names, _in_joints, _in_legs, _in_the_rest):
+        for fault in faults(model, body):
+            raise InputError(f"body {body.name!r}: {fault}")
 
 
-def _check_names(model: mujoco.MjModel, body: Body) -> None:
+def _in_names(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     parts = [part for leg in body.legs for part in leg.parts]
     kinds = mujoco.mjtObj
     for kind, number, names in (
@@ -44,67 +35,61 @@ def _check_names(model: mujoco.MjModel, body: Body) -> None:
         (kinds.mjOBJ_CAMERA, model.ncam, body.cameras),
     ):
         there = [mujoco.mj_id2name(model, kind, i) for i in range(number)]
-        for name in names:
-            if name not in there:
-                what = kind.name.removeprefix("mjOBJ_").lower()
-                valid = ", ".join(one for one in there if one) or "none"
-                raise InputError(f"body {body.name!r}: its MJCF has no {what} {name!r}; valid names: {valid}")
+        what, valid = kind.name.removeprefix("mjOBJ_").lower(), ", ".join(filter(None, there)) or "none"
+        yield from (f"its MJCF has no {what} {name!r}; valid names: {valid}" for name in names if name not in there)
 
 
-def _check_root_and_joints(model: mujoco.MjModel, body: Body) -> None:
+def _in_joints(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     root = model.body(body.root)
-    first = int(root.jntadr[0])
-    if root.jntnum[0] != 1 or first != 0 or model.jnt_type[first] != mujoco.mjtJoint.mjJNT_FREE:
-        raise InputError(
-            f"body {body.name!r}: its root {body.root!r} lacks a free joint that is the MJCF's first joint"
-        )
+    if root.jntnum[0] != 1 or root.jntadr[0] != 0 or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
+        yield f"its root {body.root!r} lacks a free joint that is the MJCF's first joint"
     joints = np.array([model.joint(name).id for name in body.joints])
-    for name, joint in zip(body.joints, joints, strict=True):
-        if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or not model.jnt_limited[joint]:
-            raise InputError(f"body {body.name!r}: joint {name!r}; expected a hinge with a range")
-    columns = np.arange(len(joints))
-    in_order = model.jnt_qposadr[joints] == ROOT_QPOS + columns, model.jnt_dofadr[joints] == ROOT_QVEL + columns
-    if not np.all(in_order):
-        raise InputError(
-            f"body {body.name!r}: its MJCF has the joints in the order"
-            f" {', '.join(model.joint(i).name for i in range(1, model.njnt))}; expected them leg by leg as described,"
+    hinges = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited[joints] == 1)
+    if not hinges.all():
+        yield f"joint {body.joints[np.argmin(hinges)]!r}; expected a hinge with a range"
+    columns = np.stack([model.jnt_qposadr[joints] - ROOT_QPOS, model.jnt_dofadr[joints] - ROOT_QVEL])
+    if (columns != np.arange(len(joints))).any():
+        there = ", ".join(model.joint(i).name for i in range(1, model.njnt))
+        yield (
+            f"its MJCF has the joints in the order {there}; expected them leg by leg as described,"
             f" {', '.join(body.joints)}, right after the root's"
         )
+    driven = model.actuator_trnid[:, 0].tolist() == joints.tolist()
+    if model.nu and not (driven and (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).all()):
+        yield (
+            f"its MJCF has {model.nu} actuators; expected one for each joint in the order of the joints, or none,"
+            " and then servos are added"
+        )
 
 
-def _check_legs(model: mujoco.MjModel, body: Body) -> None:
+def _in_legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     root, radii = model.body(body.root).id, set()
     for leg in body.legs:
         foot, site = model.geom(leg.foot), model.site(leg.foot)
         around = foot.bodyid[0] == site.bodyid[0] and (foot.pos == site.pos).all()
         if foot.type[0] != mujoco.mjtGeom.mjGEOM_SPHERE or not around:
-            raise InputError(f"body {body.name!r}: foot {leg.foot!r}; expected a sphere around the site of that name")
+            yield f"foot {leg.foot!r}; expected a sphere around the site of that name"
         radii.add(float(foot.size[0]))
-        chain, at = [], int(foot.bodyid[0])
-        if model.body(at).name not in leg.parts:
-            raise InputError(
-                f"body {body.name!r}: foot {leg.foot!r} is on {model.body(at).name!r};"
-                f" expected it on a part of its leg, {', '.join(leg.parts)}"
-            )
-        while at not in (0, root):
-            joints = range(model.body_jntadr[at], model.body_jntadr[at] + model.body_jntnum[at])
-            chain = [model.joint(joint).name for joint in joints] + chain
-            at = int(model.body_parentid[at])
-        if at != root or tuple(chain) != leg.joints:
-            raise InputError(
-                f"body {body.name!r}: from {body.root!r} to foot {leg.foot!r} lead the joints"
-                f" {', '.join(chain) or 'none'}; expected {', '.join(leg.joints)}"
+        chain, part = [], model.body(foot.bodyid[0])
+        if part.name not in leg.parts:
+            yield f"foot {leg.foot!r} is on {part.name!r}; expected it on a part of its leg, {', '.join(leg.parts)}"
+        while part.id not in (0, root):
+            chain = [model.joint(part.jntadr[0] + i).name for i in range(part.jntnum[0])] + chain
+            part = model.body(part.parentid[0])
+        if part.id != root or tuple(chain) != leg.joints:
+            yield (
+                f"from {body.root!r} to foot {leg.foot!r} lead the joints {', '.join(chain) or 'none'};"
+                f" expected {', '.join(leg.joints)}"
             )
     if len(radii) > 1:
-        raise InputError(f"body {body.name!r}: its feet have the radii {sorted(radii)} mm; expected one for all")
+        yield f"its feet have the radii {sorted(radii)} mm; expected one for all"
 
 
-def _check_actuators(model: mujoco.MjModel, body: Body) -> None:
-    joints = [model.joint(name).id for name in body.joints]
-    driven = model.actuator_trnid[:, 0].tolist()
-    on_joints = (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).all()
-    if model.nu and not (on_joints and driven == joints):
-        raise InputError(
-            f"body {body.name!r}: its MJCF has {model.nu} actuators; expected one for each joint in the order of the"
-            " joints, or none, and then servos are added"
-        )
+def _in_the_rest(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    if model.geom(body.ground).type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
+        yield f"the ground {body.ground!r} is no plane; expected a geom of type plane"
+    if model.opt.gravity[:2].any() or not model.opt.gravity[2] < 0:
+        yield f"gravity = {model.opt.gravity.tolist()}; expected it to point down"
+    mass = model.body_subtreemass[model.body(body.root).id]
+    if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
+        yield f"mass = {body.mass:g} g, but its MJCF weighs {mass:.6g} g; expected the same"

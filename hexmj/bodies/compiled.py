@@ -1,7 +1,7 @@
 """A compiled body: the one object that is asked for its model, its columns, its kinematics and its measures."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 from hexmj.bodies.additions import sensor_groups
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
+from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.numeric import HingeChains, hinge_chains
+from hexmj.bodies.reading import posed
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-
-if TYPE_CHECKING:
-    from hexmj.conditions import Conditions
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class CompiledBody:
 
     model: mujoco.MjModel
     """The caller's own."""
-    conditions: "Conditions"
+    conditions: Conditions
     """Those it was compiled for."""
     columns: Columns
     kinematics: ThreeHinges | HingeChains
@@ -73,29 +73,18 @@ class CompiledBody:
         return int(self.model.jnt_bodyid[0])
 
     @property
-    def gravity(self) -> float:
-        """Acceleration of gravity [mm/s^2]."""
-        return -float(self.model.opt.gravity[2])
-
-    @property
-    def mass(self) -> float:
-        """Of the body itself, without what it carries [g]."""
-        return self.body.mass
-
-    @property
     def weight(self) -> float:
-        """Of the body itself [g mm/s^2]."""
-        return self.mass * self.gravity
+        """Of the body itself, without what it carries [g mm/s^2]."""
+        return -self.body.mass * float(self.model.opt.gravity[2])
 
     @property
     def torque_limits(self) -> np.ndarray:
         """Greatest torque of each joint, (leg * joint,) [g mm^2/s^2]."""
         return self.model.actuator_forcerange[self.columns.ctrl, 1]
 
-    @property
-    def home_joints(self) -> np.ndarray:
-        """Angles of the joints in posture home, (leg, joint) [rad]."""
-        return self.home[self.columns.qpos].reshape(len(self.body.legs), -1)
+    def depth(self, feet: np.ndarray) -> np.ndarray:
+        """How deep feet in the world, (..., axis) [mm], are in the ground, (...) [mm]; negative above it."""
+        return depth_in_ground(self.conditions.ground, self.body.lengths, feet, self.foot_radius)
 
     def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].
@@ -108,6 +97,20 @@ class CompiledBody:
     def forward(self, joints: ArrayLike) -> np.ndarray:
         """Tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""
         return self.kinematics.forward(joints)
+
+
+def measured(model: mujoco.MjModel, conditions: Conditions) -> CompiledBody:
+    """A body compiled for some conditions."""
+    body = conditions.body
+    return CompiledBody(
+        model=model,
+        conditions=conditions,
+        columns=columns(model, body),
+        kinematics=kinematics(model, body),
+        foot_radius=float(model.geom(body.feet[0]).size[0]),
+        trunk_corners=trunk_corners(model, body),
+        home=model.key(body.home).qpos.copy(),
+    )
 
 
 def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:
@@ -136,22 +139,19 @@ def columns(model: mujoco.MjModel, body: Body) -> Columns:
 def trunk_corners(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the trunk's capsules, middles of its spheres and corners of its boxes, (corner, axis) [mm], in the root
     frame, and the radius around each, (corner,) [mm]."""
-    data = mujoco.MjData(model)
-    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-    mujoco.mj_kinematics(model, data)
+    data, kinds = posed(model, model.qpos0), mujoco.mjtGeom
     ends, radii = [], []
     for part in body.trunk:
         geom = model.geom(part).id
-        size, place, axes = model.geom_size[geom], data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            corners, radius = [place - size[1] * axes[:, 2], place + size[1] * axes[:, 2]], size[0]
-        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
-            corners, radius = [place], size[0]
-        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
-            signs = np.stack(np.meshgrid(*3 * [[-1, 1]]), axis=-1).reshape(-1, 3)
-            corners, radius = list(place + (signs * size) @ axes.T), 0.0
+        kind, size, axes = model.geom_type[geom], model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+        if kind == kinds.mjGEOM_CAPSULE:
+            corners, radius = np.outer((-1, 1), (0, 0, size[1])), size[0]
+        elif kind == kinds.mjGEOM_SPHERE:
+            corners, radius = np.zeros((1, 3)), size[0]
+        elif kind == kinds.mjGEOM_BOX:
+            corners, radius = size * list(product((-1, 1), repeat=3)), 0.0
         else:
             raise InputError(f"body {body.name!r}: trunk part {part!r}; expected a capsule, a sphere or a box")
-        ends += corners
+        ends.append(data.geom_xpos[geom] + corners @ axes.T)
         radii += len(corners) * [radius]
-    return np.array(ends), np.array(radii)
+    return np.concatenate(ends), np.array(radii)

@@ -4,6 +4,7 @@ Units mm, g, s, rad; forces in g mm/s^2.  The MJCF of a body uses them too.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -166,29 +167,25 @@ class Body:
             standing_height=(self.standing_height, "mm"),
             longest_step=(self.longest_step, "s"),
         )
+        for fault in self._faults():
+            raise InputError(f"body {self.name!r}: {fault}")
+
+    def _faults(self) -> Iterator[str]:
         if not self.mjcf.is_file():
-            raise InputError(f"body {self.name!r}: mjcf = {str(self.mjcf)!r} is no file; expected the body's MJCF")
+            yield f"mjcf = {str(self.mjcf)!r} is no file; expected the body's MJCF"
         if not self.trunk:
-            raise InputError(f"body {self.name!r}: trunk = (); expected the names of at least one part")
+            yield "trunk = (); expected the names of at least one part"
         if len(self.legs) != len(LEGS):
-            raise InputError(
-                f"body {self.name!r}: {len(self.legs)} legs; expected {len(LEGS)}, in the order {', '.join(LEGS)}"
-            )
+            yield f"{len(self.legs)} legs; expected {len(LEGS)}, in the order {', '.join(LEGS)}"
         numbers = [len(leg.joints) for leg in self.legs]
         if len(set(numbers)) > 1 or numbers[0] < FEWEST_JOINTS:
-            raise InputError(
-                f"body {self.name!r}: its legs have {', '.join(map(str, numbers))} joints;"
-                f" expected equally many in each, at least {FEWEST_JOINTS}"
-            )
-        for kind, names in {
-            "joints": self.joints,
-            "feet": self.feet,
-            "trunk": self.trunk,
-            "parts of legs": tuple(part for leg in self.legs for part in leg.parts),
-        }.items():
-            twice = [name for i, name in enumerate(names) if name in names[:i]]
-            if twice:
-                raise InputError(f"body {self.name!r}: {kind} name {twice[0]!r} twice; expected every name once")
+            has, least = ", ".join(map(str, numbers)), FEWEST_JOINTS
+            yield f"its legs have {has} joints; expected equally many in each, at least {least}"
+        parts = tuple(part for leg in self.legs for part in leg.parts)
+        named = {"joints": self.joints, "feet": self.feet, "trunk": self.trunk, "parts of legs": parts}
+        for kind, names in named.items():
+            twice = (name for i, name in enumerate(names) if name in names[:i])
+            yield from (f"{kind} name {name!r} twice; expected every name once" for name in twice)
 
     @property
     def joints(self) -> tuple[str, ...]:

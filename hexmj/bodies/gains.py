@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QPOS, Body
+from hexmj.bodies.description import Body
+from hexmj.bodies.reading import joint_numbers, posed
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Gains:
 def gains(model: mujoco.MjModel, body: Body) -> Gains:
     """The gains for a compiled body without load."""
     servo, weight = body.servo, -body.mass * float(model.opt.gravity[2])
-    inertia = model.dof_M0[model.jnt_dofadr[_joints(model, body)]]
+    inertia = model.dof_M0[model.jnt_dofadr[joint_numbers(model, body)]]
     lightest = inertia.min(axis=1)  # (leg,)
     return Gains(
         torque=_rounded(weight * longest_lever(model, body), servo.digits),
@@ -46,21 +47,13 @@ def gains(model: mujoco.MjModel, body: Body) -> Gains:
 
 def longest_lever(model: mujoco.MjModel, body: Body) -> float:
     """The longest lever with which the weight, on one foot, can turn a joint [mm]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(body.home).id)
-    data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-    mujoco.mj_kinematics(model, data)
-    joints, feet = _joints(model, body), [model.site(foot).id for foot in body.feet]
+    data, joints = posed(model, model.key(body.home).qpos), joint_numbers(model, body)
+    feet = [model.site(foot).id for foot in body.feet]
     places = np.concatenate([data.xanchor[joints], data.site_xpos[feet][:, None]], axis=1)  # (leg, joint + 1, axis)
     segments = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     way = np.cumsum(segments[:, ::-1], axis=1)[:, ::-1]
     horizontal = np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)
     return float((way * horizontal).max())
-
-
-def _joints(model: mujoco.MjModel, body: Body) -> np.ndarray:
-    """Numbers of the joints, (leg, joint)."""
-    return np.array([[model.joint(joint).id for joint in leg.joints] for leg in body.legs])
 
 
 def _rounded(value: float, digits: int) -> float:

@@ -4,15 +4,11 @@ Everywhere `ground` says what lies ahead: `ground.ground` is its kind, `ground_h
 `ground_seed` its measures (`hexmj.conditions.Ground`).
 """
 
-from typing import TYPE_CHECKING
-
 import mujoco
 import numpy as np
 
 from hexmj.bodies.description import Body, Lengths
-
-if TYPE_CHECKING:
-    from hexmj.conditions import Ground
+from hexmj.conditions import Ground
 
 BUMPS = (15, 9)
 """Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
@@ -21,46 +17,35 @@ LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
 
 
-def lay_ground(spec: mujoco.MjSpec, ground: "Ground", body: Body) -> None:
+def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
     """Add what lies ahead to a spec of a body on its plane."""
-    lengths = body.lengths
+    lengths, kinds = body.lengths, mujoco.mjtGeom
     near, length, height, far = ground.ground_at, ground.ground_length, ground.ground_height, lengths.ground_reach
-    boxes, caps = {}, {}
-    if ground.ground == "step":
-        boxes = {"step": (near, near + far, height)}
-    elif ground.ground == "hurdle":
-        boxes = {"hurdle": (near, near + length, height)}
-    elif ground.ground == "gap":
-        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
-        boxes = {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)}
-    elif ground.ground == "rough":
-        caps = {f"bump_{i}": bump for i, bump in enumerate(zip(*_bumps(ground, lengths), strict=True))}
-    look = LOOK | {"material": spec.geom(body.ground).material}
-    for name, (begin, end, top) in boxes.items():
+    boxes = {
+        "step": {"step": (near, near + far, height)},
+        "hurdle": {"hurdle": (near, near + length, height)},
+        "gap": {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)},
+    }
+    pieces = {}  # what lies ahead, its size and place by its name
+    for name, (begin, end, top) in boxes.get(ground.ground, {}).items():
         half = (top + lengths.shortest_leg) / 2
-        spec.worldbody.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[(end - begin) / 2, lengths.ground_half_width, half],
-            pos=[(begin + end) / 2, 0.0, top - half],
-            **look,
-        )
-    # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that is
-    # deeper than its distance from their sides sideways into the next, and there it stays.
-    for name, ((x, y), top, radius) in caps.items():
-        spec.worldbody.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[radius, 0.0, 0.0],
-            pos=[x, y, top - radius],
-            **look,
-        )
-    for piece in (*boxes, *caps):
+        size = (end - begin) / 2, lengths.ground_half_width, half
+        pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
+    if ground.ground == "gap":
+        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
+    if ground.ground == "rough":
+        # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that
+        # is deeper than its distance from their sides sideways into the next, and there it stays.
+        for i, ((x, y), top, radius) in enumerate(zip(*_bumps(ground, lengths), strict=True)):
+            pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
+    look = LOOK | {"material": spec.geom(body.ground).material}
+    for name, (kind, size, place) in pieces.items():
+        spec.worldbody.add_geom(name=name, type=kind, size=size, pos=place, **look)
         for touching in (*body.trunk, *body.feet):
-            spec.add_pair(name=f"{piece}_{touching}", geomname1=piece, geomname2=touching)
+            spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
 
 
-def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.ndarray:
+def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.ndarray:
     """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
     x = places[..., 0]
     if ground.ground == "rough":
@@ -73,7 +58,7 @@ def ground_level(ground: "Ground", lengths: Lengths, places: np.ndarray) -> np.n
     return np.where((x > ground.ground_at) & (x < end), height, 0.0)
 
 
-def depth_in_ground(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
     """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
 
     Args:
@@ -99,7 +84,7 @@ def depth_in_ground(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius
     return radius - np.minimum(from_block, z - floor)
 
 
-def _depth_in_bumps(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def _depth_in_bumps(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
     """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
     centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(ground, lengths))
     corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
@@ -112,7 +97,7 @@ def _depth_in_bumps(ground: "Ground", lengths: Lengths, feet: np.ndarray, radius
     return depth
 
 
-def _bumps(ground: "Ground", lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bumps(ground: Ground, lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
     along, across = BUMPS
     x = ground.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)

@@ -7,20 +7,17 @@ angles are unique.
 """
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
+import mujoco
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from hexmj.bodies.numeric import HingeChains
+from hexmj.bodies.description import Body
+from hexmj.bodies.numeric import HingeChains, over_tips
+from hexmj.bodies.reading import joint_numbers
 from hexmj.legs import SIDE
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from hexmj.bodies.description import Body
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -29,8 +26,7 @@ SAMPLES, SAME = 32, 1e-9
 """Postures in which a chain is compared with the closed form, and how far apart their tips may be [mm]."""
 
 
-@dataclass(frozen=True, eq=False)
-class ThreeHinges:
+class ThreeHinges(NamedTuple):
     """Six legs of three hinges in the root frame (x forward, y left, z up)."""
 
     coxa_position: Floats
@@ -56,11 +52,7 @@ class ThreeHinges:
             The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
             tip can be reached within the leg's length and the joints' ranges, (..., leg).
         """
-        tips = np.asarray(tips, dtype=np.float64)
-        flat = np.ascontiguousarray(tips).reshape(-1, *tips.shape[-2:])
-        lengths = self.coxa, self.femur, self.tibia
-        joints, reachable = _solve(flat, self.coxa_position, *lengths, self.side, self.joint_range)
-        return joints.reshape(tips.shape), reachable.reshape(tips.shape[:-1])
+        return over_tips(_solve, tips, self)
 
     def forward(self, joints: ArrayLike) -> Floats:
         """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
@@ -73,13 +65,13 @@ class ThreeHinges:
         return self.coxa_position + np.stack([forward, left, up], axis=-1)
 
 
-def three_hinges(model: "mujoco.MjModel", body: "Body", chains: HingeChains) -> ThreeHinges | None:
+def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> ThreeHinges | None:
     """The closed form of a compiled body's legs, or none where they are arranged in another way.
 
     The segments are read as if they lay along the x axes of their bodies; whether they do, and whether angles are
     counted as here, is seen in random postures: there the closed form puts the feet where the chains do.
     """
-    joints = np.array([[model.joint(joint).id for joint in leg.joints] for leg in body.legs])
+    joints = joint_numbers(model, body)
     if joints.shape[1] != 3:
         return None
     coxa, femur, tibia = (model.body_pos[model.jnt_bodyid[hinge]] for hinge in joints.T)
@@ -91,44 +83,38 @@ def three_hinges(model: "mujoco.MjModel", body: "Body", chains: HingeChains) -> 
         side=np.array(SIDE, dtype=np.float64),
         joint_range=model.jnt_range[joints],
     )
-    low, high = np.moveaxis(legs.joint_range, -1, 0)
-    unique = (low >= -np.pi).all() and (high[:, :2] <= np.pi).all()
-    knee_up = (low[:, 2] >= 0).all() and (high[:, 2] <= np.pi).all()
-    postures = np.random.default_rng(0).uniform(low, high, (SAMPLES, *low.shape))
+    unique = (chains.low >= (-np.pi, -np.pi, 0.0)).all() and (chains.high <= np.pi).all()
+    postures = np.random.default_rng(0).uniform(chains.low, chains.high, (SAMPLES, *joints.shape))
     apart = np.abs(legs.forward(postures) - chains.forward(postures)).max()
-    return legs if unique and knee_up and apart <= SAME else None
+    return legs if unique and apart <= SAME else None
 
 
 @njit(cache=True, nogil=True)
-def _solve(
-    tips: Any, coxa_position: Any, coxa: Any, femur: Any, tibia: Any, side: Any, joint_range: Any
-) -> tuple[Any, Any]:
+def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
     """`ThreeHinges.inverse` for tips shaped (n, leg, axis)."""
     joints = np.empty(tips.shape)
     reachable = np.empty(tips.shape[:2], dtype=np.bool_)
     for n in range(tips.shape[0]):
         for leg in range(tips.shape[1]):
-            a, b = femur[leg], tibia[leg]
-            forward = tips[n, leg, 0] - coxa_position[leg, 0]
-            outward = side[leg] * (tips[n, leg, 1] - coxa_position[leg, 1])
-            up = tips[n, leg, 2] - coxa_position[leg, 2]
+            coxa, a, b = legs.coxa[leg], legs.femur[leg], legs.tibia[leg]
+            forward = tips[n, leg, 0] - legs.coxa_position[leg, 0]
+            outward = legs.side[leg] * (tips[n, leg, 1] - legs.coxa_position[leg, 1])
+            up = tips[n, leg, 2] - legs.coxa_position[leg, 2]
             # The triangle of femur a, tibia b and c, from the coxa-trochanter joint to the tip.
-            along = math.sqrt(forward * forward + outward * outward) - coxa[leg]
+            along = math.sqrt(forward * forward + outward * outward) - coxa
             c = math.sqrt(along * along + up * up)
             if abs(a - b) <= c <= a + b:
                 protraction = math.atan2(forward, outward)
                 levation = math.atan2(up, along) + math.acos((a * a + c * c - b * b) / (2 * a * c))
                 knee = math.acos((a * a + b * b - c * c) / (2 * a * b))
+                angles = protraction, levation, knee
             else:
-                protraction = levation = knee = math.nan
-            limits = joint_range[leg]
-            within = (
-                limits[0, 0] <= protraction <= limits[0, 1]
-                and limits[1, 0] <= levation <= limits[1, 1]
-                and limits[2, 0] <= knee <= limits[2, 1]
-            )
+                angles = math.nan, math.nan, math.nan
+            within = True
+            for j in range(3):
+                joints[n, leg, j] = angles[j]
+                within &= legs.joint_range[leg, j, 0] <= angles[j] <= legs.joint_range[leg, j, 1]
             reachable[n, leg] = within
-            joints[n, leg, 0] = protraction if within else math.nan
-            joints[n, leg, 1] = levation if within else math.nan
-            joints[n, leg, 2] = knee if within else math.nan
+            if not within:
+                joints[n, leg] = math.nan
     return joints, reachable

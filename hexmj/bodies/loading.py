@@ -1,25 +1,23 @@
 """A body compiled for its conditions: with its gains, on its ground, under its load."""
 
 import copy
+from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
 import mujoco
 
 from hexmj.bodies.additions import complete
 from hexmj.bodies.checks import check_described
-from hexmj.bodies.compiled import CompiledBody, columns, kinematics, trunk_corners
+from hexmj.bodies.compiled import CompiledBody, measured
 from hexmj.bodies.description import Body
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
+from hexmj.conditions import Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 
-if TYPE_CHECKING:
-    from hexmj.conditions import Conditions, FootContact, Ground, Masses
 
-
-def compile_body(conditions: "Conditions", timestep: float | None = None, *, looks: bool = True) -> CompiledBody:
+def compile_body(conditions: Conditions, timestep: float | None = None, *, looks: bool = True) -> CompiledBody:
     """The body of some conditions, compiled; every call gives a model of its own.
 
     Args:
@@ -35,10 +33,11 @@ def compile_body(conditions: "Conditions", timestep: float | None = None, *, loo
     timestep = body.longest_step if timestep is None else timestep
     if not 0 < timestep <= body.longest_step:
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
-    compiled, measures = _compiled(body, conditions.masses, conditions.contact, conditions.ground, looks, body.text())
-    model = copy.copy(compiled)
+    made_of = {"masses": conditions.masses, "contact": conditions.contact, "ground": conditions.ground}
+    compiled = _compiled(Conditions(**made_of, body=body), looks, body.text())
+    model = copy.copy(compiled.model)
     model.opt.timestep = timestep
-    return CompiledBody(model=model, conditions=conditions, **measures)
+    return replace(compiled, model=model, conditions=conditions)
 
 
 def plain_model(body: Body) -> mujoco.MjModel:
@@ -67,15 +66,13 @@ def gravity(body: Body) -> float:
 
 
 @lru_cache(maxsize=16)
-def _compiled(
-    body: Body, masses: "Masses", contact: "FootContact", ground: "Ground", looks: bool, text: str
-) -> tuple[mujoco.MjModel, dict[str, Any]]:
-    """The model under some conditions, and what is measured on it once, for the file as it is now."""
-    plain = _plain_model(body, text)
-    spec = _spec(body)
+def _compiled(conditions: Conditions, looks: bool, text: str) -> CompiledBody:
+    """The body under some conditions, for the file as it is now."""
+    body, masses, contact = conditions.body, conditions.masses, conditions.contact
+    plain, spec = _plain_model(body, text), _spec(body)
     spec.compiler.discardvisual = not looks
     complete(spec, plain, body, gains(plain, body))
-    lay_ground(spec, ground, body)
+    lay_ground(spec, conditions.ground, body)
     if masses.load:
         mass = masses.load * body.mass
         load = spec.body(body.root).add_body(name="load", mass=mass, inertia=3 * [body.lengths.load_gyration**2 * mass])
@@ -86,14 +83,7 @@ def _compiled(
     model.pair_friction[:, :2] = contact.friction
     if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
         _redistribute(model, body, masses)
-    measures = {
-        "columns": columns(model, body),
-        "kinematics": kinematics(model, body),
-        "foot_radius": float(model.geom(body.feet[0]).size[0]),
-        "trunk_corners": trunk_corners(model, body),
-        "home": model.key(body.home).qpos.copy(),
-    }
-    return model, measures
+    return measured(model, conditions)
 
 
 def _spec(body: Body) -> mujoco.MjSpec:
@@ -113,7 +103,7 @@ def _add_grasp(spec: mujoco.MjSpec, body: Body, force: float) -> None:
         )
 
 
-def _redistribute(model: mujoco.MjModel, body: Body, masses: "Masses") -> None:
+def _redistribute(model: mujoco.MjModel, body: Body, masses: Masses) -> None:
     """Give the legs their share of the mass, and move the trunk's masses until the centre of mass lies there."""
     legs = [model.body(part).id for leg in body.legs for part in leg.parts]
     trunk = [model.body(part).id for part in body.trunk]

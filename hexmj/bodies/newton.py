@@ -7,7 +7,7 @@ none near by is nearer [rad, Euclidean].
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -18,17 +18,19 @@ CLOSE = 1e-10
 FARTHEST = 0.5
 """Greatest change of an angle in one step [rad]."""
 
-ATTEMPTS = 12
+ATTEMPTS = 24
 """Postures to begin from before a tip counts as out of reach."""
 
 PRIMES = (2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0)
 """Their roots are the irrational numbers with which these postures are spread."""
 
-STEPS = 60
-"""Steps from one posture, accepted or not, after which a tip counts as out of reach from there."""
+STEPS, MOST_DAMPING = 60, 1e6
+"""Steps from one posture, accepted or not, and damping, after which a tip counts as out of reach from there."""
 
 SLIDES, STILL = 200, 1e-10
 """Steps along the postures that reach a tip, and how small they are where the nearest to home is found [rad]."""
+
+NOTHING = (0.0, 0.0, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -38,240 +40,164 @@ def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
     `chains` are `numeric.HingeChains`.
     """
     legs, hinges = chains.zero.shape
-    joints = np.empty((len(tips), legs, hinges))
-    reachable = np.empty((len(tips), legs), dtype=np.bool_)
-    one, free = np.empty(hinges), np.full(hinges, math.inf)
-    work = _Work(np.empty((hinges, 3)), np.empty((hinges, 3)), np.empty(3), one, one.copy(), -free, free)
+    joints, reachable = np.empty((len(tips), legs, hinges)), np.zeros((len(tips), legs), dtype=np.bool_)
+    lever = np.empty((hinges + 1, 3))
     for n in range(len(tips)):
         for leg in range(legs):
-            angles = joints[n, leg]
-            near = _within_length(tips[n, leg], leg, chains)
-            reachable[n, leg] = near and _reached(angles, tips[n, leg], leg, chains, work)
+            tip = tips[n, leg]
+            off = _plus(tip, -1.0, chains.anchor[leg, 0])
+            if math.sqrt(_dot(off, off)) <= chains.length[leg] + CLOSE:  # not so where it is not finite
+                reachable[n, leg] = _reached(joints[n, leg], tip, leg, chains, lever)
             if not reachable[n, leg]:
-                angles[:] = math.nan
+                joints[n, leg] = math.nan
     return joints, reachable
 
 
-class _Work(NamedTuple):
-    """Arrays that are written over and over."""
-
-    columns: Any
-    """Change of the tip with each angle, (joint, axis) [mm/rad]."""
-    axes: Any
-    """Of the hinges, (joint, axis)."""
-    error: Any
-    """From the foot to the tip that is wanted, (axis,) [mm]."""
-    step: Any
-    """Change of the angles, (joint,) [rad]."""
-    trial: Any
-    """Angles after it, (joint,) [rad]."""
-    lowest: Any
-    """No least angles, (joint,)."""
-    highest: Any
-    """No greatest angles, (joint,)."""
-
-
 @njit(cache=True, nogil=True)
-def _within_length(tip: Any, leg: int, chains: Any) -> bool:
-    """Whether a tip is no farther from the first hinge than the leg is long; false where it is not finite."""
-    length, squared = _norm(chains.foot[leg]), 0.0
-    for j in range(1, chains.zero.shape[1]):
-        length += _norm(chains.offset[leg, j])
-    for axis in range(3):
-        squared += (tip[axis] - chains.offset[leg, 0, axis]) ** 2
-    return math.sqrt(squared) <= length + CLOSE
-
-
-@njit(cache=True, nogil=True)
-def _reached(angles: Any, tip: Any, leg: int, chains: Any, work: Any) -> bool:
+def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
     """Whether a posture is found that reaches a tip; it is written to `angles`.
 
-    From each posture the way leads within the ranges first; where it ends at a limit, beyond them and perhaps back.
+    It is sought from home, then from postures that fill the ranges evenly, as multiples of irrational numbers do.
     """
-    low, high, hinges = chains.low[leg], chains.high[leg], chains.zero.shape[1]
+    low, high = chains.low[leg], chains.high[leg]
     for attempt in range(ATTEMPTS):
-        for beyond in range(2):
-            _begin(angles, attempt, leg, chains)
-            if beyond:
-                if _newton(angles, tip, leg, chains, work, work.lowest, work.highest) > CLOSE:
-                    continue
-                for j in range(hinges):
-                    turns = round((angles[j] - (low[j] + high[j]) / 2) / (2 * math.pi))
-                    angles[j] = min(max(angles[j] - 2 * math.pi * turns, low[j]), high[j])
-            if _newton(angles, tip, leg, chains, work, low, high) <= CLOSE:
-                if hinges > 3:
-                    _slide_home(angles, tip, leg, chains, work)
-                return True
+        for j in range(len(angles)):
+            share = attempt * math.sqrt(PRIMES[j % len(PRIMES)]) % 1.0
+            angles[j] = low[j] + share * (high[j] - low[j]) if attempt else chains.home[leg, j]
+        if _newton(angles, tip, leg, chains, lever) <= CLOSE:
+            if len(angles) > 3:
+                _slide_home(angles, tip, leg, chains, lever)
+            return True
     return False
 
 
 @njit(cache=True, nogil=True)
-def _begin(angles: Any, attempt: int, leg: int, chains: Any) -> None:
-    """Postures to begin from: home, then some that fill the ranges evenly, as multiples of irrational numbers do."""
-    for j in range(len(angles)):
-        share = (attempt * math.sqrt(PRIMES[j % len(PRIMES)])) % 1.0
-        low, high = chains.low[leg, j], chains.high[leg, j]
-        angles[j] = chains.home[leg, j] if attempt == 0 else low + share * (high - low)
-
-
-@njit(cache=True, nogil=True)
-def _newton(angles: Any, tip: Any, leg: int, chains: Any, work: Any, low: Any, high: Any) -> float:
+def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
     """Bring the foot to a tip as near as Newton's method can; its distance [mm]."""
-    hinges, damping = len(angles), 0.0
-    distance = _look(angles, tip, leg, chains, work)
+    low, high = chains.low[leg], chains.high[leg]
+    damping, step, trial = 0.0, np.empty_like(angles), np.empty_like(angles)
+    distance = _look(angles, tip, leg, chains, lever)
     for _ in range(STEPS):
-        _step(angles, angles, low, high, damping, work)
-        largest = 0.0
-        for j in range(hinges):
-            largest = max(largest, abs(work.step[j]))
-        if not largest > 0.0 and damping == 0.0:
-            break
-        shorter = min(1.0, FARTHEST / largest) if largest > 0.0 else 1.0
-        for j in range(hinges):
-            work.trial[j] = min(max(angles[j] + shorter * work.step[j], low[j]), high[j])
-        closer = _look(work.trial, tip, leg, chains, work)
+        shorter = min(1.0, FARTHEST / max(_step(step, angles, angles, low, high, lever, damping), FARTHEST))
+        for j in range(len(angles)):
+            trial[j] = min(max(angles[j] + shorter * step[j], low[j]), high[j])
+        closer = _look(trial, tip, leg, chains, lever)
         if closer < distance:
-            close = distance <= CLOSE  # one step more than needed brings it to the last digits
-            angles[:] = work.trial
-            distance = closer
+            angles[:], distance = trial, closer
             damping = 0.0 if damping < 1e-5 else damping / 10.0
-            if close:
-                break
+        elif distance <= CLOSE or damping > MOST_DAMPING:
+            break
         else:
-            if distance <= CLOSE or damping > 1e6:
-                break
             damping = max(1e-3, 10.0 * damping)
-            _look(angles, tip, leg, chains, work)
+            _look(angles, tip, leg, chains, lever)
     return distance
 
 
 @njit(cache=True, nogil=True)
-def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, work: Any) -> None:
+def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> None:
     """Among the postures that reach a tip go down the distance from home as far as it goes."""
     low, high, home = chains.low[leg], chains.high[leg], chains.home[leg]
-    share, start = 1.0, np.empty_like(angles)
+    share, step = 1.0, np.empty_like(angles)
     for _ in range(SLIDES):
-        start[:] = angles
-        _look(angles, tip, leg, chains, work)
-        _step(angles, home, low, high, 0.0, work)
-        largest, from_home = 0.0, 0.0
-        for j in range(len(angles)):
-            largest = max(largest, abs(work.step[j]))
-            from_home += (start[j] - home[j]) ** 2
-        if not largest > STILL:
+        _look(angles, tip, leg, chains, lever)
+        if not share * _step(step, angles, home, low, high, lever, 0.0) > STILL:
             return
-        for j in range(len(angles)):
-            angles[j] = min(max(start[j] + share * work.step[j], low[j]), high[j])
-        reached = _newton(angles, tip, leg, chains, work, low, high) <= CLOSE
-        nearer = 0.0
-        for j in range(len(angles)):
-            nearer += (angles[j] - home[j]) ** 2
-        if reached and nearer < from_home:
-            share = min(1.0, 2.0 * share)
+        trial = np.minimum(np.maximum(angles + share * step, low), high)
+        reached = _newton(trial, tip, leg, chains, lever) <= CLOSE
+        if reached and ((trial - home) ** 2).sum() < ((angles - home) ** 2).sum():
+            angles[:], share = trial, min(1.0, 2.0 * share)
         else:
-            angles[:] = start
             share /= 2.0
-            if share * largest < STILL:
-                return
 
 
 @njit(cache=True, nogil=True)
-def _step(angles: Any, toward: Any, low: Any, high: Any, damping: float, work: Any) -> None:
+def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, damping: float) -> float:
     """Of the steps that bring the foot to the tip, to first order, the nearest to the way toward other angles.
 
     It is d + J^T (J J^T + damping)^-1 (error - J d), where d is that way.  Joints at a limit that it would take beyond
-    are held, one after the other, and the others take over.
+    are held, one after the other, and the others take over.  Damping is a share of the trace of J J^T.  Returned is the
+    greatest change of an angle.
     """
-    held, again = 0, True
+    hinges, held, again, largest = len(angles), 0, True, 0.0
     while again:
-        again = False
-        x, y, z = work.error
-        for j in range(len(angles)):
+        again, largest = False, 0.0
+        x, y, z, missing = NOTHING, NOTHING, NOTHING, _plus(NOTHING, 1.0, lever[hinges])
+        for j in range(hinges):
             if not held >> j & 1:
-                way, column = toward[j] - angles[j], work.columns[j]
-                x, y, z = x - column[0] * way, y - column[1] * way, z - column[2] * way
-        a, b, c = _pushed(work.columns, held, damping, x, y, z)
-        for j in range(len(angles)):
-            work.step[j] = 0.0
+                column = lever[j]
+                x, y, z = _plus(x, column[0], column), _plus(y, column[1], column), _plus(z, column[2], column)
+                missing = _plus(missing, angles[j] - toward[j], column)
+        push = _solved(x, y, z, damping, missing)
+        for j in range(hinges):
+            step[j] = 0.0
             if not held >> j & 1:
-                column = work.columns[j]
-                step = toward[j] - angles[j] + column[0] * a + column[1] * b + column[2] * c
-                if (angles[j] >= high[j] and step > 0) or (angles[j] <= low[j] and step < 0):
-                    held |= 1 << j
-                    again = True
+                change = toward[j] - angles[j] + _dot(lever[j], push)
+                if (angles[j] >= high[j] and change > 0) or (angles[j] <= low[j] and change < 0):
+                    held, again = held | 1 << j, True
                 else:
-                    work.step[j] = step
+                    step[j], largest = change, max(largest, abs(change))
+    return largest
 
 
 @njit(cache=True, nogil=True)
-def _pushed(
-    columns: Any, held: int, damping: float, error_x: float, error_y: float, error_z: float
-) -> tuple[float, float, float]:
-    """(J J^T + damping)^-1 error by Cramer's rule, J being the columns of joints that are not held.
-
-    Damping is a share of J J^T's trace.  Where it is singular nothing moves.
-    """
-    xx = xy = xz = yy = yz = zz = 0.0
-    for j in range(len(columns)):
-        if not held >> j & 1:
-            x, y, z = columns[j]
-            xx += x * x
-            xy += x * y
-            xz += x * z
-            yy += y * y
-            yz += y * z
-            zz += z * z
-    extra = damping * (xx + yy + zz)
-    xx, yy, zz = xx + extra, yy + extra, zz + extra
-    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    determinant = xx * a + xy * b + xz * c
-    if not determinant > 1e-30 * (xx + yy + zz) ** 3:
-        return 0.0, 0.0, 0.0
-    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
-    x, y, z = error_x / determinant, error_y / determinant, error_z / determinant
-    return a * x + b * y + c * z, b * x + d * y + e * z, c * x + e * y + f * z
+def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, float, float]:
+    """Cramer's rule for a symmetric matrix of these rows, damped; 0 where it is singular."""
+    trace = x[0] + y[1] + z[2]
+    extra = damping * trace
+    x, y, z = (x[0] + extra, x[1], x[2]), (y[0], y[1] + extra, y[2]), (z[0], z[1], z[2] + extra)
+    a, b, c = _cross(y, z), _cross(z, x), _cross(x, y)
+    determinant = _dot(x, a)
+    if not determinant > 1e-30 * trace**3:
+        return NOTHING
+    return _dot(right, a) / determinant, _dot(right, b) / determinant, _dot(right, c) / determinant
 
 
 @njit(cache=True, nogil=True)
-def _look(angles: Any, tip: Any, leg: int, chains: Any, work: Any) -> float:
-    """Compose the chain: the columns of J and the error are written; distance of the foot from the tip [mm]."""
-    columns, axes, error = work.columns, work.axes, work.error
-    px = py = pz = 0.0
-    xx, xy, xz = 1.0, 0.0, 0.0  # the frame's axes x, y and z in the root frame
-    yx, yy, yz = 0.0, 1.0, 0.0
-    zx, zy, zz = 0.0, 0.0, 1.0
-    for j in range(len(angles)):
-        a, b, c = chains.offset[leg, j]
-        px, py, pz = px + xx * a + yx * b + zx * c, py + xy * a + yy * b + zy * c, pz + xz * a + yz * b + zz * c
-        r = chains.rotation[leg, j]
-        ux = xx * r[0, 0] + yx * r[1, 0] + zx * r[2, 0]
-        uy = xy * r[0, 0] + yy * r[1, 0] + zy * r[2, 0]
-        uz = xz * r[0, 0] + yz * r[1, 0] + zz * r[2, 0]
-        vx = xx * r[0, 1] + yx * r[1, 1] + zx * r[2, 1]
-        vy = xy * r[0, 1] + yy * r[1, 1] + zy * r[2, 1]
-        vz = xz * r[0, 1] + yz * r[1, 1] + zz * r[2, 1]
-        zx, zy, zz = (
-            xx * r[0, 2] + yx * r[1, 2] + zx * r[2, 2],
-            xy * r[0, 2] + yy * r[1, 2] + zy * r[2, 2],
-            xz * r[0, 2] + yz * r[1, 2] + zz * r[2, 2],
-        )
-        turn = angles[j] - chains.zero[leg, j]
+def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
+    """Turn the hinges, the outermost first: the columns of J, (joint, axis), and last the error from the foot to the
+    tip are written to `lever`; the error's length [mm]."""
+    hinges = len(angles)
+    foot = _plus(NOTHING, 1.0, chains.foot[leg])
+    for j in range(hinges - 1, -1, -1):
+        axis, anchor, turn = chains.axis[leg, j], chains.anchor[leg, j], angles[j] - chains.zero[leg, j]
         cosine, sine = math.cos(turn), math.sin(turn)
-        xx, xy, xz = cosine * ux + sine * vx, cosine * uy + sine * vy, cosine * uz + sine * vz
-        yx, yy, yz = cosine * vx - sine * ux, cosine * vy - sine * uy, cosine * vz - sine * uz
-        axes[j, 0], axes[j, 1], axes[j, 2] = zx, zy, zz
-        columns[j, 0], columns[j, 1], columns[j, 2] = px, py, pz
-    a, b, c = chains.foot[leg]
-    px, py, pz = px + xx * a + yx * b + zx * c, py + xy * a + yy * b + zy * c, pz + xz * a + yz * b + zz * c
-    for j in range(len(angles)):
-        x, y, z = px - columns[j, 0], py - columns[j, 1], pz - columns[j, 2]
-        columns[j, 0] = axes[j, 1] * z - axes[j, 2] * y
-        columns[j, 1] = axes[j, 2] * x - axes[j, 0] * z
-        columns[j, 2] = axes[j, 0] * y - axes[j, 1] * x
-    error[0], error[1], error[2] = tip[0] - px, tip[1] - py, tip[2] - pz
-    return _norm(error)
+        off = _turned(_plus(foot, -1.0, anchor), axis, cosine, sine)
+        for outer in range(j + 1, hinges):
+            _write(lever, outer, _turned(lever[outer], axis, cosine, sine))
+        _write(lever, j, _cross(axis, off))
+        foot = _plus(off, 1.0, anchor)
+    error = _plus(foot, -1.0, tip)
+    _write(lever, hinges, _plus(NOTHING, -1.0, error))
+    return math.sqrt(_dot(error, error))
 
 
 @njit(cache=True, nogil=True)
-def _norm(vector: Any) -> float:
-    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+def _turned(vector: Any, axis: Any, cosine: float, sine: float) -> tuple[float, float, float]:
+    """A vector turned about an axis."""
+    x, y, z = _cross(axis, vector)
+    along = (1.0 - cosine) * _dot(axis, vector)
+    return (
+        cosine * vector[0] + sine * x + along * axis[0],
+        cosine * vector[1] + sine * y + along * axis[1],
+        cosine * vector[2] + sine * z + along * axis[2],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _write(rows: Any, row: int, vector: Any) -> None:
+    rows[row, 0], rows[row, 1], rows[row, 2] = vector
+
+
+@njit(cache=True, nogil=True)
+def _plus(a: Any, times: float, b: Any) -> tuple[float, float, float]:
+    return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]
+
+
+@njit(cache=True, nogil=True)
+def _cross(a: Any, b: Any) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, nogil=True)
+def _dot(a: Any, b: Any) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

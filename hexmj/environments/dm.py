@@ -28,8 +28,8 @@ fall, when the trunk touches the ground, with discount 0, and after its duration
 that diverges raises dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
 """
 
-from abc import abstractmethod
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -41,21 +41,18 @@ from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
-from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import advanced, begin, tell
+from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.physics.backend import Rolled
-from hexmj.physics.fine_steps import SINK, FineSteps
-from hexmj.physics.foot_path import TipTargets
-from hexmj.physics.orders import hold
-from hexmj.physics.sensing import sensed
+from hexmj.physics.backend import AFTER, Rolled
+from hexmj.physics.fine_steps import FineSteps, Shown
+from hexmj.physics.orders import OrdersFromPlan
+from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import settle
-from hexmj.physics.standing import StandingFeet
 from hexmj.stability import stability_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride, steps_within
@@ -118,7 +115,8 @@ def load(
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p")
     if actions not in TASKS:
         raise InputError(f"actions = {actions!r}; valid names: {', '.join(TASKS)}")
-    task = TASKS[actions](velocity, controller, conditions, stride, int(steps_within(duration, stride)), seed)
+    whole = float(steps_within(duration, stride) * stride.dt)
+    task = TASKS[actions](velocity, controller, conditions, stride, whole, seed)
     compiled = compile_body(conditions, conditions.timestep(stride))
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
     physics.compiled = compiled
@@ -128,13 +126,10 @@ def load(
 class InsectPhysics(mujoco.Physics):
     """The insect in dm_control, and what is measured on it."""
 
-    touch: np.ndarray
-    """(substep, leg) normal force of the ground on each foot in the last step, its mean over a substep in parts
-    [g mm/s^2]."""
     compiled: CompiledBody
     """The insect and its conditions; set by `load`."""
-    trunk: np.ndarray
-    """(substep, part) contacts of each part of the trunk with the ground in the last step."""
+    shown: Shown
+    """What the last step has shown of it, the only one: sensors, torques and depth, each (1, substep, ...)."""
 
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
@@ -166,14 +161,7 @@ class InsectPhysics(mujoco.Physics):
         """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `fine_steps`."""
         rows = [self.data.ctrl.copy(), *self._next]
         control = np.array((rows + nstep * rows[-1:])[:nstep])
-        compiled, conditions, columns = self.compiled, self.compiled.conditions, self.compiled.columns
-
-        def depth_of(feet: np.ndarray) -> np.ndarray:
-            return depth_in_ground(conditions.ground, conditions.body.lengths, feet, compiled.foot_radius)
-
-        loop = FineSteps(self, nstep, depth_of, SINK * conditions.path.standing_height, columns.touch)
-        sensors = loop.take(ONLY, control[np.newaxis])["sensors"][0]
-        self.touch, self.trunk = sensors[:, columns.touch], sensors[:, columns.trunk]
+        self.shown = FineSteps.of(self, nstep, self.compiled).take(ONLY, control[np.newaxis])
         self.set_control(np.array(rows[nstep:] or rows[-1:]))
 
     def states(self, ids: np.ndarray) -> np.ndarray:
@@ -200,14 +188,15 @@ class InsectPhysics(mujoco.Physics):
 
     def _roll(self, control: np.ndarray) -> Rolled:
         """One step for each row of the controls, (step, actuator)."""
-        feet, sensors = [self._feet()], np.empty((1, len(control), self.model.nsensordata))
-        for now, row in zip(control, sensors[0], strict=True):
+        feet, sensors, force = [self._feet()], [], []
+        for now in control:
             super().set_control(now)
             super().step()
-            row[:] = self.data.sensordata
+            sensors.append(self.data.sensordata.copy())
+            force.append(self.data.actuator_force.copy())
             feet.append(self._feet())
-        nothing = np.empty((1, len(control), 0))
-        return Rolled(np.array(feet)[np.newaxis], sensors, nothing, nothing)
+        seen = (np.array(values)[np.newaxis] for values in (feet, sensors, force))
+        return Rolled(*seen, after=np.empty((1, len(control), 0)))
 
     def rotation(self) -> np.ndarray:
         """From the root frame to the world, (axis, axis)."""
@@ -239,39 +228,35 @@ class InsectPhysics(mujoco.Physics):
         return self.data.sensordata[self.compiled.columns.foot].reshape(6, 3).copy()
 
 
+@dataclass(eq=False)
 class Walking(control.Task):
-    """Walk straight ahead; subclasses say what an action means."""
+    """Walk straight ahead; subclasses say what an action means.  The arguments are those of `load`."""
 
-    def __init__(
-        self, velocity: float, controller: Controller, conditions: Conditions, stride: Stride, steps: int, seed: int
-    ) -> None:
-        """The arguments are those of `load`, but for the `steps` of an episode."""
-        self._velocity, self._controller, self._conditions, self._stride = velocity, controller, conditions, stride
-        self._command = velocity * conditions.time.vp
-        self._steps, self._seed = steps, seed
-        self._starts, self._episodes = draw_starts(16, seed, stride), 0
-        self._plan: Plan
+    velocity: float
+    controller: Controller
+    conditions: Conditions
+    stride: Stride
+    duration: float
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Draw the first starts."""
+        self._starts, self._episodes = draw_starts(16, self.seed, self.stride), 0
+        self._command = self.velocity * self.conditions.time.vp
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
         if self._episodes == len(self._starts):
-            self._starts = draw_starts(2 * self._episodes, self._seed, self._stride)
+            self._starts = draw_starts(2 * self._episodes, self.seed, self.stride)
         start = self._starts[[self._episodes]]
         self._episodes += 1
-        settled = settle(start, self._conditions, self._stride, threads=1)
-        model = physics.model
-        physics.data.qpos[:], physics.data.qvel[:], physics.data.qacc_warmstart[:] = np.split(
-            settled.state[0], np.cumsum([model.nq, model.nv])
-        )
+        settled = settle(start, self.conditions, self.stride, threads=1)
+        mujoco.mj_setState(physics.model.ptr, physics.data.ptr, settled.state[0], AFTER)
         physics.set_control(settled.ctrl[0])
-        self._plan = begin(self._controller, start, self._velocity, self._stride, threads=1)
-        self._targets = TipTargets(start, self._conditions, self._stride)
-        geometry, height = self._stride.geometry, self._conditions.path.standing_height
-        self._planned_stance = np.ones(6)
-        self._planned_tips = np.stack([start[0] + geometry.origin, geometry.y, np.full(6, -height)], axis=-1)
-        self._standing = StandingFeet(1, self._conditions, physics.timestep())
-        self._load, self._torques = settled.load, settled.torques
-        self._contact = np.ones((1, 6), dtype=bool)
+        plan = begin(self.controller, start, self.velocity, self.stride, threads=1)
+        self._orders, self._senses = OrdersFromPlan(settled, plan, self.duration), Senses(settled)
+        self._reading = plan if isinstance(plan, ReadingPlan) else None
+        self._planned_stance, self._out_of_reach = np.ones(6), np.zeros(6)
         self._fell = False
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
@@ -282,37 +267,31 @@ class Walking(control.Task):
         within = (action >= spec.minimum - ROUNDING) & (action <= spec.maximum + ROUNDING)
         if not within.all():
             i = int(np.argmin(within))
-            raise InputError(
-                f"the action's {spec.name.split()[i]} = {action[i]};"
-                f" expected {spec.minimum[i]:.4g} to {spec.maximum[i]:.4g}"
-            )
-        if isinstance(self._plan, ReadingPlan):
-            tell(self._plan, self._sensed(physics))
-        ahead = advanced(self._plan, 1)
-        tips = self._targets.follow(ahead, np.zeros(1, dtype=int))[0]
-        self._planned_stance, self._planned_tips = ahead.stance[0, 0].astype(float), tips[-1]
-        targets = np.atleast_2d(self.joint_targets(action, tips, physics))
-        if physics.compiled.conditions.contact.grasp:
-            held = np.broadcast_to(self._planned_stance, (len(targets), len(LEGS)))
-            targets = np.concatenate([targets, held], axis=1)
-        physics.set_control(targets)
+            name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
+            raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
+        if self._reading:
+            here = physics.position()[np.newaxis], physics.velocity()[np.newaxis]
+            tell(self._reading, self._senses.sensed(ONLY, *here))
+        if orders := self._orders.ahead(ONLY, steps=1, offset=self.tip_offsets(action)):
+            self._planned_stance = orders.plan.stance[0, 0].astype(float)
+            self._out_of_reach = orders.missed[0].sum(axis=0).astype(float)
+            control = orders.control[0]
+            joints = control[:, physics.compiled.columns.ctrl]
+            joints[:] = self.joint_targets(action, joints)
+            physics.set_control(control)
 
-    @abstractmethod
-    def joint_targets(self, action: np.ndarray, tips: np.ndarray, physics: InsectPhysics) -> np.ndarray:
-        """Targets (actuator,) or (substep, actuator) [rad], from the planned tips, (substep, leg, axis) [mm]."""
+    def tip_offsets(self, action: np.ndarray) -> np.ndarray | None:
+        """What feet do beside the plan, (leg, axis) [mm]."""
+
+    def joint_targets(self, action: np.ndarray, planned: np.ndarray) -> np.ndarray:
+        """What the joints do, from what they would do by the plan and the offsets, (substep, joint) [rad]."""
+        return planned
 
     def after_step(self, physics: InsectPhysics) -> None:
         """Note which feet stand and whether the trunk has touched the ground."""
-        self._standing.after(physics.touch[np.newaxis] > 0, ONLY)
-        self._load, self._torques = physics.touch[-1:], physics.data.actuator_force[np.newaxis].copy()
-        self._fell = bool((physics.trunk > 0).any())
-
-    def _sensed(self, physics: InsectPhysics) -> Sensed:
-        """What the insect knows of itself."""
-        before, self._contact = self._contact, self._standing.now(ONLY)
-        qpos, qvel = physics.position()[np.newaxis], physics.velocity()[np.newaxis]
-        torques = self._torques[:, physics.compiled.columns.ctrl]
-        return sensed(ONLY, qpos, qvel, self._contact, before, self._load, torques, physics.compiled)
+        columns, sensors = physics.compiled.columns, physics.shown["sensors"]
+        self._senses.feel(ONLY, sensors, physics.shown["force"][:, :, columns.ctrl])
+        self._fell = bool((sensors[:, :, columns.trunk] > 0).any())
 
     def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
         """The specs of all observations by their names."""
@@ -321,7 +300,7 @@ class Walking(control.Task):
     def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
         """The observations, in the order of their specs."""
         qpos, qvel = physics.position(), physics.velocity()
-        standing = self._standing.now(ONLY)[0]
+        standing = self._senses.standing(ONLY)[0]
         return OrderedDict(
             joint_angles=qpos[physics.compiled.columns.qpos],
             joint_velocities=qvel[physics.compiled.columns.qvel],
@@ -334,7 +313,7 @@ class Walking(control.Task):
             margin=physics.margin(standing),
             command=np.array(self._command),
             planned_stance=self._planned_stance,
-            planned_tips=self._planned_tips,
+            planned_tips=self._orders.tips[0].copy(),
         )
 
     def get_reward(self, physics: InsectPhysics) -> float:
@@ -347,7 +326,7 @@ class Walking(control.Task):
         """Discount 0 on a fall, 1 when the time is over, nothing before."""
         if self._fell:
             return 0.0
-        return 1.0 if self._plan.done >= self._steps else None
+        return None if self._orders.steps_ahead() else 1.0
 
 
 class JointTargets(Walking):
@@ -359,8 +338,8 @@ class JointTargets(Walking):
         low, high = physics.model.actuator_ctrlrange[compiled.columns.ctrl].T
         return specs.BoundedArray((compiled.joints,), float, low, high, name="\t".join(compiled.body.joints))
 
-    def joint_targets(self, action: np.ndarray, tips: np.ndarray, physics: InsectPhysics) -> np.ndarray:
-        """The action itself."""
+    def joint_targets(self, action: np.ndarray, planned: np.ndarray) -> np.ndarray:
+        """The action itself, throughout."""
         return action
 
 
@@ -373,21 +352,13 @@ class TipOffsets(Walking):
         bound = np.full(3 * len(LEGS), physics.compiled.body.lengths.largest_tip_offset)
         return specs.BoundedArray(bound.shape, float, -bound, bound, name=names)
 
-    def initialize_episode(self, physics: InsectPhysics) -> None:
-        """Settle the next start; nothing is out of reach yet."""
-        super().initialize_episode(physics)
-        self._out_of_reach = np.zeros(6)
-
-    def joint_targets(self, action: np.ndarray, tips: np.ndarray, physics: InsectPhysics) -> np.ndarray:
-        """The angles that put the tips there; a leg whose tip is out of reach keeps its last ones."""
-        joints, reachable = physics.compiled.inverse(tips + action.reshape(6, 3))
-        self._out_of_reach = (~reachable).sum(axis=0).astype(float)
-        hold(joints, physics.control()[physics.compiled.columns.ctrl].reshape(len(LEGS), -1))
-        return joints.reshape(len(tips), -1)
+    def tip_offsets(self, action: np.ndarray) -> np.ndarray:
+        """The action itself; a leg whose tip is out of reach keeps its last angles."""
+        return action.reshape(6, 3)
 
     def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
         """The specs of all observations by their names."""
-        most = float(self._conditions.substeps(self._stride))
+        most = float(self.conditions.substeps(self.stride))
         spec = specs.BoundedArray((6,), float, 0.0, most, "out_of_reach")
         return super().observation_spec(physics) | {"out_of_reach": spec}
 

@@ -12,7 +12,7 @@ from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
-from hexmj.physics.outcomes import Outcomes, RunningOutcomes, measured_walk
+from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, measured_walk
 from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress
 from hexmj.stability import loss_time
@@ -88,10 +88,10 @@ def outcomes_of_plan(
 ) -> Outcomes:
     """The same for any plan that is at time 0, whose own losses, (start,) [time units], are known."""
     typed("progress", progress, Progress | None)
-    running = RunningOutcomes(settled, planned_loss)
+    so_far = OutcomesSoFar(settled, planned_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
-        running.add(chunk)
-    return running.outcomes()
+        so_far.add(chunk)
+    return so_far.outcomes()
 
 
 def physical_walk(
@@ -141,13 +141,13 @@ def physical_walk_of_plan(
 ) -> PhysicalWalk:
     """The same for any plan that is at time 0, which goes as `planned`."""
     conditions, stride = settled.conditions, settled.stride
-    running = RunningOutcomes(settled, loss_time(planned, threads=threads))
+    so_far = OutcomesSoFar(settled, loss_time(planned, threads=threads))
     shape = planned.stance.shape
     x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
     told: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
-        running.add(chunk)
+        so_far.add(chunk)
         told += [chunk.plan] if isinstance(plan, ReadingPlan) else []
         columns, seen, seen_centre = measured_walk(chunk, settled)
         at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
@@ -156,4 +156,4 @@ def physical_walk_of_plan(
         qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
     measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
     ordered = joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]) if told else planned
-    return PhysicalWalk(planned, ordered, measured, running.outcomes(), qpos, centre, conditions, stride)
+    return PhysicalWalk(planned, ordered, measured, so_far.outcomes(), qpos, centre, conditions, stride)

@@ -13,7 +13,7 @@ import numpy as np
 from hexmj.controllers.asking import tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.physics.chunks import Chunk, Insects, Push
-from hexmj.physics.orders import JointTargets, Orders
+from hexmj.physics.orders import Orders, OrdersFromPlan
 from hexmj.physics.settling import Settled
 from hexmj.progress import Progress
 from hexmj.timing import steps_within
@@ -44,10 +44,10 @@ def drive(
         InputError: a plan of other starts, with another stride, not at time 0, or of other shapes than asked for.
         SimulationError: a simulation that diverged; it carries its last good state.
     """
-    insects, targets = Insects(settled, push, threads), JointTargets(settled, plan, duration)
-    total = int(steps_within(duration, settled.stride)) * settled.conditions.substeps(settled.stride)
+    insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration)
+    total = int(steps_within(duration, settled.stride)) * settled.substeps
     told = 0.0
-    for chunk in _reading(insects, plan, targets) if isinstance(plan, ReadingPlan) else _by_itself(insects, targets):
+    for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):
         yield chunk
         if progress:
             done = 1.0 if chunk.fell.all() else min(1.0, (chunk.first + chunk.qpos.shape[1]) / total)
@@ -55,33 +55,33 @@ def drive(
             told = done
 
 
-def _by_itself(insects: Insects, targets: JointTargets) -> Iterator[Chunk]:
+def _by_itself(insects: Insects, orders: OrdersFromPlan) -> Iterator[Chunk]:
     """The plan goes on, whatever happens to the insects."""
-    now = targets.ahead(np.arange(len(insects.settled.starts)))
+    now = orders.ahead(np.arange(len(insects.settled.starts)))
     with ThreadPoolExecutor(1) as stepper:
-        stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
+        stepping = now and stepper.submit(insects.carry_out, [now], len(now.plan.time))
         while now and stepping:
-            ahead = targets.ahead(now.ids)
+            ahead = orders.ahead(now.ids)
             chunk = stepping.result()
             now = ahead.only(~chunk.fell) if ahead and not chunk.fell.all() else None
-            stepping = now and stepper.submit(insects.obey, [now], len(now.plan.time))
+            stepping = now and stepper.submit(insects.carry_out, [now], len(now.plan.time))
             yield chunk
 
 
-def _reading(insects: Insects, plan: ReadingPlan, targets: JointTargets) -> Iterator[Chunk]:
+def _reading(insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
     """The plan is told what the insects know before each of its steps."""
     ids = np.arange(len(insects.settled.starts))
-    while len(ids) and (steps := targets.steps_ahead()):
-        chunk = insects.obey(_step_by_step(insects, plan, targets, ids, steps), steps)
+    while len(ids) and (steps := orders.steps_ahead()):
+        chunk = insects.carry_out(_step_by_step(insects, plan, orders, ids, steps), steps)
         yield chunk
         ids = ids[~chunk.fell]
 
 
 def _step_by_step(
-    insects: Insects, plan: ReadingPlan, targets: JointTargets, ids: np.ndarray, steps: int
+    insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
 ) -> Iterator[Orders]:
     """Orders for one step after the other, each made from what the last one has brought about."""
     for _ in range(steps):
         tell(plan, insects.sensed(ids))
-        if orders := targets.ahead(ids, steps=1):
-            yield orders
+        if now := orders.ahead(ids, steps=1):
+            yield now

@@ -9,9 +9,11 @@ diverges ends everything even in steps that would have been taken again.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.backend import Diverged, Engine
 
 Shown = dict[str, np.ndarray]
@@ -27,26 +29,26 @@ BRAKED = 0.5
 """Share of its speed that a foot in the ground is taken to keep over a physics step; measured are 0.2 to 0.7."""
 
 
+@dataclass(frozen=True, eq=False)
 class FineSteps:
     """The loop that takes whole steps of a plan, and those again, more finely, in which a foot strikes."""
 
-    def __init__(
-        self,
-        engine: Engine,
-        substeps: int,
-        depth_of: Callable[[np.ndarray], np.ndarray],
-        allowed: float,
-        touch: slice,
-    ) -> None:
-        """Args:
-        engine: steps the bodies.
-        substeps: physics steps in one of the plan.
-        depth_of: how deep feet in the world are in the ground, (..., 3) -> (...) [mm].
-        allowed: how deep a foot may be [mm].
-        touch: columns of the sensors that hold forces.
-        """
-        self._engine, self._substeps = engine, substeps
-        self._depth_of, self._allowed, self._touch = depth_of, allowed, touch
+    engine: Engine
+    """Steps the bodies."""
+    substeps: int
+    """Physics steps in one of the plan."""
+    depth_of: Callable[[np.ndarray], np.ndarray]
+    """How deep feet in the world are in the ground, (..., 3) -> (...) [mm]."""
+    allowed: float
+    """How deep a foot may be [mm]."""
+    touch: slice
+    """Columns of the sensors that hold forces."""
+
+    @classmethod
+    def of(cls, engine: Engine, substeps: int, compiled: CompiledBody) -> "FineSteps":
+        """Of an engine that steps such a body."""
+        allowed = SINK * compiled.conditions.path.standing_height
+        return cls(engine, substeps, compiled.depth, allowed, compiled.columns.touch)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """What some bodies show while they take the substeps of these controls, (n, substep, actuator).
@@ -56,12 +58,12 @@ class FineSteps:
         Raises:
             Diverged: a body that diverged.
         """
-        m, end, before = self._substeps, control.shape[1], self._engine.states(ids)
+        m, end, before = self.substeps, control.shape[1], self.engine.states(ids)
         shown, struck = self._roll(ids, control, 0, end)
         for begin in range(0, end, m):
             if (again := np.flatnonzero(struck == begin)).size:
                 few, then = ids[again], min(begin + m, end)
-                self._engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
+                self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
                 _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
                 if then < end:
                     rest, struck[again] = self._roll(few, control[again], then, end)
@@ -73,27 +75,27 @@ class FineSteps:
     ) -> tuple[Shown, np.ndarray]:
         """Every part of some substeps; and where the first step begins in which a foot strikes, (n,), or `end`."""
         try:
-            seen = self._engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
+            seen = self.engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
         except Diverged as error:
             error.substep = begin
             raise
-        depth, m = self._depth_of(seen.feet), self._substeps
-        strike = strikes(depth, parts * m, self._allowed)
+        depth, m = self.depth_of(seen.feet), self.substeps
+        strike = strikes(depth, parts * m, self.allowed)
         shown = {"sensors": seen.sensors, "force": seen.force, "depth": depth[:, 1:].max(axis=2), "after": seen.after}
         return shown, np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
 
     def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
         """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""
-        before = self._engine.states(ids)
+        before = self.engine.states(ids)
         every, struck = self._roll(ids, control, begin, end, parts)
         shown = {
-            "sensors": in_whole_steps(every["sensors"], parts, self._touch),
+            "sensors": in_whole_steps(every["sensors"], parts, self.touch),
             "force": every["force"][:, ::parts],
             "depth": every["depth"].reshape(len(ids), -1, parts).max(axis=2),
             "after": every["after"][:, parts - 1 :: parts],
         }
         if parts < FINEST and (again := np.flatnonzero(struck < end)).size:
-            self._engine.put(ids[again], before[again])
+            self.engine.put(ids[again], before[again])
             finer = self._roll_finely(ids[again], control[again], begin, end, FINER * parts)
             _show(shown, again, 0, finer)
         return shown

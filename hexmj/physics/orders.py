@@ -30,7 +30,7 @@ class Orders:
     tips: np.ndarray
     """(n, substep, leg, 3) where the tips shall be before each of these substeps, in the root frame [mm]."""
     missed: np.ndarray
-    """(n, substep) number of tips out of reach."""
+    """(n, substep, leg) which tips are out of reach."""
 
     def only(self, keep: np.ndarray) -> "Orders":
         """The orders of some of the starts, (n,)."""
@@ -43,8 +43,11 @@ def steps_in_chunk(substeps: int) -> int:
     return max(1, CHUNK // substeps)
 
 
-class JointTargets:
-    """The joint targets of settled starts, made as the plan goes on."""
+class OrdersFromPlan:
+    """The orders of settled starts, made as their plan goes on."""
+
+    tips: np.ndarray
+    """(start, leg, 3) where the tips shall be now, in the root frame [mm]."""
 
     def __init__(self, settled: Settled, plan: Plan, duration: float) -> None:
         """All legs hold their starts; `plan` is at time 0 and ends at `duration` [time units].
@@ -53,42 +56,42 @@ class JointTargets:
             InputError: a plan of other starts, with another stride, or not at time 0.
         """
         check_plan(plan, settled.starts, settled.stride)
-        self._plan = plan
-        self._steps = int(steps_within(duration, settled.stride))
-        self._substeps = settled.conditions.substeps(settled.stride)
-        self._tips = TipTargets(settled.starts, settled.conditions, settled.stride)
-        self._compiled, columns = settled.compiled, settled.compiled.columns
-        self._last = settled.ctrl[:, columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
-        self._last_tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
-        self._grasps = columns.grasp.stop > columns.grasp.start
+        self._plan, self._settled, self._steps = plan, settled, int(steps_within(duration, settled.stride))
+        self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
+        self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
+        self.tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
 
     def steps_ahead(self) -> int:
         """Steps of the plan in the next chunk, 0 where the walk has ended."""
-        return min(steps_in_chunk(self._substeps), self._steps - self._plan.done)
+        return min(steps_in_chunk(self._settled.substeps), self._steps - self._plan.done)
 
-    def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
-        """The orders of the starts `ids` for the next `steps`, a chunk unless given; none where the walk has ended.
+    def ahead(self, ids: np.ndarray, steps: int | None = None, offset: np.ndarray | None = None) -> Orders | None:
+        """The orders of some starts for the next steps, none where the walk has ended.
 
         A leg whose tip is out of reach keeps its last angles.
+
+        Args:
+            ids: of the starts, (n,).
+            steps: of the plan; a chunk unless given.
+            offset: what the feet do beside the plan, (leg, 3) [mm].
         """
-        first = self._plan.done * self._substeps
-        if self._plan.done == self._steps:
+        done, m = self._plan.done, self._settled.substeps
+        if done == self._steps:
             return None
         plan = advanced(self._plan, steps or self.steps_ahead())
-        tips = self._tips.follow(plan, ids)
-        joints, reachable = self._compiled.inverse(tips)
+        tips = self._follow(plan, ids)
+        joints, reachable = self._settled.compiled.inverse(tips if offset is None else tips + offset)
         for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
-            hold(joints[i], self._last[ids[i]])
-        self._last[ids] = joints[:, -1]
-        tips = np.concatenate([self._last_tips[ids, None], tips], axis=1)  # the insect is shown before each substep
-        self._last_tips[ids] = tips[:, -1]
-        control, missed = joints.reshape(*joints.shape[:2], -1), (~reachable).sum(axis=2)
-        if self._grasps:
-            held = plan.stance[:, ids].swapaxes(0, 1).repeat(self._substeps, axis=1)
-            control = np.concatenate([control, held], axis=2)
+            hold(joints[i], self._joints[ids[i]])
+        self._joints[ids] = joints[:, -1]
+        tips = np.concatenate([self.tips[ids, None], tips], axis=1)  # the insect is shown before each substep
+        self.tips[ids] = tips[:, -1]
+        control = joints.reshape(*joints.shape[:2], -1)
+        if self._settled.conditions.contact.grasp:
+            control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
         if self._plan.done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
-        return Orders(plan, first, ids, control, tips[:, : control.shape[1]], missed)
+        return Orders(plan, done * m, ids, control, tips[:, : control.shape[1]], ~reachable)
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:

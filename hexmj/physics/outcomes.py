@@ -1,7 +1,7 @@
 """What a physical walk has shown: the measured walk, and how every start went."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -58,34 +58,26 @@ def measured_walk(
         Columns of the chunk's substeps, (step,), the walk of these starts, and the centre of mass in the
         world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall.
     """
-    m, stride = settled.conditions.substeps(settled.stride), settled.stride
+    m, stride, columns = settled.substeps, settled.stride, settled.compiled.columns
     rows = np.arange(len(chunk.ids)) if rows is None else rows
     substep = np.arange(chunk.qpos.shape[1])
     shown = substep[((chunk.first + substep) % m == 0) & (chunk.first + substep > 0)]
-    columns = settled.compiled.columns
     shape = len(shown), len(rows)
-    x, y = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan)
-    stance, centre = np.zeros((*shape, 6), dtype=bool), np.full((*shape, 3), np.nan)
-    seen = chunk.qpos, chunk.sensors, chunk.standing, chunk.valid
-    _look(*seen, rows, shown, columns.foot.start, columns.centre_of_mass.start, x, y, stance, centre)
+    x, y, stance = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan), np.zeros((*shape, 6), dtype=bool)
+    centre, places = np.full((*shape, 3), np.nan), (columns.foot.start, columns.centre_of_mass.start)
+    _look((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
     step = (chunk.first + shown) // m
-    walk = Walk(
-        time=step * stride.dt,
-        velocity=chunk.plan.velocity[np.maximum(step - 1 - chunk.first // m, 0)][:, chunk.ids[rows]],
-        x=x - np.array(stride.geometry.origin),
-        y=y,
-        stance=stance,
-        geometry=stride.geometry,
-    )
+    velocity = chunk.plan.velocity[np.maximum(step - 1 - chunk.first // m, 0)][:, chunk.ids[rows]]
+    walk = Walk(step * stride.dt, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
     return shown, walk, centre
 
 
 @njit(cache=True, nogil=True)
-def _look(
-    qpos: Any, sensors: Any, standing: Any, valid: Any, rows: Any, shown: Any, foot: int, centre_of_mass: int,
-    x: Any, y: Any, stance: Any, centre: Any,
-) -> None:  # fmt: skip
+def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
     """Feet ahead of and beside the centre of mass, seen along the root's heading, up to the fall."""
+    qpos, sensors, standing, valid = chunk
+    foot, centre_of_mass = places
+    x, y, stance, centre = walk
     for n, column in enumerate(shown):
         for i, row in enumerate(rows):
             if column >= valid[row]:
@@ -104,35 +96,49 @@ def _look(
                 stance[n, i, leg] = standing[row, column, leg]
 
 
-class RunningOutcomes:
+class _Sums(NamedTuple):
+    """What is added up of every start, or the least of it so far."""
+
+    clearance: np.ndarray
+    """(start,) see `Outcomes.clearance`."""
+    upright: np.ndarray
+    """(start,) least upward component of the trunk's vertical."""
+    slid: np.ndarray
+    """(start,) way that feet slid in contact [mm]."""
+    contacts: np.ndarray
+    """(start,) substeps in which a foot was in contact, over all feet."""
+    saturated: np.ndarray
+    """(start,) substeps in which a torque stood at its limit, over all joints."""
+    shown: np.ndarray
+    """(start,) substeps."""
+    misses: np.ndarray
+    """(start, bin) how often a foot was so far from its target on the ground."""
+
+
+class OutcomesSoFar:
     """Adds up the outcomes of all starts, chunk by chunk."""
 
     def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:
         """Begin with nothing but the plan's losses, (start,) [time units]."""
-        size = len(settled.starts)
-        self._settled = settled
-        self._planned_loss = planned_loss
+        size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
+        self._settled, self._planned_loss = settled, planned_loss
         self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
-        self._walked, self._commanded = np.zeros(size), np.zeros(size)
-        self._sums = np.zeros((size, len(_SUMS)))
-        self._sums[:, _CLEARANCE], self._sums[:, _UPRIGHT] = np.inf, 1.0
-        lengths = settled.conditions.body.lengths
-        self._bins = lengths.tracking_bin, lengths.tracking_bins
-        self._misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
-        self._depth, self._corners = np.zeros(size), settled.compiled.trunk_corners
+        self._walked, self._commanded, self._depth = np.zeros((3, size))
+        misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
+        slid, contacts, saturated, shown = np.zeros((4, size))
+        self._sums = _Sums(np.full(size, np.inf), np.ones(size), slid, contacts, saturated, shown, misses)
+        columns, ground = compiled.columns, -settled.conditions.path.standing_height
+        self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
+        self._scale = ground, lengths.tracking_bin
 
     def add(self, chunk: Chunk) -> None:
         """Take in one chunk of `drive.drive`."""
-        settled, ids = self._settled, chunk.ids
-        compiled, dt, m = settled.compiled, settled.stride.dt, settled.conditions.substeps(settled.stride)
-        columns, limit = compiled.columns, compiled.torque_limits
-        feet, touch = columns.foot.start, columns.touch.start
+        settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
         seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid
-        ground = -settled.conditions.path.standing_height
-        _scan(*seen, feet, touch, ground, *self._corners, 0.999 * limit, self._bins[0], self._sums, self._misses, ids)
+        _scan(seen, ids, self._body, self._scale, self._sums)
         n, last = np.arange(len(ids)), chunk.valid - 1
-        trunk = chunk.sensors[n, last, columns.trunk] > 0
+        trunk = chunk.sensors[n, last, settled.compiled.columns.trunk] > 0
         fell, until = chunk.fell, np.where(chunk.fell, last, chunk.valid)
         self._fall[ids[fell]] = ((chunk.first + last) / m * dt)[fell]
         self._fall_part[ids[fell]] = np.argmax(trunk, axis=1)[fell]
@@ -149,69 +155,64 @@ class RunningOutcomes:
 
     def outcomes(self) -> Outcomes:
         """How every start went, as far as the chunks reach."""
-        sums, timestep = self._sums, self._settled.compiled.model.opt.timestep
+        sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
         with np.errstate(invalid="ignore", divide="ignore"):
             speed = np.where(self._commanded > 0, self._walked / self._commanded, np.nan)
-            slip = sums[:, _SLID] / (sums[:, _CONTACTS] * timestep)
+            slip = sums.slid / (sums.contacts * compiled.model.opt.timestep)
         return Outcomes(
             planned_loss=self._planned_loss,
             measured_loss=self._measured_loss,
             fall=self._fall,
             fall_part=self._fall_part,
-            clearance=sums[:, _CLEARANCE],
-            tilt=np.arccos(np.clip(sums[:, _UPRIGHT], -1.0, 1.0)),
+            clearance=sums.clearance,
+            tilt=np.arccos(np.clip(sums.upright, -1.0, 1.0)),
             speed=speed,
             slip=slip,
-            tracking=_percentile(self._misses, 0.95, *self._bins),
+            tracking=_percentile(sums.misses, 0.95, lengths.tracking_bin),
             depth=self._depth,
-            saturation=sums[:, _SATURATED] / (sums[:, _SHOWN] * self._settled.compiled.joints),
+            saturation=sums.saturated / (sums.shown * compiled.joints),
             unreachable=self._unreachable,
         )
 
 
-def _percentile(counts: np.ndarray, share: float, width: float, bins: int) -> np.ndarray:
+def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
     """Upper end [mm] of the bin that holds this share of the counts, (start, bin); inf in the last, open one."""
     reached = np.cumsum(counts, axis=1) >= share * counts.sum(axis=1, keepdims=True)
-    ends = np.append(np.arange(1, bins + 1) * width, np.inf)
+    ends = np.append(np.arange(1, counts.shape[1]) * width, np.inf)
     return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
 
 
-_SUMS = _CLEARANCE, _UPRIGHT, _SLID, _CONTACTS, _SATURATED, _SHOWN = range(6)
-
-
 @njit(cache=True, nogil=True)
-def _scan(
-    qpos: Any, sensors: Any, targets: Any, force: Any, valid: Any, feet: int, touch: int, ground: float,
-    corner: Any, radius: Any, limit: Any, width: float, sums: Any, misses: Any, ids: Any,
-) -> None:  # fmt: skip
+def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
     """Take a chunk's substeps into the sums and counts of its starts."""
+    qpos, sensors, targets, force, valid = chunk
+    feet, touch, corner, radius, limit = body
     for i, start in enumerate(ids):
-        total = sums[start]
         for t in range(valid[i]):
-            _count_misses(qpos[i, t], sensors[i, t, feet : feet + 18], targets[i, t], ground, width, misses[start])
-            z, q = qpos[i, t, 2], qpos[i, t]
+            q, sensed = qpos[i, t], sensors[i, t]
+            _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
             _, _, _, _, _, _, up_x, up_y, up_z = matrix(q[3], q[4], q[5], q[6])
             for c in range(len(corner)):
-                height = z + up_x * corner[c, 0] + up_y * corner[c, 1] + up_z * corner[c, 2] - radius[c]
-                total[_CLEARANCE] = min(total[_CLEARANCE], height)
-            total[_UPRIGHT] = min(total[_UPRIGHT], up_z)
+                height = q[2] + up_x * corner[c, 0] + up_y * corner[c, 1] + up_z * corner[c, 2] - radius[c]
+                sums.clearance[start] = min(sums.clearance[start], height)
+            sums.upright[start] = min(sums.upright[start], up_z)
             for leg in range(6):
-                if t > 0 and sensors[i, t, touch + leg] > 0 and sensors[i, t - 1, touch + leg] > 0:
-                    f = feet + 3 * leg
-                    forward = sensors[i, t, f] - sensors[i, t - 1, f]
-                    total[_SLID] += np.hypot(forward, sensors[i, t, f + 1] - sensors[i, t - 1, f + 1])
-                    total[_CONTACTS] += 1.0
+                if t > 0 and sensed[touch + leg] > 0 and sensors[i, t - 1, touch + leg] > 0:
+                    f, before = feet + 3 * leg, sensors[i, t - 1]
+                    sums.slid[start] += np.hypot(sensed[f] - before[f], sensed[f + 1] - before[f + 1])
+                    sums.contacts[start] += 1.0
             for joint in range(len(limit)):
-                total[_SATURATED] += abs(force[i, t, joint]) >= limit[joint]
-            total[_SHOWN] += 1.0
+                sums.saturated[start] += abs(force[i, t, joint]) >= limit[joint]
+            sums.shown[start] += 1.0
 
 
 @njit(cache=True, nogil=True)
-def _count_misses(qpos: Any, feet: Any, targets: Any, ground: float, width: float, counts: Any) -> None:
+def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -> None:
     """Count the distance of each foot, (leg * axis), from its target, (leg, 3), if that is on the ground."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix(qpos[3], qpos[4], qpos[5], qpos[6])
+    ground, width = scale
     for leg in range(6):
-        a, b, c = targets[leg, 0], targets[leg, 1], targets[leg, 2]
+        a, b, c = targets[leg]
         if c == ground:
             off_x = qpos[0] + xx * a + xy * b + xz * c - feet[3 * leg]
             off_y = qpos[1] + yx * a + yy * b + yz * c - feet[3 * leg + 1]

@@ -1,35 +1,76 @@
-"""What insects know of themselves, for plans that read the legs."""
+"""What insects feel, substep by substep: which feet stand, what they carry, and what they know for plans that read."""
+
+from typing import Any
 
 import numpy as np
+from numba import njit
 
-from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.controllers.protocol import Sensed
+from hexmj.physics.settling import Settled
 from hexmj.rotations import heading, lean, turned
 
 
-def sensed(
-    ids: np.ndarray,
-    qpos: np.ndarray,
-    qvel: np.ndarray,
-    contact: np.ndarray,
-    before: np.ndarray,
-    load: np.ndarray,
-    torques: np.ndarray,
-    compiled: CompiledBody,
-) -> Sensed:
-    """See `Sensed`; `before` are the contacts a step before, (n, leg), and torques those of all joints, (n, joint)."""
-    joints, root = qpos[:, compiled.columns.qpos].reshape(len(ids), 6, -1), qpos[:, 3:ROOT_QPOS]
-    return Sensed(
-        ids=ids,
-        tips=compiled.forward(joints),
-        contact=contact,
-        gained=contact & ~before,
-        lost=before & ~contact,
-        load=load,
-        joints=joints,
-        torques=torques.reshape(joints.shape),
-        tilt=np.arcsin(np.clip(lean(root)[0], -1.0, 1.0)),
-        velocity=np.concatenate([turned(qvel[:, None, :2], -heading(root))[:, 0], qvel[:, 2:3]], axis=1),
-        turning=qvel[:, 3:ROOT_QVEL],
-    )
+class Senses:
+    """Of settled starts, as they walk; a foot stands that the ground carried within the last `Numerics.contact_gap`."""
+
+    def __init__(self, settled: Settled) -> None:
+        """All feet stand."""
+        self._compiled = settled.compiled
+        self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
+        self._longest_gap = settled.conditions.numerics.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
+        self._before = np.ones(settled.starts.shape, dtype=bool)
+        self._load, self._torques = settled.load.copy(), settled.torques.copy()
+
+    def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Which feet of some starts stand after each of the next substeps, (n, substep, leg).
+
+        Args:
+            ids: of the starts, (n,).
+            sensors: as `backend.Rolled` has them.
+            force: of the joints, (n, substep, joint).
+        """
+        touch = sensors[:, :, self._compiled.columns.touch]
+        self._load[ids], self._torques[ids] = touch[:, -1], force[:, -1]
+        return _standing(touch > 0, self._unloaded, ids, self._longest_gap)
+
+    def standing(self, ids: np.ndarray) -> np.ndarray:
+        """Which feet of some starts stand now, (n, leg)."""
+        return self._unloaded[ids] <= self._longest_gap
+
+    def sensed(self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> Sensed:
+        """What some starts know of themselves; contacts gained and lost are those since they were last asked.
+
+        Args:
+            ids: of the starts, (n,).
+            qpos: where they are now, (n, position).
+            qvel: how fast, (n, velocity).
+        """
+        before, contact = self._before[ids], self.standing(ids)
+        self._before[ids] = contact
+        joints, root = qpos[:, self._compiled.columns.qpos].reshape(len(ids), 6, -1), qpos[:, 3:ROOT_QPOS]
+        return Sensed(
+            ids=ids,
+            tips=self._compiled.forward(joints),
+            contact=contact,
+            gained=contact & ~before,
+            lost=before & ~contact,
+            load=self._load[ids],
+            joints=joints,
+            torques=self._torques[ids].reshape(joints.shape),
+            tilt=np.arcsin(np.clip(lean(root)[0], -1.0, 1.0)),
+            velocity=np.concatenate([turned(qvel[:, None, :2], -heading(root))[:, 0], qvel[:, 2:3]], axis=1),
+            turning=qvel[:, 3:ROOT_QVEL],
+        )
+
+
+@njit(cache=True, nogil=True)
+def _standing(touches: Any, unloaded: Any, ids: Any, longest_gap: float) -> Any:
+    """Which feet stand, from whether they touch, (n, substep, leg); `unloaded`, (start, leg), counts on."""
+    standing = np.empty(touches.shape, dtype=np.bool_)
+    for i, start in enumerate(ids):
+        for t in range(touches.shape[1]):
+            for leg in range(6):
+                unloaded[start, leg] = 0 if touches[i, t, leg] else unloaded[start, leg] + 1
+                standing[i, t, leg] = unloaded[start, leg] <= longest_gap
+    return standing

@@ -1,6 +1,7 @@
 """Every start is put on its six feet in MuJoCo and comes to rest before it walks."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +41,11 @@ class Settled:
     def qpos(self) -> np.ndarray:
         """(start, position)."""
         return self.state[:, : self.compiled.model.nq]
+
+    @cached_property
+    def substeps(self) -> int:
+        """Physics steps in one step of a plan."""
+        return self.conditions.substeps(self.stride)
 
 
 def settle(

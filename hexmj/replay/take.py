@@ -56,32 +56,26 @@ class Take:
             raise InputError(f"the recording {recording.attrs['title']!r} holds no pose; expected at least one")
         physical = "measured_stance" in recording
         kind = "measured" if physical else "planned"
-        centre, tips = recording["centre_of_mass"].values[shown], recording["planned_tip"].values[shown]
-        seen = np.stack(
-            [
-                recording[f"{kind}_x"].values[shown] + np.tile(recording.attrs["origins"], 2),
-                recording[f"{kind}_y"].values[shown],
-            ],
-            axis=-1,
-        )
-        seconds, conditions = recording["seconds"].values, recorded_conditions(recording, body)
-        vp = conditions.time.vp
+        few, conditions = recording.isel(step=shown), recorded_conditions(recording, body)
+        centre, vp = few["centre_of_mass"].values, conditions.time.vp
+        ahead = few[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
+        seen = np.stack([ahead, few[f"{kind}_y"].values], axis=-1)
         return cls(
             title=recording.attrs["title"],
             physical=physical,
             conditions=conditions,
             step=float(recording.attrs["dt"]) / vp,
-            duration=float(seconds[-1]),
-            velocity=recording["velocity"].values[shown],
-            margin=recording[f"{kind}_margin"].values[shown],
-            stance=recording[f"{kind}_stance"].values[shown].astype(bool),
+            duration=float(recording["seconds"][-1]),
+            velocity=few["velocity"].values,
+            margin=few[f"{kind}_margin"].values,
+            stance=few[f"{kind}_stance"].values.astype(bool),
             feet=centre[:, None, :2] + turned(seen, heading(qpos[shown, 3:7])),
-            planned_tip=tips,
+            planned_tip=few["planned_tip"].values,
             centre_of_mass=centre,
             qpos=qpos[shown],
             lost=float(recording[f"{kind}_loss_time"]) / vp,
             fell=float(recording["fall_time"]) / vp if physical else np.inf,
-            part=conditions.body.trunk[int(recording["fall_part"])] if physical else "",
+            part=body.trunk[int(recording["fall_part"])] if physical else "",
         )
 
     def row(self, seconds: float) -> int:
