@@ -44,7 +44,7 @@ def try_inputs(kind: str, inputs: int, number: int) -> Tried:
     @seed(number)
     @settings(
         max_examples=inputs, deadline=None, database=None, phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck), report_multiple_bugs=False,
+        suppress_health_check=[*HealthCheck.__members__.values()], report_multiple_bugs=False,
     )  # fmt: skip
     @given(drawn)
     def one(given: Any) -> None:
