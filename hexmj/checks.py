@@ -64,7 +64,7 @@ def whole(name: str, value: Any, least: int, most: float = math.inf, more: str =
 
 
 def numbers(name: str, values: ArrayLike) -> np.ndarray:
-    """A new array of real numbers.
+    """A new array of real numbers, laid out in memory as they are: the order of sums is part of the bits.
 
     Raises:
         InputError: values that are none, some that are masked, or rows of different lengths.
@@ -72,7 +72,7 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
     with suppress(ValueError):
         array = np.asarray(values)
         if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
-            return np.array(array, dtype=float, order="C")
+            return np.array(array, dtype=float)
     raise InputError(f"{name} = {_shown(values)}; expected numbers")
 
 

@@ -32,7 +32,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     Raises:
         InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
-    points, stands = numbers("feet", feet), states("stance", stance)
+    points, stands = np.ascontiguousarray(numbers("feet", feet)), states("stance", stance)
     if points.shape[-2:] != (6, 2) or stands.shape != points.shape[:-1]:
         raise InputError(
             f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
