@@ -1,6 +1,5 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -13,6 +12,8 @@ from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
 from hexmj.controllers.cruse1998.presets import read_weights
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.files import read_toml
+from hexmj.literal import literal
 from hexmj.loaded import importable
 
 ENTRY_POINTS = "hexmj.controllers"
@@ -39,7 +40,7 @@ def load_controller(name: str) -> Controller:
         return _controller(_object(_module(point.module, name), point.attr, name), name)
     path = Path(name)
     if _is_file(path):
-        return _with_fields(path) or Cruse1998(read_weights(path), name=path.stem)
+        return _with_fields(path) or Cruse1998(read_weights(path), name=literal(path.stem))
     raise InputError(
         f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
         " nor module:object or file.py:object"
@@ -54,10 +55,7 @@ def known_names() -> Iterator[str]:
 
 def _with_fields(path: Path) -> Controller | None:
     """The controller that a file names, with its fields; None of other files."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError):
-        return None  # `read_weights` says what is wrong
+    table = read_toml(path)
     if set(table) != {"controller", "fields"} or not isinstance(table["fields"], dict):
         return None
     if ":" not in (named := str(table["controller"])):

@@ -1,6 +1,5 @@
 """Sets of weights by name: those of the paper and our own, and parameter files (TOML)."""
 
-import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.errors import InputError
+from hexmj.files import read_toml
 
 OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""
@@ -32,10 +32,7 @@ def read_weights(path: Path) -> AnyWeights:
     Raises:
         InputError: a file that cannot be read, or a key, type or value that makes no sense.
     """
-    try:
-        table = tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path} cannot be read as TOML: {error}") from None
+    table = read_toml(path)
     if list(table) == ["symmetric"]:
         return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{path} [symmetric]"))
     if list(table) == ["weights"] and isinstance(table["weights"], dict):
@@ -80,7 +77,7 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
 
 def _own() -> dict[str, Weights]:
     """The sets of `OWN` by their names."""
-    table = tomllib.loads(OWN.read_text(encoding="utf-8"))
+    table = read_toml(OWN)
     return {name: _read_weights(entry["weights"], f"{OWN.name} [{name}]") for name, entry in table.items()}
 
 
