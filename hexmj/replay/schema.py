@@ -110,8 +110,8 @@ def check_recording(recording: xr.Dataset) -> None:
         raise InputError(f"no recording; missing: {', '.join(missing)}")
     check_settings(recording)
     for name, labels in {"leg": list(LEGS), "coordinate": list("xyz")}.items():
-        if name not in recording.coords or (given := recording[name].values.tolist()) != labels:
-            given = given if name in recording.coords else None
+        given = recording[name].values.tolist() if name in recording.coords else None
+        if given != labels:
             raise InputError(f"no recording: {name} = {given}; expected {labels}")
     for name, one in expected.items():
         if (values := recording[name]).dims != one.dimensions or values.dtype != np.dtype(one.dtype) or not values.size:
@@ -123,7 +123,7 @@ def check_recording(recording: xr.Dataset) -> None:
         raise InputError(
             f"no recording: {recording.sizes['position']} positions; expected more than the root's {ROOT_QPOS}"
         )
-    poses = ~np.isnan(recording["qpos"].values).any(axis=1)
+    poses: np.ndarray = np.isfinite(recording["qpos"].values).all(axis=1)
     for name, one in expected.items():
         _check_range(name, one, recording[name].values, poses)
     _check_laws(recording, int(poses.sum()))
@@ -141,8 +141,8 @@ def check_settings(recording: xr.Dataset) -> None:
     for name, usual in SETTINGS.items():
         if not _alike(given[name], usual):
             raise InputError(f"no recording: attribute {name} = {given[name]!r:.80}; expected one such as {usual!r}")
-    geometry = Geometry(*(tuple(map(float, given[name])) for name in ("origins", "lateral")))
-    Stride(**{name: float(given[name]) for name in ("aep0", "pep0", "pep_min", "dt")}, geometry=geometry)
+    lines: Any = {name: tuple(map(float, given[name])) for name in ("origins", "lateral")}
+    Stride(**{name: float(given[name]) for name in ("aep0", "pep0", "pep_min", "dt")}, geometry=Geometry(**lines))
 
 
 def _alike(value: Any, usual: Any) -> bool:
