@@ -123,7 +123,7 @@ def check_recording(recording: xr.Dataset) -> None:
         raise InputError(
             f"no recording: {recording.sizes['position']} positions; expected more than the root's {ROOT_QPOS}"
         )
-    poses: np.ndarray = np.isfinite(recording["qpos"].values).all(axis=1)
+    poses = np.asarray(np.isfinite(recording["qpos"].values).all(axis=1))
     for name, one in expected.items():
         _check_range(name, one, recording[name].values, poses)
     _check_laws(recording, int(poses.sum()))
@@ -140,7 +140,8 @@ def check_settings(recording: xr.Dataset) -> None:
         raise InputError(f"no recording; missing: attribute {', attribute '.join(missing)}")
     for name, usual in SETTINGS.items():
         if not _alike(given[name], usual):
-            raise InputError(f"no recording: attribute {name} = {given[name]!r:.80}; expected one such as {usual!r}")
+            value = np.asarray(given[name]).tolist()
+            raise InputError(f"no recording: attribute {name} = {value!r:.80}; expected one such as {usual!r}")
     lines: Any = {name: tuple(map(float, given[name])) for name in ("origins", "lateral")}
     Stride(**{name: float(given[name]) for name in ("aep0", "pep0", "pep_min", "dt")}, geometry=Geometry(**lines))
 
