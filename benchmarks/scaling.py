@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 from benchmarks.processor import description
 from hexmj import LDVS, Conditions, Stride, draw_starts, first_loss, flss, physical_flss
 from hexmj.measures.figures import MEASURE_COLOURS
-from hexmj.results import json_text, results_folder, write_whole
+from hexmj.results import json_text, results_folder, save_figure, save_text
 from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
@@ -268,8 +268,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console.print(table(all_curves))
     points = [asdict(curve) | curve.summary() for curve in all_curves]
     text = json_text({"machine": description(), "share": options.share, "controller": LDVS.name, "curves": points})
-    write_whole(folder / DATA, lambda part: part.write_text(text + "\n", encoding="utf-8"))
-    write_whole(folder / FIGURE, lambda part: figure(all_curves).savefig(part, dpi=200))
+    save_text(text + "\n", folder / DATA)
+    save_figure(figure(all_curves), folder / FIGURE, dpi=200)
     console.print(f"{folder / FIGURE}, {folder / DATA}")
 
 

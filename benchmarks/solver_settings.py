@@ -26,7 +26,7 @@ from hexmj.bodies.loading import compile_body
 from hexmj.intervals import wilson_interval
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import Settled, settle
-from hexmj.results import json_text, write_whole
+from hexmj.results import json_text, save_text
 
 VELOCITY, DURATION = 0.5, 40.0
 FINEST = "time step / 4"
@@ -148,7 +148,7 @@ def main(folder: str = "results/bench", starts: str = "400") -> None:
     columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
     print_table(columns, rows(results))
     text = json_text(results)
-    write_whole(Path(folder) / "solver_settings.json", lambda part: part.write_text(text, encoding="utf-8"))
+    save_text(text, Path(folder) / "solver_settings.json")
 
 
 if __name__ == "__main__":

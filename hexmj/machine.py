@@ -102,17 +102,17 @@ def rendering() -> str:
 def films() -> str:
     """ffmpeg encodes two frames, which can be read back."""
     import imageio_ffmpeg
-    import mediapy
     import numpy as np
+
+    from hexmj.replay.film.encoder import encoder
 
     ffmpeg, frames = imageio_ffmpeg.get_ffmpeg_exe(), np.zeros((2, 48, 64, 3), np.uint8)
     frames[1] = 255
-    mediapy.set_ffmpeg(ffmpeg)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        with mediapy.VideoWriter(path, (48, 64), fps=25) as writer:
+        with encoder(path, 48, 64, 25.0) as add:
             for frame in frames:
-                writer.add_image(frame)
+                add(frame)
         decode = [ffmpeg, "-loglevel", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
         read = np.frombuffer(subprocess.run(decode, capture_output=True, check=True).stdout, np.uint8)
     if read.size != frames.size or abs(read.reshape(frames.shape).astype(int) - frames).max() > 10:

@@ -1,17 +1,24 @@
 """Results on disk: NetCDF, figures and a manifest, each written whole or not at all."""
 
+import io
 import json
 import math
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
+from hexmj import netcdf
 from hexmj.errors import InputError
+from hexmj.files import PART, sealed, write_whole
+from hexmj.literal import literal
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "cmaes", "dm-control", "xarray")
 
@@ -22,43 +29,55 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
     Raises:
         InputError: the path or a name in it is taken by something else, or cannot be written to.
     """
-    nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
-    if not nearest.is_dir():
-        raise InputError(f"--out {path}: {nearest} is a file; expected a folder")
-    if not os.access(nearest, os.W_OK):
-        raise InputError(f"--out {path}: {nearest} is not writable; expected a folder that is")
-    if taken := [name for name in names if (path / name).is_dir()]:
+    try:
+        nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))
+        if not nearest.is_dir():
+            raise InputError(f"--out {path}: {nearest} is a file; expected a folder")
+        _try(nearest, path.absolute().relative_to(nearest.absolute()).parts)
+        taken = [name for name in names if (path / name).is_dir()]
+    except OSError as error:
+        raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None
+    if taken:
         raise InputError(f"--out {path}: {taken[0]} is a folder there; expected a file or nothing")
     return path
 
 
-def write_whole(path: Path, write: Callable[[Path], Any]) -> Path:
-    """Let `write` make a file beside `path`, then put it in the place of `path`; on failure `path` stays as it was.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    part = path.with_name(f".part-{path.name}")
+def _try(folder: Path, missing: Sequence[str]) -> None:
+    """Write a file into a folder and remove it; look up the names of folders that are still to be made in it."""
+    for name in missing:
+        with suppress(FileNotFoundError):
+            os.lstat(folder / name)
+    part = folder / f"{PART}{uuid4().hex}"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(part)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
+        part.write_bytes(bytes(4096))
     finally:
-        if part.exists():
-            part.unlink()
-    return path
+        part.unlink(missing_ok=True)
 
 
 def save_dataset(data: "xr.Dataset", path: Path) -> Path:
     """Write a dataset as NetCDF; settings that NetCDF has no type for become JSON text."""
     plain = data.copy()
     plain.attrs = {
-        key: value if type(value) in (str, int, float) else json.dumps(value, default=str)
+        key: literal(value)
+        if type(value) is str
+        else value
+        if type(value) in (int, float)
+        else json.dumps(value, default=str)
         for key, value in data.attrs.items()
     }
-    return write_whole(path, lambda part: plain.to_netcdf(part, engine="h5netcdf"))
+    return write_whole(path, sealed(netcdf.encode(plain)))
+
+
+def save_figure(figure: "Figure", path: Path, **how: Any) -> Path:
+    """Write a figure in the format that the name's ending tells; `how` as of `Figure.savefig`."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix[1:], **how)
+    return write_whole(path, drawn.getvalue())
+
+
+def save_text(text: str, path: Path) -> Path:
+    """Write a text in UTF-8."""
+    return write_whole(path, text.encode())
 
 
 def save_manifest(settings: dict[str, Any], path: Path) -> Path:
@@ -66,8 +85,8 @@ def save_manifest(settings: dict[str, Any], path: Path) -> Path:
     from importlib.metadata import version
 
     versions = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
-    text = json_text({"settings": settings, "versions": versions, "machine": platform.machine()})
-    return write_whole(path, lambda part: part.write_text(text + "\n", encoding="utf-8"))
+    told = {"settings": settings, "versions": versions, "machine": platform.machine()}
+    return save_text(json_text(told) + "\n", path)
 
 
 def json_text(value: Any) -> str:

@@ -1,6 +1,6 @@
 """Reads a real video file back, frame by frame.
 
-By ffmpeg itself: mediapy's reader asks it for an option that it no longer has, imageio-ffmpeg's leaves files open.
+By ffmpeg itself: imageio-ffmpeg's reader leaves files open.
 """
 
 import re

@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("checks", "errors", "intervals", "legs", "loaded", "progress", "results", "rotations", "threads"),
+    ("checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
+    ("progress", "results", "rotations", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("timing",),
     ("stability", "walks"),

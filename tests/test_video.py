@@ -18,6 +18,7 @@ from hexmj.replay.film import gl
 from hexmj.replay.film.film import CAMERAS, Film
 from hexmj.replay.film.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
+from hexmj.replay.schema import MEASURED, PLANNED
 from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s
@@ -140,7 +141,8 @@ def test_films_that_make_no_sense(fallen, tmp_path):
         with pytest.raises(InputError, match=r"expected a name with \.mp4 in a folder that exists"):
             render([fallen], path)
     with pytest.raises(InputError, match="'a fall' holds no pose"):
-        render([fallen.assign(qpos=fallen.qpos * np.nan)], tmp_path / "film.mp4")
+        poses = [name for name, one in (PLANNED | MEASURED).items() if one.gaps == "after a fall"]
+        render([fallen.assign({name: fallen[name] * np.nan for name in poses})], tmp_path / "film.mp4")
 
 
 def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):

@@ -13,6 +13,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
 from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
 
 ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice."
@@ -55,8 +56,12 @@ def main() -> None:
     sys.path.append("")  # for modules of the user's own in the current folder, as `python -m hexmj` finds them
     options: Any = None
     try:
-        options = _options(sys.argv[1:])
-        options.run()
+        try:
+            options = _options(sys.argv[1:])
+            options.run()
+        finally:
+            if sys.stdout:  # there is none where it was closed
+                sys.stdout.flush()
     except KeyboardInterrupt:
         sys.exit(_complain("stopped", 130))
     except InputError as error:
@@ -66,8 +71,11 @@ def main() -> None:
     except RenderingError as error:
         sys.exit(_complain(error, 1))
     except BrokenPipeError:  # whoever read the output has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         sys.exit(141)
+    except OSError as error:
+        _drop_output()
+        sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
 
 
 def _options(words: list[str]) -> Any:
@@ -104,10 +112,15 @@ def _kept(error: SimulationError, out: Path | None) -> str:
 
     try:
         return f"; its last good state is in {save_state(error, out)}"
-    except OSError as problem:
-        return f"; its last good state cannot be written to {out}: {problem.strerror or problem}"
+    except InputError as problem:
+        return f"; its last good state is lost: {problem}"
+
+
+def _drop_output() -> None:
+    """Nothing more is written to standard output, nor tried at the end of the program."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(error: Exception | str, code: int) -> int:
-    print(f"hexmj: {error}", file=sys.stderr)
+    print(f"hexmj: {literal(str(error))}", file=sys.stderr)
     return code

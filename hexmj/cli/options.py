@@ -153,10 +153,15 @@ class Sweepers:
             yield None
             return
         from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
+        from multiprocessing import active_children, get_context
 
         with ProcessPoolExecutor(self.processes, get_context("spawn")) as executor:
-            yield executor
+            try:
+                yield executor
+            except KeyboardInterrupt:  # nobody waits for cells that are stopped
+                for worker in active_children():
+                    worker.terminate()
+                raise
 
 
 def changed(given: Any, usual: Any) -> Iterator[str]:

@@ -11,8 +11,10 @@ from hexmj.cli.command import WalkingCommand
 from hexmj.cli.options import Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
+from hexmj.literal import literal
+from hexmj.locks import locked
 from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_manifest, write_whole
+from hexmj.results import results_folder, save_dataset, save_manifest, save_text
 from hexmj.starts import SAMPLE
 
 if TYPE_CHECKING:
@@ -76,7 +78,7 @@ class Search(WalkingCommand):
         problem, effort = self._problem(), self._effort()
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
         out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
-        with progress_bar("searching") as progress:
+        with locked(out / KEPT), progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
@@ -166,7 +168,7 @@ class Search(WalkingCommand):
         low, high = self._range
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
         method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
-        return f"{self.form}, {self._kind} FLSS at {at}, {method}"
+        return literal(f"{self.form}, {self._kind} FLSS at {at}, {method}")
 
     def _write(self, problem: "Problem", found: "Found", manifest: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
@@ -174,7 +176,7 @@ class Search(WalkingCommand):
         text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
         return [
             save_dataset(found.history, self.out / "history.nc"),
-            write_whole(self.out / "found.toml", lambda part: part.write_text(text, encoding="utf-8")),
+            save_text(text, self.out / "found.toml"),
             save_figure(convergence_figure(found.history, self._title), self.out / "convergence.png"),
             save_manifest(manifest, self.out / "manifest.json"),
         ]

@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.results import json_text, write_whole
+from hexmj import results
+from hexmj.literal import literal
+from hexmj.results import json_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +40,7 @@ def short(value: Any) -> str:
 
 
 def save_figure(figure: "Figure", path: Path) -> Path:
-    return write_whole(path, lambda part: figure.savefig(part, dpi=150))
+    return results.save_figure(figure, path, dpi=150)
 
 
 def new_table(*columns: str) -> "Table":
@@ -54,9 +56,9 @@ def new_table(*columns: str) -> "Table":
 def show(*parts: Any) -> None:
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=False)
+    console = Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
-        console.print(part, markup=False) if isinstance(part, str) else console.print(part)
+        console.print(literal(part) if isinstance(part, str) else part)
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -11,9 +11,11 @@ from typing import Any
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
-from hexmj.controllers.cruse1998.presets import read_toml, read_weights
+from hexmj.controllers.cruse1998.presets import read_weights
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.files import read_toml
+from hexmj.literal import literal
 from hexmj.loaded import importable
 
 ENTRY_POINTS = "hexmj.controllers"
@@ -38,15 +40,16 @@ def load_controller(name: str) -> Controller:
         return _found(where, what, name)
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return _found(point.module, point.attr, name)
-    if not isfile(name):
+    path = Path(name)
+    if not isfile(path):
         raise InputError(
             f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
             " nor module:object or file.py:object"
         )
-    table, path = read_toml(Path(name)), Path(name)
+    table = read_toml(path)
     if set(table) == {"controller", "fields"} and isinstance(table["fields"], dict):
         return _with_fields(path, str(table["controller"]), table["fields"])
-    return Cruse1998(read_weights(table, name), name=path.stem)
+    return Cruse1998(read_weights(table, name), name=literal(path.stem))
 
 
 def known_names() -> Iterator[str]:

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.literal import in_figure
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
@@ -26,7 +28,7 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
             axes.errorbar(
                 one.velocity + offset, middle, [middle - low, high - middle],
                 color=colour, linestyle=line, marker=marker, markersize=4, capsize=2.5, linewidth=1.6,
-                label=f"{name}, {measure}",
+                label=f"{in_figure(name)}, {measure}",
             )  # fmt: skip
     axes.legend(frameon=False, fontsize=9)
     conditions = result.attrs["conditions"]
@@ -45,7 +47,7 @@ def flss_figure(table: "xr.Dataset", title: str) -> "Figure":
     figure, axes = _flss_axes(6.4, 4.2)
     error = [table.flss - table.low, table.high - table.flss]
     axes.errorbar(table.velocity, table.flss, error, marker="o", markersize=4, capsize=2.5, color="#1b6ca8")
-    axes.set_title(title, fontsize=10)
+    axes.set_title(in_figure(title), fontsize=10)
     return figure
 
 

@@ -1,6 +1,5 @@
 """The parameter sets that searches found (``ideal.toml``), by observation time and velocities."""
 
-import tomllib
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import InputError
+from hexmj.files import read_toml
 from hexmj.timing import WINDOWS
 
 TABLE = Path(__file__).with_name("ideal.toml")
@@ -35,10 +35,7 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
     Raises:
         InputError: the table is damaged, or holds a set twice.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path.name} cannot be read as TOML: {error}") from None
+    table = read_toml(path)
     found = tuple(_read(entry, f"{path.name}, set {i + 1}") for i, entry in enumerate(table.get("set", [])))
     places = [(one.window, one.low, one.high) for one in found]
     if twice := [place for place in places if places.count(place) > 1]:

@@ -5,12 +5,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from hexmj import results
 from hexmj.errors import InputError
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
-from hexmj.results import json_text, results_folder, save_dataset, write_whole
+from hexmj.results import json_text, results_folder, save_dataset, save_text
 from hexmj.sweeps import Execution, finish, over_axes, run
 
 if TYPE_CHECKING:
@@ -93,10 +94,7 @@ def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]"
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:
     """Write a figure as PDF and PNG, and its data as NetCDF, under `path` with these endings."""
     options = {".pdf": {"metadata": {"CreationDate": None}}, ".png": {"dpi": 200}}
-    files = [
-        write_whole(path.with_name(path.name + end), lambda part, how=how: figure.savefig(part, **how))
-        for end, how in options.items()
-    ]
+    files = [results.save_figure(figure, path.with_name(path.name + end), **how) for end, how in options.items()]
     return [*files, save_dataset(data, path.with_name(path.name + ".nc"))]
 
 
@@ -113,10 +111,7 @@ def _judge_ready(
             judged[claim.key] = judge(claim, measured)
     rows, settings = _rows(claims, judged), asdict(protocol)
     texts = claims_markdown(rows, settings), json_text(claims_json(rows, settings)) + "\n"
-    return [
-        write_whole(out / name, lambda part, text=text: part.write_text(text, encoding="utf-8"))
-        for name, text in zip(TABLES, texts, strict=True)
-    ]
+    return [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
 
 
 def _rows(claims: Sequence[Claim], judged: Mapping[str, Row]) -> list[Row]:

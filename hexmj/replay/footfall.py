@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.legs import LEGS
+from hexmj.literal import in_figure
 from hexmj.measures.figures import MEASURE_COLOURS, spans
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def walk_figure(recording: "xr.Dataset") -> "Figure":
             off = ~recording.measured_stance.values[:, row] & np.isfinite(recording.measured_x.values[:, row])
             footfall.broken_barh(spans(time, off), (row + 0.2, 0.18), color=MEASURE_COLOURS["measured"])
         footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
-    footfall.set(ylim=(5.6, -0.6), yticks=[], title=recording.attrs.get("title", ""))
+    footfall.set(ylim=(5.6, -0.6), yticks=[], title=in_figure(recording.attrs["title"]))
     legend = "black: protraction" + (", orange: foot off the ground" if physical else "")
     footfall.set_xlabel(legend, fontsize=8)
     margin.axhline(0.0, color="0.6", linewidth=0.8)

@@ -1,67 +1,28 @@
 """Recordings: one start of a walk as a file, with all that figures and films need."""
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from hexmj import netcdf
 from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.files import read_sealed, sealed, write_whole
 from hexmj.legs import LEGS
+from hexmj.literal import literal
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import hold
-from hexmj.results import write_whole
+from hexmj.replay.schema import MEASURED, PLANNED, TIMES, check_recording, check_settings, stride_settings
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start
-
-_LEGS, _STEPS, _ONCE = ("step", "leg"), ("step",), ()
-_TIPS = ("step", "leg", "coordinate")
-
-PLANNED = {  # dimensions, units, long_name
-    "velocity": (_STEPS, "V_p", "commanded velocity V_r during the step"),
-    "planned_x": (_LEGS, "mm", "planned tip on its own axis"),
-    "planned_y": (_LEGS, "mm", "planned tip beside the body axis, left positive"),
-    "planned_stance": (_LEGS, "1", "leg retracts in the plan"),
-    "planned_margin": (_STEPS, "mm", "stability margin of the plan"),
-    "planned_loss_time": (_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
-    "planned_tip": (_TIPS, "mm", "where the tip was told to be in the world, lifted while it swings"),
-    "qpos": (("step", "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
-    "centre_of_mass": (("step", "coordinate"), "mm", "centre of mass in the world"),
-}
-"""Variables of every recording."""
-
-MEASURED = {
-    "measured_x": (_LEGS, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
-    "measured_y": (_LEGS, "mm", "foot beside the centre of mass, left positive"),
-    "measured_stance": (_LEGS, "1", "foot touches the ground"),
-    "measured_margin": (_STEPS, "mm", "measured stability margin"),
-    "measured_loss_time": (_ONCE, "time unit", "first loss of measured static stability, or inf"),
-    "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
-    "fall_part": (_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
-    "clearance": (_ONCE, "mm", "least height of the trunk's lowest point"),
-    "tilt": (_ONCE, "rad", "greatest tilt of the trunk"),
-    "speed": (_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
-    "slip": (_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
-    "tracking": (_ONCE, "mm", "95th percentile of the distance between a foot and its target on the ground"),
-    "depth": (_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
-    "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
-    "unreachable": (_ONCE, "1", "tip targets out of reach"),
-}
-"""Variables of a recorded physical insect; a puppet that only shows the plan has none of them."""
-
-_TIMES = {
-    "time": (_STEPS, "time unit", "time, in the unit 1 mm / V_p"),
-    "seconds": (_STEPS, "s", "time"),
-}
 
 
 def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
@@ -135,36 +96,30 @@ def record_plan(
 
 
 def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
-    """Write a recording as NetCDF; the file appears whole or not at all."""
-    return write_whole(Path(path), lambda part: recording.to_netcdf(part, engine="h5netcdf"))
+    """Write a recording as NetCDF with a checksum; the file appears whole or not at all.
+
+    Raises:
+        InputError: it is no recording, see `check_recording`, or cannot be written.
+    """
+    _check(recording)
+    return write_whole(Path(path), sealed(netcdf.encode(recording)))
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
-    """Open a recording.  Numbers are read when they are used, so close it after that, best in a `with` statement.
+    """Read a recording that `save_recording` wrote.
 
     Raises:
-        InputError: no recording of ours.
+        InputError: it cannot be read, is damaged, or is no recording.
     """
-    if not Path(path).is_file():
-        raise InputError(f"{path} is no file; expected a recording")
+    path = Path(path)
+    recording = netcdf.decode(
+        read_sealed(path),
+        f"{path} is damaged, or was not written by hexmj.save_recording of this version; expected a recording",
+    )
     try:
-        recording = xr.open_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError, KeyError, RuntimeError):
-        raise InputError(f"{path} cannot be read as NetCDF; expected a recording") from None
-    expected = _TIMES | PLANNED | (MEASURED if set(MEASURED) & set(recording.variables) else {})
-    missing = [name for name in expected if name not in recording.variables]
-    settings = ("title", *Conditions().settings(), *_settings(Stride()))
-    missing += [f"attribute {name}" for name in settings if name not in recording.attrs]
-    if missing:
-        recording.close()
-        raise InputError(f"{path} is no recording; missing: {', '.join(missing)}")
-    for name, (dimensions, *_) in expected.items():
-        if recording[name].dims != dimensions or recording[name].dtype.kind not in "fib":
-            recording.close()
-            raise InputError(f"{path} is no recording: {name} is not a table of numbers over {dimensions}")
-    if recording.sizes["leg"] != len(LEGS):
-        recording.close()
-        raise InputError(f"{path} is no recording of a body with {len(LEGS)} legs")
+        _check(recording)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return recording
 
 
@@ -174,12 +129,20 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
     Raises:
         InputError: one that makes no sense, or the recording is of another body.
     """
-    if (name := recording.attrs["body"]) != body.name:
+    if (name := recording.attrs.get("body")) != body.name:
         raise InputError(f"the recording is of the body {name!r}, not of {body.name!r}; expected its own description")
     if (found := recording.sizes["position"]) != (expected := ROOT_QPOS + len(body.joints)):
         raise InputError(f"the recording has {found} positions; expected {expected} of the body {name!r}")
+    check_settings(recording)
     usual = Conditions(body=body)
     return usual.but(**{name: type(value)(recording.attrs[name]) for name, value in usual.flat().items()})
+
+
+def _check(recording: xr.Dataset) -> None:
+    """Refuse what is no recording; conditions as far as the body's bounds are known."""
+    check_recording(recording)
+    if recording.attrs["body"] == STICK_INSECT.name:
+        recorded_conditions(recording)
 
 
 def _dataset(
@@ -196,20 +159,13 @@ def _dataset(
         "planned_margin": walk_margin(planned)[:, 0],
         "planned_loss_time": loss_time(planned)[0],
     }
-    texts = _TIMES | PLANNED | MEASURED
     variables = {
-        name: (dimensions, values[name], {"units": units, "long_name": long_name})
-        for name, (dimensions, units, long_name) in texts.items()
+        name: (one.dimensions, values[name], {"units": one.units, "long_name": one.long_name})
+        for name, one in (TIMES | PLANNED | MEASURED).items()
         if name in values
     }
-    coords = {name: variables.pop(name) for name in _TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
-    return xr.Dataset(variables, coords, {"title": title, **conditions.settings(), **_settings(stride)})
-
-
-def _settings(stride: Stride) -> dict[str, Any]:
-    """A stride in one flat table that NetCDF and JSON can hold."""
-    settings = asdict(stride)
-    return settings | {name: list(values) for name, values in settings.pop("geometry").items()}
+    coords = {name: variables.pop(name) for name in TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
+    return xr.Dataset(variables, coords, {"title": literal(title), **conditions.settings(), **stride_settings(stride)})
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:

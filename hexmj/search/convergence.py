@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.literal import in_figure
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
@@ -24,7 +26,7 @@ def convergence_figure(history: "xr.Dataset", title: str) -> "Figure":
             axes.plot(evaluation[here], history.cost.values[here], ".", color=colour, markersize=2.5, alpha=0.35)
             axes.plot(evaluation[here], history.best.values[here], color=colour, linewidth=1.8, label=stage)
     axes.set(xlabel="evaluations of the cost function", ylabel="FLSS on the starts of the stage", ylim=(-0.02, 1.02))
-    axes.set_title(title, fontsize=9)
+    axes.set_title(in_figure(title), fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
     title = "lines: least so far, dots: candidates"

@@ -2,7 +2,7 @@
 
 A folder of a sweep holds
 
-- `<name>-<digest>.nc` for each finished cell: NetCDF 4, then the line ``hexmj cell, sha256 <checksum>``.  Its
+- `<name>-<digest>.nc` for each finished cell: NetCDF 4, then the line ``hexmj, sha256 <checksum>``.  Its
   attribute `cell` is the record of all that its numbers depend on, as JSON: the `function`, whose it is (`of`), the
   `settings`, the `sources` of every module within reach (module -> digest) and the `versions` of Python and of the
   packages that compute.  The digest in the name is that of the record, so an edit, another version or another setting

@@ -22,7 +22,10 @@ from hexmj.sweeps.plain import digest, module_label
 
 PACKAGE = Path(__file__).parents[1]
 
-CARRIERS = {"h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray", "hexmj.progress", "hexmj.sweeps"}
+CARRIERS = {
+    *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
+    *("hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
+}
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 
 DATA = re.compile(r"""["']([\w. -]+\.(?:toml|xml|json))["']""")

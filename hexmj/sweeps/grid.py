@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 from hexmj.errors import InputError
 from hexmj.progress import Progress
 from hexmj.sweeps.cells import Cell
-from hexmj.sweeps.files import decode, encode, read, write
+from hexmj.sweeps.files import read, write
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +94,7 @@ def finish(
     waiting = []
     for i, path in enumerate(paths):
         if path and path.exists():
-            yield finished(i, decode(read(path), records[i], path))
+            yield finished(i, read(path, records[i]))
         else:
             waiting.append((i, path, _parcel(cells[i])))
     futures: dict[Future[xr.Dataset], int] = {}
@@ -130,10 +130,8 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     if path is None:
         return cell.compute(**execution)
     if path.exists():
-        return decode(read(path), record, path)
-    content = encode(cell.compute(**execution), record)
-    write(path, content)
-    return decode(content, record, path)
+        return read(path, record)
+    return write(path, record, cell.compute(**execution))
 
 
 def _parcel(cell: Cell) -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.files import opened
 from hexmj.sweeps.cells import Cell
 
 
@@ -53,21 +54,20 @@ class KeptValues:
         return np.array([self._values[key] for key in keys])
 
     def _begin(self, path: Path, record: str) -> None:
-        try:
-            first, *lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.exists() else [""]
-        except OSError as error:
-            raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
-        if first not in ("", record):
-            raise InputError(f"{path} is damaged, or of another search; delete it, and it is made anew")
+        first, lines = "", []
+        if os.path.lexists(path):
+            with opened(path) as file:
+                first = file.readline(len(record.encode()) + 1).decode(errors="replace")
+                if not f"{record}\n".startswith(first):
+                    raise InputError(f"{path} is damaged, or of another search; delete it, and it is made anew")
+                lines = file.read().decode(errors="replace").split("\n")
         for line in lines:
             text = line.rpartition(" ")[0]
             if text and line == _checked(text):
                 row, value = text.split(" ")
                 self._values[bytes.fromhex(row)] = float.fromhex(value)
-        if not first:
-            _add(path, f"{record}\n")
-        elif not lines or lines[-1]:
-            _add(path, "\n")
+        if rest := f"{record}\n"[len(first) :] or (lines[-1] and "\n"):
+            _add(path, rest)
 
 
 def _line(row: bytes, value: float) -> str:

@@ -1,6 +1,5 @@
 """Sets of weights by name: those of the paper and our own, and parameter files (TOML)."""
 
-import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -17,21 +16,10 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.errors import InputError
+from hexmj.files import read_toml
 
 OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a file.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path} cannot be read as TOML: {error}") from None
 
 
 def read_weights(table: dict[str, Any], where: str) -> AnyWeights:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-import imageio_ffmpeg
-import mediapy
 import mujoco
 import numpy as np
 import xarray as xr
@@ -16,13 +14,15 @@ from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
+from hexmj.files import replacing
 from hexmj.progress import Progress
 from hexmj.replay.film import gl
+from hexmj.replay.film.encoder import encoder
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.replay.schema import check_recording
 from hexmj.replay.take import Take
-from hexmj.results import write_whole
 from hexmj.stability import support_polygon
 
 BRIGHTER = 1.2
@@ -50,7 +50,8 @@ def render(
         The number of frames: the walk's duration, the longer one's of two, at `Film.fps`.
 
     Raises:
-        InputError: not one or two recordings, no MP4 file in a folder that exists, or a recording without a pose.
+        InputError: not one or two recordings, no MP4 file in a folder that exists, a recording without a pose, or a
+            film that cannot be written.
         RenderingError: nothing can be rendered here; says what brings it.
     """
     film, path = film or Film(), Path(path)
@@ -61,12 +62,14 @@ def render(
     if reason := gl.missing():
         raise RenderingError(reason)
     try:
+        for recording in recordings:
+            check_recording(recording)
         takes = [Take.of(recording, body) for recording in recordings]
-    except (KeyError, IndexError, TypeError, ValueError, OSError, RuntimeError) as error:
+    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
         raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
     frames = max(1, round(max(take.duration for take in takes) * film.slow_motion * film.fps))
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    write_whole(path, lambda part: _write(takes, part, frames, film, progress))
+    with replacing(path) as part:
+        _write(takes, part, frames, film, progress)
     return frames
 
 
@@ -76,21 +79,20 @@ def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress:
     overlays = [Overlay(take, film.width, film.height, duration) for take in takes]
     picture = np.empty((film.height, film.width * len(takes), 3), dtype=np.uint8)
     panels = np.split(picture, len(takes), axis=1)
-    encoder = {"fps": film.fps, "crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"}
     with ExitStack() as opened:
         worlds = {take.conditions: _filmed_insect(film, take.conditions) for take in takes}
         stages = {
             conditions: (opened.enter_context(gl.renderer(model, film.height, film.width)), mujoco.MjData(model))
             for conditions, model in worlds.items()
         }
-        writer = opened.enter_context(mediapy.VideoWriter(path, picture.shape[:2], **encoder))
+        add = opened.enter_context(encoder(path, *picture.shape[:2], film.fps))
         for frame in range(frames):
             seconds = frame / (film.fps * film.slow_motion)
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
                 panel[:] = _view(*stages[take.conditions], film.camera, take, row)
                 overlay.draw(panel, row, seconds)
-            writer.add_image(picture)
+            add(picture)
             if progress:
                 progress(1 / frames)
 

@@ -1,0 +1,127 @@
+"""Files, written whole or not at all, and read only if they are files; what must come back unchanged is sealed.
+
+A sealed file ends with a checksum of all that stands before it: 80 bytes that readers of NetCDF and NPZ do not mind.
+"""
+
+import hashlib
+import os
+import stat
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+from uuid import uuid4
+
+from hexmj.errors import InputError
+
+MARK = b"\nhexmj, sha256 "
+"""Between the content of a sealed file and its checksum."""
+
+SEAL = len(MARK) + 64
+"""Length of both [bytes]."""
+
+PART = ".part-"
+"""Begins the names of files that are being written; none is left but by a killed process."""
+
+
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write a file whole or not at all, whoever else writes the same.
+
+    Raises:
+        InputError: it cannot be written; what stood there before still does.
+    """
+    with replacing(path) as part, part.open("xb") as file:
+        file.write(content)
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A name of its own beside `path`, absolute, to write to: what is there in the end takes the place of `path`.
+
+    Raises:
+        InputError: it cannot be written; what stood there before still does.
+    """
+    part = path.absolute().with_name(f"{PART}{uuid4().hex}{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """A file to be read; never a pipe or a device, which might have no end.
+
+    Raises:
+        InputError: there is no file, or it cannot be read.
+    """
+    try:
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise InputError(f"{path} is a pipe or a device; expected a file")
+            yield file
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+
+
+def read_text(path: Path, most: int = 1_000_000) -> str:
+    """A text in UTF-8.
+
+    Raises:
+        InputError: it cannot be read, or is longer than `most` bytes.
+    """
+    with opened(path) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise InputError(f"{path} is longer than {most} bytes; expected a text that a person would write")
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is no text in UTF-8: {error.reason} at byte {error.start}") from None
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table of a TOML file.
+
+    Raises:
+        InputError: it cannot be read, or is no TOML.
+    """
+    text = read_text(path)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} cannot be read as TOML: {error}") from None
+
+
+def sealed(content: bytes) -> bytes:
+    """A content and its checksum."""
+    return content + MARK + hashlib.sha256(content).hexdigest().encode()
+
+
+def unsealed(whole: bytes) -> bytes | None:
+    """What was sealed; None where a bit of it, or of the seal, is another one."""
+    content, seal = whole[:-SEAL], whole[-SEAL:]
+    return content if seal == MARK + hashlib.sha256(content).hexdigest().encode() else None
+
+
+def read_sealed(path: Path) -> bytes | None:
+    """The content of a sealed file; of any other, None, and no more than its end is read.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    with opened(path) as file:
+        file.seek(-min(SEAL, file.seek(0, os.SEEK_END)), os.SEEK_END)
+        if not file.read().startswith(MARK):
+            return None
+        file.seek(0)
+        return unsealed(file.read())

@@ -1,0 +1,43 @@
+"""The one format of all data: NetCDF 4, uncompressed, made and read in memory; on disk it is sealed."""
+
+import io
+import math
+from typing import TYPE_CHECKING
+
+from hexmj.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def encode(data: "xr.Dataset") -> bytes:
+    """A dataset as it stands in its file, before the seal; the bits of all numbers stay."""
+    plain = data.drop_encoding()
+    for variable in plain.variables.values():
+        variable.encoding["_FillValue"] = None
+    return bytes(plain.to_netcdf(engine="h5netcdf"))
+
+
+def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":
+    """The dataset that `encode` was given.
+
+    Args:
+        content: what was sealed; None where it was not, or is damaged.
+        otherwise: what to say of anything else.
+
+    Raises:
+        InputError: `otherwise`; nothing of the size that a false file may claim is allocated.
+    """
+    import h5netcdf
+    import xarray as xr
+
+    if content is None:
+        raise InputError(otherwise)
+    try:
+        with h5netcdf.File(io.BytesIO(content), "r") as file:
+            claimed = sum(math.prod(one.shape) * one.dtype.itemsize for one in file.variables.values())
+        if claimed <= len(content):
+            return xr.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
+    except Exception as error:  # whatever the libraries make of what is sealed, but not by `encode`
+        raise InputError(f"{otherwise} ({type(error).__name__})") from None
+    raise InputError(otherwise)

@@ -1,0 +1,78 @@
+"""Ctrl-C and SIGTERM at any moment: the command says that it was stopped, and leaves nothing half written."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import hexmj
+
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
+
+
+def started(*words: str, until: Path | None = None, wait: float = 0.0) -> subprocess.Popen[bytes]:
+    """The command in a process group of its own, once there is a file or some time [s] has gone by."""
+    running = subprocess.Popen(
+        [sys.executable, "-m", "hexmj", *words],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    while until and not list(until.parent.glob(until.name)):
+        assert running.poll() is None, running.communicate()
+        time.sleep(0.01)
+    time.sleep(wait)
+    return running
+
+
+def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = False) -> None:
+    """It ends soon after a signal, to itself or, as from a terminal, to its whole group; and says so."""
+    try:
+        os.killpg(running.pid, by) if group else running.send_signal(by)
+        out, error = running.communicate(timeout=30)
+    finally:
+        running.kill()
+    assert running.returncode == 130, error
+    assert error.strip() == b"hexmj: stopped"
+    assert out == b""
+
+
+@pytest.mark.parametrize("module", ["tyro", "numpy", "mujoco"])
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_while_it_is_imported(by, module):
+    """While a module that the command needs is being looked for."""
+    script = (
+        "import os, sys\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == {module!r}: os.kill(os.getpid(), {int(by)})\n"
+        "from hexmj.__main__ import main\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "main()"
+    )
+    words = [sys.executable, "-c", script, "flss", "--physical", "--starts", "5000"]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
+
+
+@pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
+def test_while_a_film_is_written(tmp_path, by, group):
+    stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
+    assert [path.name for path in tmp_path.iterdir()] == ["recording-1.nc"]
+
+
+@pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
+def test_while_processes_compute_cells(tmp_path, by, group):
+    """They end at once, too; their cells may be long."""
+    words = ("compare", "--velocities", "0.1", "0.5", "--starts", "60", "--no-video", "--processes", "2")
+    stopped(started(*words, "--out", str(tmp_path / "out"), wait=4.0), by, group)
+    assert not list(tmp_path.rglob("manifest.json"))
+
+
+def test_while_a_search_evaluates(tmp_path):
+    out = tmp_path / "evaluations"
+    stopped(started("search", "--out", str(tmp_path), until=out / "population-*.jsonl", wait=1.0), signal.SIGTERM)
+    assert {path.suffix for path in out.iterdir()} == {".jsonl"}, "the lock is gone, the evaluations are not"
