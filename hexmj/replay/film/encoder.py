@@ -1,18 +1,17 @@
-"""Frames to an MP4 file, by ffmpeg."""
+"""Frames to an MP4 file, by mediapy and ffmpeg."""
 
-import subprocess
+import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile
 
 import imageio_ffmpeg
+import mediapy
 import numpy as np
 
 from hexmj.errors import RenderingError
 
-INPUT = "-v error -f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {fps} -i -"
-FILM = "-an -vcodec h264 -pix_fmt yuv420p -vb 0 -crf 20 -preset veryfast -movflags +faststart -y"
+FILM = "-preset veryfast -movflags +faststart"
 
 
 @contextmanager
@@ -29,39 +28,37 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
         OSError: the film cannot be written; with what ffmpeg says of it.
         RenderingError: there is no ffmpeg.
     """
-    options = [*INPUT.format(height=height, width=width, fps=fps).split(), *FILM.split()]
-    with TemporaryFile() as said:
+    writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, crf=20, ffmpeg_args=FILM)
+    try:
+        mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+        with _no_interrupts():
+            writer.__enter__()
+    except (OSError, RuntimeError) as error:
+        raise RenderingError(f"ffmpeg cannot be run ({error}); reinstall imageio-ffmpeg") from None
+    try:
+        yield writer.add_image
+    finally:
+        _close(writer)
+
+
+@contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Programs that are started meanwhile take no Ctrl-C: the film is stopped here, and ffmpeg ends with it."""
+    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+
+
+def _close(writer: mediapy.VideoWriter) -> None:
+    try:
         try:
-            # An absolute path is no protocol, and with a session of its own no Ctrl-C at the terminal reaches it.
-            ffmpeg = subprocess.Popen(
-                [imageio_ffmpeg.get_ffmpeg_exe(), *options, str(path.absolute())],
-                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True,
-            )  # fmt: skip
-        except (OSError, RuntimeError) as error:
-            raise RenderingError(f"ffmpeg cannot be run ({error}); reinstall imageio-ffmpeg") from None
-        frames = ffmpeg.stdin
-        assert frames
-
-        def end() -> None:
-            with suppress(BrokenPipeError):
-                frames.close()
-            if ffmpeg.wait():
-                said.seek(0)
-                lines = said.read().decode(errors="replace").splitlines() or [f"ffmpeg ended with {ffmpeg.returncode}"]
-                raise OSError(lines[-1].rpartition(": ")[2])
-
-        def add(frame: np.ndarray) -> None:
-            try:
-                frames.write(frame.tobytes())
-            except BrokenPipeError:
-                end()
-                raise
-
-        try:
-            yield add
-            end()
-        finally:
-            ffmpeg.kill()
-            ffmpeg.wait()
-            with suppress(BrokenPipeError):
-                frames.close()
+            writer.close()
+        except BrokenPipeError:  # ffmpeg has ended; once more, to be told why
+            writer.close()
+    except RuntimeError as error:
+        if writer._popen:
+            writer._popen.__exit__(None, None, None)  # mediapy leaves its pipes open where ffmpeg fails
+        said = str(error).strip().splitlines()[-1]
+        raise OSError(said.rpartition(": ")[2]) from None
