@@ -114,7 +114,7 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return _fitted(value, one)
         raise TypeError
     if origin is tuple:
-        if isinstance(value, list | tuple | np.ndarray) and np.ndim(value):
+        if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
             kinds = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
             if len(kinds) == len(value):
                 return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))

@@ -3,9 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+LONGEST = 1000
+"""Characters of a sentence; what was given may be longer, and is shown in part."""
+
 
 class InputError(Exception):
     """A value that makes no sense: says what was given, what is expected and the valid names."""
+
+    def __str__(self) -> str:
+        sentence = super().__str__()
+        return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST // 2]} [...] {sentence[-LONGEST // 2 :]}"
 
 
 class SimulationError(RuntimeError):

@@ -69,8 +69,14 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
     Args:
         feet: tips, (leg, 2) [mm].
         stance: which of them stand, (leg,).
+
+    Raises:
+        InputError: shapes that do not fit.
     """
-    points = numbers("feet", feet)[states("stance", stance)]
+    tips, stands = numbers("feet", feet), states("stance", stance)
+    if tips.ndim != 2 or tips.shape[1] != 2 or stands.shape != tips.shape[:1]:
+        raise InputError(f"feet of the shape {tips.shape}, stance of {stands.shape}; expected (leg, 2) and (leg,)")
+    points = tips[stands]
     if len(points) < 3 or np.linalg.matrix_rank(points - points[0]) < 2:
         return points
     from scipy.spatial import ConvexHull

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.legs import LEGS, Geometry
 
@@ -33,6 +34,8 @@ class Leg:
     parts: tuple[str, ...]
     """The bodies whose mass is the leg's; the foot's is one of them."""
 
+    __post_init__ = check_types
+
 
 @dataclass(frozen=True)
 class Servo:
@@ -46,6 +49,7 @@ class Servo:
     """Significant digits of the gains."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         _check_positive("Servo", step=(self.step, "s"), damping_ratio=(self.damping_ratio, ""))
         if not 1 <= self.digits <= 17:
             raise InputError(f"Servo: digits = {self.digits}; expected 1 to 17")
@@ -96,6 +100,7 @@ class Lengths:
     since no leg reaches so far."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         positive = {field.name: (getattr(self, field.name), "") for field in fields(self)}
         positive["no_foot_margin"] = (-self.no_foot_margin, "with the sign turned")
         _check_positive("Lengths", **positive)
@@ -122,6 +127,8 @@ class Marks:
     """Radius and half height of the disc below the centre of mass."""
     tip: float
     """Radius of the ball at a planned tip."""
+
+    __post_init__ = check_types
 
 
 @dataclass(frozen=True)
@@ -161,6 +168,7 @@ class Body:
     """Sizes of a film's marks."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         _check_positive(
             f"body {self.name!r}",
             mass=(self.mass, "g"),

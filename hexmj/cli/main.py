@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
-from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.errors import LONGEST, InputError, RenderingError, SimulationError
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
 
@@ -57,7 +57,7 @@ def main() -> None:
     options: Any = None
     try:
         try:
-            options = _options(sys.argv[1:])
+            options = _options(_checked(sys.argv[1:]))
             options.run()
         finally:
             if sys.stdout:  # there is none where it was closed
@@ -76,6 +76,18 @@ def main() -> None:
     except OSError as error:
         _drop_output()
         sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
+
+
+def _checked(words: list[str]) -> list[str]:
+    """The words of the command line, if a person could have typed and read them.
+
+    Raises:
+        InputError: a word that is no print, or a book.
+    """
+    for word in words:
+        if len(word) > LONGEST or not word.isprintable():
+            raise InputError(f"{literal(word)}: expected words of at most {LONGEST} printable characters")
+    return words
 
 
 def _options(words: list[str]) -> Any:

@@ -9,6 +9,7 @@ from hexmj import netcdf
 from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.files import read_sealed, sealed, write_whole
@@ -33,6 +34,7 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
         start: which of them.
         title: shown on films.
     """
+    typed("walk", walk, PhysicalWalk)
     planned, measured = one_start(walk.planned, start), one_start(walk.measured, start)
     qpos, outcomes = walk.qpos[:, start], walk.outcomes
     tips, _ = _lifted_tips(one_start(walk.ordered, start), walk.conditions, walk.stride)
@@ -70,7 +72,9 @@ def record_plan(
         start: which of the walks.
         title: shown on films.
     """
-    planned = one_start(plan, start)
+    typed("conditions", conditions, Conditions)
+    typed("stride", stride, Stride)
+    planned = one_start(typed("plan", plan, PlannedWalk), start)
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((len(plan.time), ROOT_QPOS))
@@ -101,8 +105,8 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
     Raises:
         InputError: it is no recording, see `check_recording`, or cannot be written.
     """
-    _check(recording)
-    return write_whole(Path(path), sealed(netcdf.encode(recording)))
+    _check(typed("recording", recording, xr.Dataset))
+    return write_whole(Path(typed("path", path, str | Path)), sealed(netcdf.encode(recording)))
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
@@ -111,7 +115,7 @@ def load_recording(path: Path | str) -> xr.Dataset:
     Raises:
         InputError: it cannot be read, is damaged, or is no recording.
     """
-    path = Path(path)
+    path = Path(typed("path", path, str | Path))
     recording = netcdf.decode(
         read_sealed(path),
         f"{path} is damaged, or was not written by hexmj.save_recording of this version; expected a recording",
@@ -149,6 +153,7 @@ def _dataset(
     planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: np.ndarray
 ) -> xr.Dataset:
     """A recording of a plan of one start and `values` by the names of their variables."""
+    typed("title", title, str)
     values |= {
         "time": planned.time,
         "seconds": planned.time / conditions.time.vp,

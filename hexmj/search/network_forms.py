@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import Cruse1998, Order
 from hexmj.controllers.cruse1998.weights import BINARY, NEIGHBOURS, AnyWeights, Symmetric, Weights, general
 from hexmj.controllers.protocol import Controller
@@ -78,10 +79,7 @@ class NetworkForm:
     order: Order = "printed"
     """See `Cruse1998.order`."""
 
-    def __post_init__(self) -> None:
-        if self.name not in FORMS:
-            raise InputError(f"form = {self.name!r}; valid names: {', '.join(FORMS)}")
-        Cruse1998(Symmetric(), self.order)
+    __post_init__ = check_types
 
     @property
     def names(self) -> tuple[str, ...]:

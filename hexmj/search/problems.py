@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -53,6 +54,7 @@ class Problem:
     """Candidates read the legs, see `ReadsLegs`, in physical walks."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not 0 <= self.low <= self.high < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         if self.feedback and not self.conditions:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.progress import Progress
@@ -65,8 +66,7 @@ class Effort:
     """Of the starts, their velocities and the algorithm."""
 
     def __post_init__(self) -> None:
-        if self.algorithm not in ALGORITHMS:
-            raise InputError(f"algorithm = {self.algorithm!r}; valid names: {', '.join(ALGORITHMS)}")
+        check_types(self)
         if self.budget < self.population:
             raise InputError(f"budget = {self.budget}; expected at least one generation, {self.population} evaluations")
         if self.refine_budget < 0:

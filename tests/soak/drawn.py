@@ -16,6 +16,8 @@ import hexmj
 from tests.soak import calls, commands, files
 from tests.soak.judge import judged
 
+SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much, HealthCheck.large_base_example)
+
 KINDS: dict[str, tuple[Any, Callable[[Any], None]]] = {
     "commands": (commands.command_lines(), commands.typed),
     "calls": (calls.calls(), calls.called),
@@ -44,7 +46,7 @@ def try_inputs(kind: str, inputs: int, number: int) -> Tried:
     @seed(number)
     @settings(
         max_examples=inputs, deadline=None, database=None, phases=[Phase.generate],
-        suppress_health_check=[*HealthCheck.__members__.values()], report_multiple_bugs=False,
+        suppress_health_check=SLOW, report_multiple_bugs=False,
     )  # fmt: skip
     @given(drawn)
     def one(given: Any) -> None:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from hexmj.checks import check_types
 from hexmj.errors import InputError
 
 CAMERAS = ("following", "side", "top", "front")
@@ -26,10 +27,7 @@ class Film:
     """'fast': no shadows, reflections or multisampling; 'high': all of them."""
 
     def __post_init__(self) -> None:
-        if self.camera not in CAMERAS:
-            raise InputError(f"camera = {self.camera!r}; valid names: {', '.join(CAMERAS)}")
-        if self.quality not in ("fast", "high"):
-            raise InputError(f"quality = {self.quality!r}; valid names: fast, high")
+        check_types(self)
         for name, size, most in (("width", self.width, 1920), ("height", self.height, 1080)):
             if not (64 <= size <= most and size % 2 == 0):
                 raise InputError(f"{name} = {size}; expected an even number of pixels from 64 to {most}")

@@ -12,6 +12,7 @@ from hexmj.bodies.description import Body
 from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
@@ -54,7 +55,8 @@ def render(
             film that cannot be written.
         RenderingError: nothing can be rendered here; says what brings it.
     """
-    film, path = film or Film(), Path(path)
+    film, path = given("film", film, Film), Path(typed("path", path, str | Path))
+    recordings = typed("recordings", recordings, tuple[xr.Dataset, ...])
     if len(recordings) not in (1, 2):
         raise InputError(f"{len(recordings)} recordings were given; expected one, or two for side by side")
     if path.suffix != ".mp4" or not path.parent.is_dir():
