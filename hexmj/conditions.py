@@ -90,7 +90,8 @@ class FootContact:
     friction: float = 1.0
     """Coefficient of sliding friction between the ground and feet or trunk."""
     grasp: float = 0.0
-    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight."""
+    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight; what presses the feet too
+    deep into the ground is refused as the insect settles, about 15 for the stick insect."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,11 @@ class Ground:
     """Length of gap or hurdle along the way [mm]."""
     ground_seed: int = 0
     """Of the bumps of rough ground."""
+
+    @property
+    def top(self) -> float:
+        """Height of the highest ground [mm]."""
+        return 0.0 if self.ground in ("flat", "gap") else self.ground_height
 
 
 @dataclass(frozen=True)
@@ -143,7 +149,8 @@ class Conditions:
         if kind not in get_args(GroundKind):
             raise InputError(f"ground = {kind!r}; valid names: {', '.join(get_args(GroundKind))}")
         if kind == "rough":
-            Bound(0.0, lengths.highest_bump, "mm where rough").check("ground_height", self.ground.ground_height)
+            rough = Bound(lengths.lowest_bump, lengths.highest_bump, "mm where rough", least_itself=True)
+            rough.check("ground_height", self.ground.ground_height)
         if not (isinstance(seed := self.ground.ground_seed, int) and seed >= 0):
             raise InputError(f"ground_seed = {seed}; expected an integer of at least 0")
 
