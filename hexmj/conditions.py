@@ -94,7 +94,8 @@ class FootContact:
     friction: float = 1.0
     """Coefficient of sliding friction between the ground and feet or trunk."""
     grasp: float = 0.0
-    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight."""
+    """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight; what presses the feet too
+    deep into the ground is refused as the insect settles, about 15 for the stick insect."""
 
     __post_init__ = check_types
 
@@ -113,6 +114,11 @@ class Ground:
     """Length of gap or hurdle along the way [mm]."""
     ground_seed: int = 0
     """Of the bumps of rough ground."""
+
+    @property
+    def top(self) -> float:
+        """Height of the highest ground [mm]."""
+        return 0.0 if self.ground in ("flat", "gap") else self.ground_height
 
     __post_init__ = check_types
 
@@ -150,9 +156,10 @@ class Conditions:
         flat = self.flat()
         for name, bound in bounds(self.body).items():
             bound.check(name, flat[name])
+        lengths = self.body.lengths
         if self.ground.ground == "rough":
-            highest = Bound(0.0, self.body.lengths.highest_bump, "mm where rough")
-            highest.check("ground_height", self.ground.ground_height)
+            rough = Bound(lengths.lowest_bump, lengths.highest_bump, "mm where rough", closed=True)
+            rough.check("ground_height", self.ground.ground_height)
         whole("ground_seed", self.ground.ground_seed, 0)
 
     @classmethod

@@ -449,7 +449,10 @@ def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, t
     assert code == 1
     path = tmp_path / "results" / "diverged-start-3.npz"
     if out:
-        assert f"start 3 diverged; its last good state is in {path}" in error
+        assert (
+            f"start 3 diverged; its last good state is in {path}; python -m hexmj.physics.divergence {path} replays it"
+            in error
+        )
         assert np.load(path)["qpos"].tolist() == [0.0, 1.0, 2.0]
         assert list(tmp_path.iterdir()) == [path.parent]
     else:

@@ -123,7 +123,8 @@ def _kept(error: SimulationError, out: Path | None) -> str:
     from hexmj.physics.divergence import save_state
 
     try:
-        return f"; its last good state is in {save_state(error, out)}"
+        path = save_state(error, out)
+        return f"; its last good state is in {path}; python -m hexmj.physics.divergence {path} replays it"
     except InputError as problem:
         return f"; its last good state is lost: {problem}"
 

@@ -61,10 +61,10 @@ class Engine(Protocol):
 class Diverged(Exception):
     """One body that diverged; `physics.divergence` makes a sentence of it."""
 
-    def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray]) -> None:
-        """`start` is its index, `kinds` names what MuJoCo warned of, `state` replays it."""
+    def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray], substep: int = 0) -> None:
+        """`start` is its index, `kinds` names what happened, `state` replays it."""
         super().__init__(start, kinds)
-        self.start, self.kinds, self.state, self.substep = start, kinds, state, 0
+        self.start, self.kinds, self.state, self.substep = start, kinds, state, substep
 
 
 class MujocoBatch:
@@ -106,7 +106,7 @@ class MujocoBatch:
             Diverged: see `Engine.roll`.
         """
         ids = np.arange(len(control))
-        before = self._before(ids)
+        before = self.replayed(ids)
         self._batch.bind("ctrl")[:] = control
         with stopped_clock():
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
@@ -114,7 +114,7 @@ class MujocoBatch:
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
         """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
-        model, before = self._model, self._before(ids)
+        model, before = self._model, self.replayed(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
@@ -129,9 +129,20 @@ class MujocoBatch:
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
         return Rolled(places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
 
-    def _before(self, ids: np.ndarray) -> dict[str, np.ndarray]:
-        """What replays some bodies; MuJoCo takes back states and pushes of one that diverges."""
+    def replayed(self, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """What replays some bodies from now on; MuJoCo takes back states and pushes of one that diverges."""
         return {name: values[ids] for name, values in self._replayed.items()}
+
+    def saved(self, before: dict[str, np.ndarray], i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
+        """What replays the i-th body of those, with its controls since, (step, actuator), time step and contacts."""
+        model = self._batch.get_model(start)
+        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
+        return {name: values[i] for name, values in before.items()} | now
+
+    def put_back(self, saved: dict[str, np.ndarray]) -> None:
+        """Put the only body where it was saved."""
+        for name, values in self._replayed.items():
+            values[0] = saved[name]
 
     def _check(self, ids: np.ndarray, before: dict[str, np.ndarray], control: np.ndarray) -> None:
         """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""
@@ -142,7 +153,4 @@ class MujocoBatch:
             return
         i = int(failed[0])
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
-        model = self._batch.get_model(ids[i])
-        state = {name: values[i] for name, values in before.items()} | {"ctrl": control[i]}
-        state |= {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep)}
-        raise Diverged(int(ids[i]), ", ".join(kinds), state)
+        raise Diverged(int(ids[i]), ", ".join(kinds), self.saved(before, i, int(ids[i]), control[i]))

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from hexmj.controllers.protocol import Sensed
+from hexmj.errors import SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import FineSteps, Shown
 from hexmj.physics.orders import Orders
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
+from hexmj.physics.watch import explosion
 from hexmj.walks import PlannedWalk, joined
 
 PUSH_LASTS = 0.025
@@ -72,6 +74,7 @@ class Insects:
     def __init__(self, settled: Settled, push: Push | None = None, threads: int | None = None) -> None:
         """Put all at rest; `threads` step them, one per core unless given."""
         self.settled, self._push, self._columns = settled, push, settled.compiled.columns
+        self._impulse = push.impulse if push else np.zeros(len(settled.starts))
         self._batch = MujocoBatch(settled.compiled, len(settled.starts), threads)
         self._batch.put(np.arange(len(settled.starts)), settled.state)
         self._steps, self._senses = FineSteps.of(self._batch, settled.substeps, settled.compiled), Senses(settled)
@@ -86,19 +89,26 @@ class Insects:
         Each is asked for when those before it are done, so it may depend on what they have done.
 
         Raises:
-            SimulationError: a simulation that diverged.
+            SimulationError: a simulation that diverged, or a walk that exploded.
         """
+        before: dict[str, np.ndarray] = {}
         done: list[Orders] = []
         shown: list[Shown] = []
         for orders in ordered:
             if not done:
                 self._apply_push(orders, steps)
+                before = self._batch.replayed(orders.ids)
             shown.append(self._show(orders))
             done.append(orders)
         whole: dict[str, Any] = {name: _joined([part[name] for part in shown]) for name in SHOWN}
         touching = (whole["sensors"][:, :, self._columns.trunk] > 0).any(axis=2)
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
+        if odd := explosion(whole["qpos"], valid, self._impulse[done[0].ids], self.settled):
+            control = _joined([orders.control for orders in done])[odd.row, : odd.substep + 1]
+            start = int(done[0].ids[odd.row])
+            state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
+            raise self._error(Diverged(start, odd.what, state, odd.substep), done[0])
         missed = _joined([orders.missed for orders in done]).sum(axis=2)
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
         plan = joined([orders.plan for orders in done])
@@ -111,9 +121,7 @@ class Insects:
         try:
             shown = self._steps.take(ids, orders.control)
         except Diverged as error:
-            time = orders.plan.time[0] + (error.substep / self.settled.substeps - 1) * self.settled.stride.dt
-            doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
-            raise walk_error(error, doing, time, self.settled.conditions) from None
+            raise self._error(error, orders) from None
         force = shown["force"][:, :, self._columns.ctrl]
         return shown | {
             "qpos": np.concatenate([before, shown["after"][:, :-1, :width]], axis=1),
@@ -121,6 +129,12 @@ class Insects:
             "standing": self._senses.feel(ids, shown["sensors"], force),
             "targets": orders.tips,
         }
+
+    def _error(self, error: Diverged, orders: Orders) -> SimulationError:
+        """What became of an insect while it carried out orders."""
+        time = orders.plan.time[0] + (error.substep / self.settled.substeps - 1) * self.settled.stride.dt
+        doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
+        return walk_error(error, doing, time, self.settled.conditions)
 
     def _apply_push(self, orders: Orders, steps: int) -> None:
         """Push with the part of the impulse that falls within the `steps` of the plan that begin with the orders."""

@@ -1,7 +1,11 @@
-"""A simulation that diverged is an error, never an outcome: its last good state can be saved and replayed."""
+"""A simulation that diverged is an error, never an outcome: its last good state can be saved and replayed.
+
+`python -m hexmj.physics.divergence FILE` replays one.
+"""
 
 import io
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,13 +13,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import Body
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
 from hexmj.files import read_sealed, sealed, write_whole
-from hexmj.physics.backend import Diverged
+from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.fine_steps import FineSteps
+from hexmj.rotations import lean
+
+STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
 
 
 def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
@@ -43,20 +52,62 @@ def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel,
     Raises:
         InputError: it cannot be read, is damaged, or is of another body.
     """
+    saved, compiled = _read(path, body)
+    data = mujoco.MjData(compiled.model)
+    for name in STATE:
+        getattr(data, name)[:] = saved[name]
+    return compiled.model, data
+
+
+def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
+    """What a written state does under its controls, step by step and finely as it did.
+
+    Returns:
+        Positions after each physics step, (step, position).
+
+    Raises:
+        Diverged: it does so again.
+        InputError: it cannot be read, is damaged, or is of another body.
+    """
+    saved, compiled = _read(path, body)
+    only, control = np.array([0]), saved["ctrl"][np.newaxis]
+    batch = MujocoBatch(compiled, 1, threads=1)
+    batch.put_back(saved)
+    if "substeps" in saved:  # of a walk that exploded, from the beginning of a step of the plan on
+        after = FineSteps.of(batch, int(saved["substeps"]), compiled).take(only, control)["after"]
+    else:
+        after = batch.roll(only, control).after
+    return after[0, :, : compiled.model.nq]
+
+
+def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody]:
+    """A written state, and the body with its conditions, time step and contacts."""
     if (content := read_sealed(Path(path))) is None:
         raise InputError(f"{path} is damaged, or no state that a simulation left; expected one of this version")
     try:
-        return _set(content, body)
+        with np.load(io.BytesIO(content)) as file:
+            saved = dict(file)
+        conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
+        compiled = compile_body(replace(Conditions.of(**conditions), body=body), float(saved["timestep"]))
+        compiled.model.pair_solref[:, 0] = saved["contact"]
+        data = mujoco.MjData(compiled.model)
+        for name in STATE:
+            getattr(data, name)[:] = saved[name]
     except (KeyError, ValueError) as error:
         raise InputError(f"{path} is no state of the body {body.name!r}: {error}") from None
+    return saved, compiled
 
 
-def _set(content: bytes, body: Body) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    with np.load(io.BytesIO(content)) as saved:
-        conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
-        model = compile_body(replace(Conditions.of(**conditions), body=body), float(saved["timestep"])).model
-        model.pair_solref[:, 0] = saved["contact"]
-        data = mujoco.MjData(model)
-        for name in ("qpos", "qvel", "qacc_warmstart", "xfrc_applied"):
-            getattr(data, name)[:] = saved[name]
-    return model, data
+def main(path: str) -> None:
+    """Print how a written state of the stick insect goes on: height and tilt of its root after each physics step."""
+    try:
+        for step, qpos in enumerate(replayed(path)):
+            print(f"step {step + 1}: {qpos[2]:.4g} mm high, tilted by {lean(qpos[3:ROOT_QPOS])[1]:.3g} rad")
+    except Diverged as error:
+        print(f"it diverged: {error.kinds}")
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

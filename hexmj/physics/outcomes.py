@@ -6,11 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from hexmj.physics.backend import Diverged
+from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk
 from hexmj.physics.settling import Settled
 from hexmj.rotations import matrix
 from hexmj.stability import loss_time
 from hexmj.walks import Walk
+
+NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
+"""Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +159,17 @@ class OutcomesSoFar:
             self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
-        """How every start went, as far as the chunks reach."""
+        """How every start went, as far as the chunks reach.
+
+        Raises:
+            SimulationError: a walk of which something cannot be measured, as the slip where no foot is ever in contact.
+        """
         sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
         with np.errstate(invalid="ignore", divide="ignore"):
             speed = np.where(self._commanded > 0, self._walked / self._commanded, np.nan)
             slip = sums.slid / (sums.contacts * compiled.model.opt.timestep)
-        return Outcomes(
+            saturation = sums.saturated / (sums.shown * compiled.joints)
+        found = Outcomes(
             planned_loss=self._planned_loss,
             measured_loss=self._measured_loss,
             fall=self._fall,
@@ -170,9 +180,15 @@ class OutcomesSoFar:
             slip=slip,
             tracking=_percentile(sums.misses, 0.95, lengths.tracking_bin),
             depth=self._depth,
-            saturation=sums.saturated / (sums.shown * compiled.joints),
+            saturation=saturation,
             unreachable=self._unreachable,
         )
+        for name in NUMBERS:
+            if (wrong := np.isnan(getattr(found, name))).any():
+                start = int(np.argmax(wrong))
+                error = Diverged(start, f"its {name} is no number", self._settled.saved(start))
+                raise walk_error(error, "walking", 0.0, self._settled.conditions)
+        return found
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:

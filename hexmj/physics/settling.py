@@ -11,8 +11,9 @@ from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
-from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.backend import STATE, Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
+from hexmj.physics.fine_steps import SINK
 from hexmj.physics.foot_path import standing_tips
 from hexmj.starts import checked_starts
 from hexmj.timing import Stride
@@ -47,6 +48,18 @@ class Settled:
         """Physics steps in one step of a plan."""
         return self.conditions.substeps(self.stride)
 
+    def saved(self, start: int) -> dict[str, np.ndarray]:
+        """What replays one start from here on, see `divergence.replayed`: a step of the plan at rest."""
+        model = self.compiled.model
+        state = np.split(self.state[start], np.cumsum([model.nq, model.nv]))
+        return dict(zip(STATE, state, strict=True)) | {
+            "xfrc_applied": np.zeros((model.nbody, 6)),
+            "ctrl": self.ctrl[[start]].repeat(self.substeps, axis=0),
+            "contact": model.pair_solref[:, 0].copy(),
+            "timestep": np.array(model.opt.timestep),
+            "substeps": np.array(self.substeps),
+        }
+
 
 def settle(
     starts: ArrayLike,
@@ -63,7 +76,7 @@ def settle(
         threads: one per core unless given.
 
     Raises:
-        InputError: a start that the legs cannot reach.
+        InputError: a start that the legs cannot reach, or more adhesion than the contacts can hold.
         SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
     """
     conditions, stride = conditions or Conditions(), stride or Stride()
@@ -88,6 +101,8 @@ def settle(
         batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
     except Diverged as error:
         raise walk_error(error, "settling", 0.0, conditions) from None
+    if conditions.contact.grasp:
+        _check_grasp(batch.sensors[:, columns.foot], compiled)
     touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
     for name, failed in {
         "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
@@ -98,3 +113,17 @@ def settle(
             raise SimulationError(f"start {np.argmax(failed)} did not settle in {settling_time:g} ms: {name}")
     torques = batch.force[:, columns.ctrl].copy()
     return Settled(x, batch.states(everyone), ctrl, touch, torques, compiled, conditions, stride)
+
+
+def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
+    """Refuse adhesion that presses feet at rest, (start, leg * axis) [mm], deeper into the ground than they may be.
+
+    Every step would be taken finely then, on contacts so hard that they throw the insect off.
+    """
+    deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.contact.grasp
+    allowed = SINK * compiled.conditions.path.standing_height
+    if deepest > allowed:
+        raise InputError(
+            f"grasp = {grasp:g}: it presses feet {deepest:.3g} mm into the ground at rest; expected at most"
+            f" {allowed:.3g} mm, so about {grasp * allowed / deepest:.2g} times the insect's weight"
+        )

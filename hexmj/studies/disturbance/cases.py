@@ -19,8 +19,8 @@ Strategy = Literal["none"] | Answer
 PHYSICAL = ("push", "grasp")
 """Disturbances and strategies of which a plan knows nothing."""
 
-MOST_IMPULSE = 1000.0
-"""Largest impulse in multiples of m V_p; far beyond any that leaves the insect on its feet."""
+MOST_IMPULSE = 80.0
+"""Largest impulse in multiples of m V_p: beyond it the insect is thrown into the air, up to half a metre."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,149 @@
+"""What physics and time step cannot hold is refused, and a walk that exploded is an error; a fall stays an outcome."""
+
+from contextlib import chdir
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.errors import InputError, SimulationError
+from hexmj.measures.physical import outcomes_of_plan
+from hexmj.physics import divergence
+from hexmj.physics.drive import Chunk, Push, drive
+from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
+from hexmj.physics.settling import Settled, settle
+from hexmj.physics.watch import MOST_ENERGY, explosion
+from hexmj.starts import draw_starts
+from hexmj.studies.disturbance.cases import every_case
+
+LEG, GRAVITY = 31.0, 9810.0
+
+
+def thrown(up: float) -> Settled:
+    """Settled starts, of which start 1 is thrown up [mm/s]."""
+    settled = settle(draw_starts(3, 0))
+    settled.state[1, settled.compiled.model.nq + 2] = up
+    return settled
+
+
+def walked(settled: Settled) -> list[Chunk]:
+    """For 20 time units."""
+    return list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 20.0))
+
+
+@pytest.mark.parametrize("grasp", [16.0, 70.0, 100.0])
+def test_more_grasp_than_the_contacts_can_hold_is_refused(grasp: float):
+    """At 20 the insect was thrown off the ground, and counted as stable where it did not come down in time."""
+    said = rf"grasp = {grasp:g}: it presses feet .* mm into the ground at rest; expected at most 0\.2 mm, so about 15 t"
+    with pytest.raises(InputError, match=said):
+        settle(draw_starts(12, 0), Conditions.of(grasp=grasp))
+
+
+def test_as_much_grasp_as_the_contacts_can_hold_keeps_the_insect_on_the_ground():
+    settled = settle(draw_starts(12, 0), Conditions.of(grasp=15.0))
+    speed = np.concatenate([np.diff(one.qpos[:, :, 2], axis=1).ravel() for one in walked(settled)])
+    assert np.abs(speed).max() / settled.compiled.model.opt.timestep < 100.0
+
+
+def test_a_walk_with_energy_from_nowhere_is_an_error_that_can_be_replayed(tmp_path, capsys):
+    """Up to where it was seen, and one step on."""
+    settled = thrown(up=1500.0)
+    said = r"start 1 diverged while walking at V = 0\.3, at .* its root is .* mm above the ground and moves at"
+    with pytest.raises(SimulationError, match=said) as error:
+        walked(settled)
+    path = divergence.save_state(error.value, tmp_path)
+    positions = divergence.replayed(path)
+    assert positions.shape == (len(error.value.state["ctrl"]), settled.compiled.model.nq)
+    assert f"its root is {positions[-2, 2]:.3g} mm above the ground" in str(error.value)
+    divergence.main(str(path))
+    assert capsys.readouterr().out.startswith("step 1: ")
+
+
+def test_energy_is_bounded_well_above_a_walk_and_below_an_explosion():
+    fastest = np.sqrt(2 * GRAVITY * (MOST_ENERGY * LEG - 10.0))
+    walked(thrown(up=0.95 * fastest))
+    with pytest.raises(SimulationError):
+        walked(thrown(up=1.05 * fastest))
+
+
+def test_a_walk_that_turns_over_high_up_is_an_error_unless_it_was_pushed():
+    settled, still = settle(draw_starts(2, 0)), np.zeros(2)
+    qpos = settled.qpos[:, np.newaxis].repeat(3, axis=1)
+    qpos[1, :, 3:7] = np.cos(1.0), 0.0, np.sin(1.0), 0.0  # tilted by 2 rad
+    qpos[1, :, 2] = 1.4 * LEG
+    everything = np.full(2, 3)
+    assert explosion(qpos, everything, still, settled) is None
+    qpos[1, :, 2] = 1.6 * LEG
+    found = explosion(qpos, everything, still, settled)
+    assert found == (1, 1, "it tilts by 2 rad, past a right angle, and was not pushed")
+    assert explosion(qpos, everything, np.array([0.0, 80.0]), settled) is None
+    assert explosion(qpos, np.array([3, 1]), still, settled) is None, "it has fallen"
+
+
+def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duration: float = 80.0) -> Outcomes:
+    """Of starts pushed at 20 time units, in multiples of m V_p."""
+    settled = settle(draw_starts(24, 5), conditions)
+    pushed = Push(np.full(24, push * conditions.time.vp), np.full(24, 20.0))
+    plan = begin(LDVS, settled.starts, velocity, settled.stride)
+    return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), push=pushed)
+
+
+@pytest.mark.parametrize("push", [40.0, 80.0])
+def test_an_insect_tipped_over_by_a_push_fell(push: float):
+    found = outcomes(Conditions(), 0.5, push)
+    assert np.isfinite(found.fall).mean() > 0.5
+    assert (found.tilt > pi / 2).any()
+
+
+def test_an_insect_that_tumbles_down_fell():
+    """Into a gap; some land on their backs."""
+    found = outcomes(Conditions.of(ground="gap", standing_height=12.0, ground_at=45.0), 0.7, duration=150.0)
+    assert np.isfinite(found.fall).mean() > 0.9
+    assert (found.tilt > pi / 2).any()
+
+
+def test_a_walk_without_contact_is_no_outcome():
+    """Whatever the reason: what cannot be measured is an error."""
+    settled = settle(draw_starts(2, 0))
+    so_far = OutcomesSoFar(settled, np.full(2, np.inf))
+    for chunk in walked(settled):
+        sensors = chunk.sensors.copy()
+        sensors[1, :, settled.compiled.columns.touch] = 0.0
+        so_far.add(replace(chunk, sensors=sensors))
+    with pytest.raises(SimulationError, match="start 1 diverged while walking, at 0 time units: its slip is no number"):
+        so_far.outcomes()
+
+
+def test_the_state_of_a_walk_that_cannot_be_measured_is_its_start(tmp_path):
+    settled = settle(draw_starts(2, 0))
+    with pytest.raises(SimulationError) as error:
+        OutcomesSoFar(settled, np.full(2, np.inf)).outcomes()
+    positions = divergence.replayed(divergence.save_state(error.value, tmp_path))
+    np.testing.assert_allclose(positions, settled.qpos[:1].repeat(settled.substeps, axis=0), atol=1e-3)
+
+
+def test_a_state_that_diverged_says_so_again(tmp_path, capsys):
+    settled = thrown(up=1e12)
+    with chdir(tmp_path):  # MuJoCo writes its own log
+        with pytest.raises(SimulationError, match="mjWARN") as error:
+            walked(settled)
+        divergence.main(str(divergence.save_state(error.value, tmp_path)))
+    assert capsys.readouterr().out.startswith("it diverged: mjWARN")
+
+
+@pytest.mark.parametrize("height", [0.0001, 0.099])
+def test_bumps_so_flat_that_a_foot_stands_on_dozens_are_refused(height: float):
+    with pytest.raises(InputError, match=f"ground_height = {height}; expected 0.1 to 8 mm where rough"):
+        Conditions.of(ground="rough", ground_height=height)
+    assert Conditions.of(ground="rough", ground_height=0.1).ground.top == 0.1
+    assert Conditions.of(ground="step", ground_height=height).ground.top == height
+
+
+def test_pushes_that_throw_the_insect_high_up_are_refused():
+    assert len(every_case(["push"], [80.0], [], True)) == 2
+    with pytest.raises(InputError, match=r"impulses = \[81.0\]; expected above 0 and at most 80 times m V_p"):
+        every_case(["push"], [81.0], [], True)
