@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 from uuid import uuid4
 
 from hexmj.errors import InputError
+from hexmj.locks import among_writers
 
 MARK = b"\nhexmj, sha256 "
 """Between the content of a sealed file and its checksum."""
@@ -22,7 +23,7 @@ SEAL = len(MARK) + 64
 """Length of both [bytes]."""
 
 PART = ".part-"
-"""Begins the names of files that are being written; none is left but by a killed process."""
+"""Begins the names of files that are being written; a killed process leaves them, the next run removes them."""
 
 
 def write_whole(path: Path, content: bytes) -> Path:
@@ -46,15 +47,47 @@ def replacing(path: Path) -> Iterator[Path]:
     part = path.absolute().with_name(f"{PART}{uuid4().hex}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        yield part
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(part, path)
+        with among_writers(path.parent):
+            yield part
+            with part.open("rb+") as file:
+                os.fsync(file.fileno())
+            os.replace(part, path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def prepare(folder: Path) -> None:
+    """Make a folder, see that it can be written to, and remove what killed processes left there half written.
+
+    Raises:
+        InputError: it cannot be made, or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        try_writing(folder)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written to: {error.strerror or error}") from None
+    remove_leftovers(folder)
+
+
+def try_writing(folder: Path) -> None:
+    """Write a file into a folder and remove it, or raise OSError."""
+    part = folder / f"{PART}{uuid4().hex}"
+    try:
+        part.write_bytes(bytes(4096))
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed processes left half written in a folder, unless somebody writes into it at this moment."""
+    with among_writers(folder, alone=True) as alone:
+        for part in folder.glob(f"{PART}{'[0-9a-f]' * 32}*") if alone else ():
+            with suppress(OSError):
+                part.unlink()
 
 
 @contextmanager

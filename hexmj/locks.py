@@ -1,4 +1,4 @@
-"""A folder for one process at a time, where the system has such locks; a killed process holds none."""
+"""A folder for one process, or for writers, at a time, where the system has such locks; a killed process holds none."""
 
 import os
 import socket
@@ -40,6 +40,35 @@ def locked(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             path.unlink()
         os.close(file)
+
+
+@contextmanager
+def among_writers(folder: Path, alone: bool = False) -> Iterator[bool]:
+    """Write into a folder while the block runs, as others may; or see to it that nobody does.
+
+    Args:
+        folder: which is there.
+        alone: without other writers, if there are none at this moment; new ones wait.
+
+    Yields:
+        Whether this is sure: not where the system has no such locks.
+    """
+    file = None
+    try:
+        try:
+            file = os.open(folder, os.O_RDONLY)
+            if fcntl:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
+            sure = fcntl is not None
+        except OSError:
+            sure = False
+        yield sure
+    finally:
+        if file is not None:
+            if fcntl:
+                with suppress(OSError):
+                    fcntl.flock(file, fcntl.LOCK_UN)  # closing is not enough where the process was forked meanwhile
+            os.close(file)
 
 
 def _held(path: Path) -> int:

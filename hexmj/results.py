@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 from hexmj import netcdf
 from hexmj.errors import InputError
-from hexmj.files import PART, sealed, write_whole
+from hexmj.files import remove_leftovers, sealed, try_writing, write_whole
 from hexmj.literal import literal
 
 if TYPE_CHECKING:
@@ -25,6 +24,8 @@ PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "cmaes", "dm-control",
 
 def results_folder(path: Path, names: Sequence[str]) -> Path:
     """The folder for results, if the files `names` can be written to it; it is made when the first one is.
+
+    What killed processes left there half written is removed.
 
     Raises:
         InputError: the path or a name in it is taken by something else, or cannot be written to.
@@ -39,6 +40,7 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
         raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None
     if taken:
         raise InputError(f"--out {path}: {taken[0]} is a folder there; expected a file or nothing")
+    remove_leftovers(path)
     return path
 
 
@@ -47,11 +49,7 @@ def _try(folder: Path, missing: Sequence[str]) -> None:
     for name in missing:
         with suppress(FileNotFoundError):
             os.lstat(folder / name)
-    part = folder / f"{PART}{uuid4().hex}"
-    try:
-        part.write_bytes(bytes(4096))
-    finally:
-        part.unlink(missing_ok=True)
+    try_writing(folder)
 
 
 def save_dataset(data: "xr.Dataset", path: Path) -> Path:

@@ -155,7 +155,9 @@ class Sweepers:
         from concurrent.futures import ProcessPoolExecutor
         from multiprocessing import active_children, get_context
 
-        with ProcessPoolExecutor(self.processes, get_context("spawn")) as executor:
+        from hexmj.sweeps.workers import end_with_parent
+
+        with ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent) as executor:
             try:
                 yield executor
             except KeyboardInterrupt:  # nobody waits for cells that are stopped

@@ -12,7 +12,6 @@ from hexmj.cli.options import Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.literal import literal
-from hexmj.locks import locked
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_manifest, save_text
 from hexmj.starts import SAMPLE
@@ -78,7 +77,7 @@ class Search(WalkingCommand):
         problem, effort = self._problem(), self._effort()
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
         out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
-        with locked(out / KEPT), progress_bar("searching") as progress:
+        with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from hexmj.checks import check_types
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
+from hexmj.locks import locked
 from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
@@ -101,14 +103,21 @@ def search(
         problem: what is minimised.
         effort: how.
         folder: keeps every evaluation as it is made; none of them is made again, by this search or another of the same
-            problem and starts.
+            problem and starts.  It is held meanwhile, and another search has to wait.
         threads: one per core unless given; the result does not depend on it.
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError: settings that make no sense, or a file that is damaged.
+        InputError: settings that make no sense, a file that is damaged or cannot be written, or a folder in use.
         SimulationError: a physical walk that failed; the evaluations before it are kept.
     """
+    with locked(folder) if folder else nullcontext():
+        return _search(problem, effort, folder, threads, progress)
+
+
+def _search(
+    problem: Problem, effort: Effort, folder: Path | None, threads: int | None, progress: Progress | None
+) -> Found:
     domain, history = problem.domain(effort.domain, effort.begin), History()
     work = effort.budget * effort.starts + effort.refine_budget * effort.refine_starts
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if effort.refine_budget else {})
@@ -119,10 +128,13 @@ def search(
     }
 
     def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
-        result = kept[stage](candidates)
+        result = np.empty(len(candidates))
+        together = 1 if problem.conditions else len(candidates)  # physical walks take long: each is kept at once
+        for i in range(0, len(candidates), together):
+            result[i : i + together] = kept[stage](candidates[i : i + together])
+            if progress:
+                progress(together * sizes[stage] / work)
         history.add(stage, candidates, result)
-        if progress:
-            progress(len(candidates) * sizes[stage] / work)
         return result
 
     best, cost = run(searcher, partial(costs, "population"), effort.budget)

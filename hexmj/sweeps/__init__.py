@@ -8,7 +8,7 @@ A folder of a sweep holds
   packages that compute.  The digest in the name is that of the record, so an edit, another version or another setting
   is another file; none is ever overwritten by other numbers, and one that is damaged or foreign is refused.
 - `<name>-<digest>.jsonl` for each `KeptValues`: the same record, then a line for each value.
-- `.part-*` of runs that were killed while they wrote; they may be deleted.
+- `.part-*` of runs that were killed while they wrote; the next run removes them.
 
 There is no index: the names are all that a run needs to go on, and several runs may share a folder.
 """

@@ -18,8 +18,10 @@ def write(path: Path, record: str, data: "xr.Dataset") -> "xr.Dataset":
     """Keep a cell with the record of what it depends on, and give its data as they will be read.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: it cannot be written, or the sweep's folder is no longer there.
     """
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent} was removed or renamed while it was in use; nothing more is written there")
     content = netcdf.encode(data.assign_attrs({RECORD: record}))
     write_whole(path, sealed(content))
     return _decode(content, record, path)

@@ -2,12 +2,13 @@
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from hexmj.errors import InputError
+from hexmj.files import prepare
 from hexmj.progress import Progress
 from hexmj.sweeps.cells import Cell
 from hexmj.sweeps.files import read, write
@@ -64,7 +65,8 @@ def finish(
         how: see `Execution`.
 
     Raises:
-        InputError: a cell cannot be named, sent, written or believed.  And whatever the first cell to fail raises.
+        InputError: a cell cannot be named, sent, written or believed, or a worker was killed.  And whatever the first
+            cell to fail raises.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
@@ -74,6 +76,8 @@ def finish(
     paths = [
         folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
     ]
+    if folder and not all(path and path.exists() for path in paths):
+        prepare(folder)
     whole = sum(cell.work for cell in cells)
     told = [0.0] * len(cells)
 
@@ -103,6 +107,11 @@ def finish(
             futures[executor.submit(_sent, parcel, path, records[i], threads or 1)] = i
         for future in as_completed(futures):
             yield finished(futures[future], future.result())
+    except BrokenExecutor:
+        raise InputError(
+            "a process that computed cells was killed, or could not be started; what is finished is kept:"
+            " start again, with fewer processes if the memory was full"
+        ) from None
     finally:
         for future in futures:
             future.cancel()

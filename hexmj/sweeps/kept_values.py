@@ -66,8 +66,8 @@ class KeptValues:
             if text and line == _checked(text):
                 row, value = text.split(" ")
                 self._values[bytes.fromhex(row)] = float.fromhex(value)
-        if rest := f"{record}\n"[len(first) :] or (lines[-1] and "\n"):
-            _add(path, rest)
+        if rest := f"{record}\n"[len(first) :]:
+            _add(path, rest, begin=True)
 
 
 def _line(row: bytes, value: float) -> str:
@@ -78,16 +78,17 @@ def _checked(text: str) -> str:
     return f"{text} {zlib.crc32(text.encode()):08x}"
 
 
-def _add(path: Path, text: str) -> None:
-    """Append in one write, which a kill does not undo."""
+def _add(path: Path, text: str, begin: bool = False) -> None:
+    """Append whole lines in one write, which a kill does not undo; after one that was torn, on a line of their own."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-        try:
-            content = text.encode()
-            if os.write(file, content) < len(content):
-                raise OSError("no space left")
-        finally:
-            os.close(file)
+        if begin:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("ab+") as file:
+            if not begin:
+                if not file.seek(0, os.SEEK_END):
+                    raise OSError("it was removed while it was in use")
+                file.seek(-1, os.SEEK_END)
+                text = text if file.read(1) == b"\n" else f"\n{text}"
+            file.write(text.encode())
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
