@@ -1,10 +1,9 @@
-"""Results on disk: NetCDF, figures and a manifest, each written whole or not at all."""
+"""Results on disk: NetCDF, figures and texts, each written whole or not at all."""
 
 import io
 import json
 import math
 import os
-import platform
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,8 +17,6 @@ from hexmj.literal import literal
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-PACKAGES = ("hexmj", "mujoco", "numpy", "numba", "scipy", "cmaes", "dm-control", "xarray")
 
 
 def results_folder(path: Path, names: Sequence[str]) -> Path:
@@ -76,15 +73,6 @@ def save_figure(figure: "Figure", path: Path, **how: Any) -> Path:
 def save_text(text: str, path: Path) -> Path:
     """Write a text in UTF-8."""
     return write_whole(path, text.encode())
-
-
-def save_manifest(settings: dict[str, Any], path: Path) -> Path:
-    """Write what is needed to run the same again: settings (the seed among them) and versions."""
-    from importlib.metadata import version
-
-    versions = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
-    told = {"settings": settings, "versions": versions, "machine": platform.machine()}
-    return save_text(json_text(told) + "\n", path)
 
 
 def json_text(value: Any) -> str:

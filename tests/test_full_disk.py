@@ -17,10 +17,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import hexmj
+from hexmj.cli.flss import Flss
+from hexmj.cli.manifest import save_manifest
 from hexmj.errors import InputError
 from hexmj.files import replacing, write_whole
 from hexmj.replay.film.encoder import encoder
-from hexmj.results import save_dataset, save_figure, save_manifest, save_text
+from hexmj.results import save_dataset, save_figure, save_text
 from hexmj.sweeps import Cell, KeptValues, run
 
 ROOM = 30_000
@@ -65,7 +67,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "data.nc": lambda path: save_dataset(numbers(0, 10_000), path),
     "figure.png": lambda path: save_figure(figure(), path),
     "figure.pdf": lambda path: save_figure(figure(), path, dpi=300),
-    "manifest.json": lambda path: save_manifest({"many": list(range(10_000))}, path),
+    "manifest.json": lambda path: save_manifest(Flss(), {"many": list(range(10_000))}, (), path),
     "found.toml": lambda path: save_text("# long\n" * 10_000, path),
     "film.mp4": noise,
 }

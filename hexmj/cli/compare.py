@@ -59,13 +59,17 @@ class Compare(StudyCommand):
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The video, unless it is left out or cannot be made."""
+        from hexmj.replay.recording import save_recording
+
         if self.no_video:
             return []
+        walked = self._typical_gait(result)
+        recording = save_recording(walked, self.out / "recording.nc")
         try:
-            return [self._typical_gait(result)]
+            return [recording, self._filmed(walked)]
         except RenderingError as error:
             print(f"hexmj: no video: {error}", file=sys.stderr)
-            return []
+            return [recording]
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """The frequencies and answers of every controller."""
@@ -87,21 +91,22 @@ class Compare(StudyCommand):
         yield self.conditions_line()
         yield report_line(physical_report(result))
 
-    def _typical_gait(self, result: "xr.Dataset") -> Path:
-        """A video of the first controller near V = 0.3, of the first start that kept its stability, if any."""
-        from hexmj.replay.film import gl
-        from hexmj.replay.film.video import render
-        from hexmj.replay.recording import save_recording
-
-        if sentence := gl.missing():
-            raise RenderingError(sentence)
+    def _typical_gait(self, result: "xr.Dataset") -> "xr.Dataset":
+        """A recording of the first controller near V = 0.3, of the first start that kept its stability, if any."""
         name, controller = next(iter(self.controlled.controllers(self.models).items()))
         velocities = result.velocity.values
         v = float(velocities[np.abs(velocities - FILMED).argmin()])
         one = result.sel(controller=name, velocity=v)
         start = int(np.argmax((np.isinf(one.planned_loss) & np.isinf(one.fall)).values))
-        walked = recorded(self, controller, v, start, title=name, threads=self.sweepers.threads)
-        save_recording(walked, self.out / "recording.nc")
+        return recorded(self, controller, v, start, title=name, threads=self.sweepers.threads)
+
+    def _filmed(self, walked: "xr.Dataset") -> Path:
+        """A video of a recording."""
+        from hexmj.replay.film import gl
+        from hexmj.replay.film.video import render
+
+        if sentence := gl.missing():
+            raise RenderingError(sentence)
         with progress_bar("rendering") as progress:
             render([walked], self.out / "gait.mp4", Film(), progress)
         return self.out / "gait.mp4"

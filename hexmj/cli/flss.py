@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
 from hexmj.controllers.protocol import Controller
 from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_manifest
+from hexmj.results import results_folder, save_dataset
 from hexmj.starts import SAMPLE
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Flss(WalkingCommand):
             self.refuse_physical("without --physical")
         controller = self.controlled.controller(self.model)
         if self.out:
-            results_folder(self.out, ("flss.nc", "flss.png", "manifest.json"))
+            results_folder(self.out, ("flss.nc", "flss.png", MANIFEST))
         table = self._measured(controller)
         table.attrs = {"model": self.model, "physical": self.physical} | table.attrs
         self._print(table, self._write(table, controller, self.out) if self.out else [])
@@ -69,11 +70,11 @@ class Flss(WalkingCommand):
         from hexmj.measures.figures import flss_figure
 
         title = f"{controller.name}, {self.kind} FLSS, {self.n_starts} starts, window {self.walks.window}"
-        return [
+        files = [
             save_dataset(table, out / "flss.nc"),
             save_figure(flss_figure(table, title), out / "flss.png"),
-            save_manifest(table.attrs, out / "manifest.json"),
         ]
+        return [*files, save_manifest(self, table.attrs, files, out / MANIFEST)]
 
     def _print(self, table: "xr.Dataset", files: list[Path]) -> None:
         columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]

@@ -12,7 +12,8 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
-from hexmj.errors import LONGEST, InputError, RenderingError, SimulationError
+from hexmj.cli.words import checked, typed
+from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
 
@@ -37,6 +38,8 @@ COMMANDS = {
     "map": f"Physical FLSS over the velocity and one condition, and why starts fall or do not.{AGAIN.format('run')}",
     "disturb": "Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies"
     f" buy.{AGAIN.format('run')}",
+    "rerun": "Makes a result again from its manifest: is every number equal to the last bit?  If not, exit code 1 and"
+    " a sentence on what else is not as it was.",
     "check-controller": "Does a controller keep the protocol?  A check that fails says in a sentence what is wrong;"
     " exit code 1 then.",
     "doctor": "Checks of this machine, each with a remedy where it fails; exit code 1 if one does.",
@@ -57,8 +60,9 @@ def main() -> None:
     options: Any = None
     try:
         try:
-            options = _options(_checked(sys.argv[1:]))
-            options.run()
+            options = options_of(words := checked(sys.argv[1:]))
+            with typed(words):
+                options.run()
         finally:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()
@@ -78,19 +82,7 @@ def main() -> None:
         sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
 
 
-def _checked(words: list[str]) -> list[str]:
-    """The words of the command line, if a person could have typed and read them.
-
-    Raises:
-        InputError: a word that is no print, or a book.
-    """
-    for word in words:
-        if len(word) > LONGEST or not word.isprintable():
-            raise InputError(f"{literal(word)}: expected words of at most {LONGEST} printable characters")
-    return words
-
-
-def _options(words: list[str]) -> Any:
+def options_of(words: list[str]) -> Any:
     """The options of the command that is asked for; no other is imported then, and none that are only listed."""
     how: Any = {"config": (FlagCreatePairsOff,)}
     listed = words in (["--help"], ["-h"])

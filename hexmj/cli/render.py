@@ -2,11 +2,12 @@
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes, Positional
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers, changed
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, show
@@ -49,16 +50,18 @@ class Render(WalkingCommand):
         beside = [] if self.beside in (None, "planned") else [self.beside]
         controllers = self.controlled.controllers([self.model, *beside])
         shown = [load_recording(path) for path in self.recordings]
-        out = results_folder(self.out, ("gait.mp4", "recording-1.nc", "recording-2.nc"))
+        out = results_folder(self.out, ("gait.mp4", "recording-1.nc", "recording-2.nc", MANIFEST))
         if sentence := gl.missing():
             raise RenderingError(sentence)
-        files = []
+        files, settings = [], {"film": asdict(self.film)}
         if not shown:
             shown, files = self._recorded(controllers, out)
+            settings |= self._walked(controllers)
         out.mkdir(parents=True, exist_ok=True)
         with progress_bar("rendering") as progress:
             frames = render(shown, out / "gait.mp4", self.film, progress)
         files.append(out / "gait.mp4")
+        files.append(save_manifest(self, settings, files, out / MANIFEST))
         if self.json:
             summary = {"frames": frames, "film": asdict(self.film), "files": files}
             print_json(summary | {"recordings": [walk_summary(one) for one in shown]})
@@ -77,6 +80,14 @@ class Render(WalkingCommand):
                 f"--{names[0].replace('_', '-')} was given with recordings; expected a second recording for side by"
                 " side, and options of walks only where one is recorded first"
             )
+
+    def _walked(self, controllers: dict[str, Controller]) -> dict[str, Any]:
+        """Settings of the walks that are recorded first."""
+        from hexmj.measures.kinematic import settings
+
+        walks = settings(controllers, n_starts=self.start + 1, **self.walked)
+        told = {"velocity": self.velocity, "start": self.start, "beside": self.beside}
+        return told | walks | {"conditions": self.conditions.settings()}
 
     def _recorded(self, controllers: dict[str, Controller], out: Path) -> "tuple[list[xr.Dataset], list[Path]]":
         """The walks that are to be seen, recorded, and their files."""

@@ -5,9 +5,11 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import new_table, print_json, show
 from hexmj.progress import progress_bar
+from hexmj.results import results_folder
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,14 @@ class Reproduce:
         from hexmj.paper.reproduce import reproduce
         from hexmj.paper.table import HEADS, claims_json, summary
 
+        results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with progress_bar("reproducing") as progress, self.sweepers.executor() as executor:
             rows, files = reproduce(
                 self.out, protocol, self.only, executor=executor, progress=progress, threads=self.sweepers.threads
             )
+        settings = {"protocol": asdict(protocol), "only": self.only}
+        files.append(save_manifest(self, settings, files, self.out / MANIFEST))
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return

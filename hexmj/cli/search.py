@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.literal import literal
 from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_manifest, save_text
+from hexmj.results import results_folder, save_dataset, save_text
 from hexmj.starts import SAMPLE
 
 if TYPE_CHECKING:
@@ -76,24 +77,24 @@ class Search(WalkingCommand):
         self._check()
         problem, effort = self._problem(), self._effort()
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
-        out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", "manifest.json"))
+        out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", MANIFEST))
         with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
-        manifest = {
+        settings = {
             "problem": problem.settings(),
             "effort": plain(effort),
-            "found": dict(zip(problem.form.names, found.vector.tolist(), strict=True)),
             "verdict_starts": fresh.n_starts,
             "verdict_seed": self.verdict_seed,
         }
-        files = self._write(problem, found, manifest)
+        files = self._write(problem, found, settings)
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
-            told |= {"verdict": _judged(verdict), "settings": manifest, "files": files}
-            print_json({"found": manifest["found"]} | told)
+            told |= {"verdict": _judged(verdict), "settings": settings, "files": files}
+            vector = dict(zip(problem.form.names, found.vector.tolist(), strict=True))
+            print_json({"found": vector} | told)
         else:
             self._show(problem, found, verdict, fresh.n_starts, files)
 
@@ -169,16 +170,16 @@ class Search(WalkingCommand):
         method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
         return literal(f"{self.form}, {self._kind} FLSS at {at}, {method}")
 
-    def _write(self, problem: "Problem", found: "Found", manifest: dict[str, Any]) -> list[Path]:
+    def _write(self, problem: "Problem", found: "Found", settings: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
 
         text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
-        return [
+        files = [
             save_dataset(found.history, self.out / "history.nc"),
             save_text(text, self.out / "found.toml"),
             save_figure(convergence_figure(found.history, self._title), self.out / "convergence.png"),
-            save_manifest(manifest, self.out / "manifest.json"),
         ]
+        return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
 
     def _toml(self, problem: "Problem", found: "Found") -> str:
         """What `load_controller` reads to the same bits: weights, or a controller and its fields."""

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_manifest
+from hexmj.results import results_folder, save_dataset
 from hexmj.sweeps import Study, conduct
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class Outputs:
     """Name of the NetCDF file."""
     figures: "Mapping[str, Callable[[xr.Dataset], Figure]]"
     """By the names of their files."""
-    manifest: str = "manifest.json"
+    manifest: str = MANIFEST
     """Name of its file."""
     others: tuple[str, ...] = ()
     """Names of files that the command writes itself."""
@@ -73,9 +74,9 @@ class StudyCommand(WalkingCommand):
         files = [
             save_dataset(result, folder / outputs.data),
             *(save_figure(draw(result), folder / name) for name, draw in outputs.figures.items()),
-            save_manifest(result.attrs, folder / outputs.manifest),
             *self.write_others(result),
         ]
+        files.append(save_manifest(self, result.attrs, files, folder / outputs.manifest))
         if self.json:
             print_json(self.summary(result) | {"files": files})
         else:

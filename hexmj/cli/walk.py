@@ -1,17 +1,18 @@
 """`hexmj walk`."""
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, save_figure, short, show
 from hexmj.conditions import FootPath, TimeScale
-from hexmj.results import results_folder, save_manifest
+from hexmj.results import results_folder
 
 SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part))
 """Conditions that the puppet of a plan shows too."""
@@ -41,21 +42,21 @@ class Walk(WalkingCommand):
         if not self.physical:
             self.refuse_physical("without --physical", SHOWN)
         controller = self.controlled.controller(self.model)
-        out = results_folder(self.out, ("recording.nc", "walk.png", "manifest.json"))
+        out = results_folder(self.out, ("recording.nc", "walk.png", MANIFEST))
         title = f"{controller.name}, V = {self.velocity:g}"
         how: Any = {"physical": self.physical, "threads": self.workers.threads}
         walked = recorded(self, controller, self.velocity, self.start, title=title, **how)
-        manifest = {"velocity": self.velocity, "start": self.start, "physical": self.physical}
-        manifest |= settings({self.model: controller}, n_starts=self.start + 1, **self.walked)
-        manifest |= {"conditions": asdict(self.conditions)}
+        told = {"velocity": self.velocity, "start": self.start, "physical": self.physical}
+        told |= settings({self.model: controller}, n_starts=self.start + 1, **self.walked)
+        told |= {"conditions": self.conditions.settings()}
         files = [
             save_recording(walked, out / "recording.nc"),
             save_figure(walk_figure(walked), out / "walk.png"),
-            save_manifest(manifest, out / "manifest.json"),
         ]
+        files.append(save_manifest(self, told, files, out / MANIFEST))
         summary = walk_summary(walked)
         if self.json:
-            print_json(summary | {"settings": manifest, "files": files})
+            print_json(summary | {"settings": told, "files": files})
         else:
             lines = [f"{key}: {short(value)}" for key, value in summary.items()]
             show(title, *lines, self.conditions_line(self.physical), *map(str, files))

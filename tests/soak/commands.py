@@ -22,6 +22,7 @@ SMALL = {
     "terrain": "--grounds step --heights 1 --velocities 0.5 --starts 1 --grasps 0",
     "map": "--values 80 --velocities 0.5 --starts 2 --window 3",
     "disturb": "--velocities 0.5 --starts 2 --window 3",
+    "rerun": "nowhere",
     "check-controller": "nobody",
     "doctor": "--json",
 }

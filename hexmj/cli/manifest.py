@@ -1,0 +1,205 @@
+"""Manifests: what a result was made by, so that it can be made again, and what of that differs from another's."""
+
+import json
+import platform
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import entry_points, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexmj.cli import words
+from hexmj.errors import InputError
+from hexmj.files import opened, read_text
+from hexmj.loaded import importable
+from hexmj.results import json_text, save_text
+from hexmj.sweeps.code import code
+from hexmj.sweeps.plain import digest
+
+FORMAT = 2
+"""Of the file; 1 had settings and versions only."""
+
+MANIFEST = "manifest.json"
+"""Name of the file, or its end."""
+
+KINDS = {
+    "versions": "versions",
+    "code": "code",
+    "own": "your files",
+    "processor": "processor",
+    "settings": "settings",
+    "files": "changed since they were written",
+}
+"""What may differ -> what it is called."""
+
+SHOWN = 8
+"""Most names of a kind in a sentence."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a result was made by."""
+
+    command: list[str]
+    """The words behind `hexmj`, without those on which no number depends."""
+    settings: dict[str, Any]
+    """What came of the words, the seed among it."""
+    versions: dict[str, str]
+    """Of Python, the packages that compute, and the C library."""
+    code: dict[str, str]
+    """Module or data file that the command may need -> digest."""
+    own: dict[str, str]
+    """The user's files that the words name, as they name them -> digest."""
+    processor: list[str]
+    """Architecture and vector extensions, as NumPy calls them."""
+    files: dict[str, str]
+    """What was written, by its path in the manifest's folder -> digest."""
+
+
+def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path], path: Path) -> Path:
+    """Write what is needed to make a result again.
+
+    Args:
+        command: the options of the command, whose module is where the code is followed from.
+        settings: of the result.
+        written: its files, in the manifest's folder or in one of that.
+        path: of the manifest.
+
+    Raises:
+        InputError: the code was edited meanwhile, or a file cannot be written or read.
+    """
+    typed = words.command()
+    own = {str(file): _digest(file) for file in words.files(typed)}
+    made = code(frozenset({type(command).__module__, *_modules(typed)}))
+    told = Manifest(
+        command=typed,
+        settings=settings,
+        versions=_versions() | made.versions | {"python": platform.python_version()},
+        code={name: one for name, one in made.sources.items() if name.partition("@")[2] not in own.values()},
+        own=own,
+        processor=_processor(),
+        files={file.relative_to(path.parent).as_posix(): _digest(file) for file in written},
+    )
+    return save_text(json_text({"format": FORMAT} | asdict(told)) + "\n", path)
+
+
+def read_manifest(path: Path) -> Manifest:
+    """A manifest that `save_manifest` wrote.
+
+    Raises:
+        InputError: it cannot be read, is none, of another format, or not of a command.
+    """
+    try:
+        told = json.loads(read_text(path, 10_000_000))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} cannot be read as JSON: {error}") from None
+    if not isinstance(told, dict) or "settings" not in told:
+        raise InputError(f"{path} is no manifest; expected one that a hexmj command wrote")
+    if (found := told.pop("format", 1)) != FORMAT:
+        raise InputError(f"{path} has format {found!r:.20}; expected {FORMAT}: make the result anew with this version")
+    for name, kind in Manifest.__annotations__.items():
+        if not _fits(told.get(name), kind):
+            raise InputError(f"{path}: {name} = {told.get(name)!r:.80}; expected {kind}")
+    if not told["command"]:
+        raise InputError(f"{path} names no command; expected a result that a hexmj command wrote")
+    return Manifest(**{name: told[name] for name in Manifest.__annotations__})
+
+
+def manifests(result: Path) -> dict[Path, Manifest]:
+    """A manifest, or all that lie in a folder, by their paths.
+
+    Raises:
+        InputError: there is none, or one makes no sense.
+    """
+    paths = sorted(result.glob(f"*{MANIFEST}")) if result.is_dir() else [result]
+    if not paths:
+        raise InputError(f"{result} holds no {MANIFEST}; expected a folder that a hexmj command wrote results to")
+    return {path: read_manifest(path) for path in paths}
+
+
+def changed_files(then: Manifest, folder: Path) -> list[str]:
+    """Files of a result that are there, but not as they were written."""
+    there = {name: one for name, one in then.files.items() if (folder / name).is_file()}
+    return [name for name, one in there.items() if _digest(folder / name) != one]
+
+
+def differences(then: Manifest, now: Manifest) -> dict[str, list[str]]:
+    """What differs between two manifests of one command, by its kind, each in a few words; no kind is empty."""
+    found = {
+        "versions": [
+            f"{name} {then.versions.get(name, 'unknown')}, now {now.versions.get(name, 'unknown')}"
+            for name in _unlike(then.versions, now.versions)
+        ],
+        "code": list(dict.fromkeys(name.partition("@")[0] for name in _unlike(then.code, now.code))),
+        "own": _unlike(then.own, now.own),
+        "processor": [
+            *(f"{one} then, not now" for one in then.processor if one not in now.processor),
+            *(f"{one} now, not then" for one in now.processor if one not in then.processor),
+        ],
+        "settings": _unlike(dict(_flat(then.settings)), dict(_flat(now.settings))),
+    }
+    return {kind: names for kind, names in found.items() if names}
+
+
+def told(found: dict[str, list[str]]) -> str:
+    """What differs, as the end of a sentence."""
+
+    def few(names: list[str]) -> str:
+        return "; ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+
+    return ", ".join(f"{KINDS[kind]} ({few(names)})" for kind, names in found.items())
+
+
+def _modules(typed: Sequence[str]) -> Iterator[str]:
+    """Modules of the user's own that words name: of files, by their names, or by entry points."""
+    from hexmj.controllers.named import ENTRY_POINTS
+
+    points = {point.name: point.module for point in entry_points(group=ENTRY_POINTS)}
+    yield from (importable(file).__name__ for file in words.files(typed) if file.suffix == ".py")
+    for name in words.named(typed):
+        module = points.get(name) or name.rpartition(":")[0]
+        if (getattr(sys.modules.get(module), "__file__", None) or "").endswith(".py"):
+            yield module
+
+
+def _versions() -> dict[str, str]:
+    libc, number = platform.libc_ver()
+    return {"hexmj": version("hexmj")} | ({libc: number} if libc else {})
+
+
+def _processor() -> list[str]:
+    """MuJoCo's results, and those of the C library's sines, depend on it."""
+    extensions: Any = np.show_config(mode="dicts")
+    extensions = extensions.get("SIMD Extensions", {})
+    return [platform.machine(), *extensions.get("baseline", ()), *extensions.get("found", ())]
+
+
+def _digest(path: Path) -> str:
+    with opened(path) as file:
+        return digest(file.read())
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Whether a value of JSON is a list or dictionary as annotated."""
+    if kind == dict[str, Any]:
+        return isinstance(value, dict)
+    items = value.values() if isinstance(value, dict) else value
+    return isinstance(value, kind.__origin__) and all(isinstance(one, str) for one in items)
+
+
+def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """The single settings of nested ones, by their names with dots between; lists count as one."""
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield from _flat(one, f"{name}.{key}" if name else key)
+    else:
+        yield name, value
+
+
+def _unlike(then: dict[str, Any], now: dict[str, Any]) -> list[str]:
+    """Keys whose values are not the same, or that only one has."""
+    missing = object()
+    return [key for key in then | now if then.get(key, missing) != now.get(key, missing)]

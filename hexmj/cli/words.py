@@ -1,0 +1,73 @@
+"""The words behind `hexmj`: which can be read, which decide what comes of a command, what files and modules they name."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from os.path import isfile
+from pathlib import Path
+
+from hexmj.errors import LONGEST, InputError
+from hexmj.files import read_toml
+from hexmj.literal import literal
+
+INDIFFERENT = {"--out": 1, "--threads": 1, "--processes": 1, "--json": 0}
+"""Options on which no number depends -> how many words follow them."""
+
+_TYPED: ContextVar[Sequence[str]] = ContextVar("typed", default=())
+
+
+def checked(words: list[str]) -> list[str]:
+    """The words of a command line, if a person could have typed and read them.
+
+    Raises:
+        InputError: a word that is no print, or a book.
+    """
+    for word in words:
+        if len(word) > LONGEST or not word.isprintable():
+            raise InputError(f"{literal(word)}: expected words of at most {LONGEST} printable characters")
+    return words
+
+
+@contextmanager
+def typed(words: Sequence[str]) -> Iterator[None]:
+    """While the block runs, a command is at work that was asked for by these words."""
+    before = _TYPED.set(words)
+    try:
+        yield
+    finally:
+        _TYPED.reset(before)
+
+
+def command() -> list[str]:
+    """The words that decide what comes of the command at work; none where it was not asked for by words."""
+    return deciding(_TYPED.get())
+
+
+def deciding(words: Sequence[str]) -> list[str]:
+    """Words without the options on which no number depends, so that these may be given anew."""
+    kept, coming = [], iter(words)
+    for word in coming:
+        option, given, _ = word.partition("=")
+        if option not in INDIFFERENT:
+            kept.append(word)
+        elif not given:
+            for _ in range(INDIFFERENT[option]):
+                next(coming, "")
+    return kept
+
+
+def named(words: Sequence[str]) -> Iterator[str]:
+    """Everything that may be a name: words, values behind `=`, and controllers that TOML files among them name."""
+    for word in words:
+        name = word.partition("=")[2] if word.startswith("--") else word
+        yield name
+        if name.endswith(".toml") and isfile(name):
+            with suppress(InputError):
+                yield from named([str(read_toml(Path(name)).get("controller", ""))])
+
+
+def files(words: Sequence[str]) -> list[Path]:
+    """Files that words name, as they name them: `mine.py` of `mine.py:Tripod`, weights, recordings."""
+    wheres = ((name, *name.rpartition(":")[::2]) for name in named(words))
+    paths = (where if what and where.endswith(".py") else name for name, where, what in wheres)
+    return [Path(path) for path in dict.fromkeys(paths) if isfile(path)]

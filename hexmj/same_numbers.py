@@ -1,0 +1,132 @@
+"""Two files of results beside each other: which of their numbers are equal to the last bit, and how far others are."""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexmj import netcdf
+from hexmj.errors import InputError
+from hexmj.files import opened, read_text, read_toml, unsealed
+
+ATTRIBUTES = "(attributes)"
+"""Stands for all attributes of a NetCDF file."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A variable of a file beside that of another."""
+
+    name: str
+    """Of the variable; for JSON and TOML the keys that lead to it, for all items of a list at once."""
+    values: int
+    """How many it has."""
+    differ: int
+    """How many of them are not equal to the last bit."""
+    most: float | None
+    """Greatest distance of two that differ, infinite where one alone is a finite number; None where none differ, or
+    texts do."""
+    misfit: str = ""
+    """Why the two cannot be compared value by value: only one is there, or of another shape or type."""
+
+
+def holds_numbers(name: str) -> bool:
+    """Whether a file of this name is one that can be compared."""
+    return Path(name).suffix in _READERS
+
+
+def compared(then: Path, now: Path) -> list[Compared]:
+    """Every variable of a file beside the same one of another file.
+
+    Raises:
+        InputError: one cannot be read.
+    """
+    before, after = variables(then), variables(now)
+    lone = [(name, one.size, "not there now") for name, one in before.items() if name not in after]
+    lone += [(name, one.size, "not there then") for name, one in after.items() if name not in before]
+    return [
+        *(_beside(name, one, after[name]) for name, one in before.items() if name in after),
+        *(Compared(name, size, size, None, misfit) for name, size, misfit in lone),
+    ]
+
+
+def variables(path: Path) -> dict[str, np.ndarray]:
+    """All that a NetCDF, JSON or TOML file holds, by name.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return _READERS[path.suffix](path)
+
+
+def _beside(name: str, then: np.ndarray, now: np.ndarray) -> Compared:
+    for what, before, after in (("shape", then.shape, now.shape), ("type", then.dtype, now.dtype)):
+        if before != after:
+            return Compared(name, then.size, then.size, None, f"{what} {before} then, {after} now")
+    unlike = _unlike(then.ravel(), now.ravel())
+    pairs = list(zip(then.ravel()[unlike], now.ravel()[unlike], strict=True))
+    distances = [_distance(*pair) for pair in pairs if all(isinstance(one, int | float | np.number) for one in pair)]
+    return Compared(name, then.size, len(pairs), max(distances, default=None))
+
+
+def _unlike(then: np.ndarray, now: np.ndarray) -> np.ndarray:
+    """Which values of two rows of one type differ in any bit."""
+    if then.dtype == object:  # texts, or numbers of JSON, whose digits say every bit
+        return np.array([repr(a) != repr(b) for a, b in zip(then, now, strict=True)], dtype=bool)
+    before, after = (np.ascontiguousarray(one).view(np.uint8).reshape(one.size, one.itemsize) for one in (then, now))
+    return np.any(before != after, axis=1)
+
+
+def _distance(a: Any, b: Any) -> float:
+    """Between two numbers whose bits differ: 0.0 of both zeros, infinite where one alone is finite."""
+    distance = abs(float(a) - float(b))
+    return distance if np.isfinite(distance) else 0.0 if np.isnan(a) and np.isnan(b) else np.inf
+
+
+def _of_netcdf(path: Path) -> dict[str, np.ndarray]:
+    """Variables, and the attributes as one; with the seal or without it, since a number may have been changed."""
+    with opened(path) as file:
+        content = file.read()
+    data = netcdf.decode(unsealed(content) or content, f"{path} cannot be read as NetCDF")
+    attributes = [f"{key} = {value!r}" for key, value in sorted(data.attrs.items())]
+    found = {str(name): one.values for name, one in data.variables.items()}
+    texts = {name: one.astype(object) for name, one in found.items() if one.dtype.kind not in "biuf"}
+    return found | texts | {ATTRIBUTES: np.array(attributes, dtype=object)}
+
+
+def _of_json(path: Path) -> dict[str, np.ndarray]:
+    try:
+        return _gathered(json.loads(read_text(path, 100_000_000)))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} cannot be read as JSON: {error}") from None
+
+
+def _of_toml(path: Path) -> dict[str, np.ndarray]:
+    return _gathered(read_toml(path))
+
+
+def _gathered(table: Any) -> dict[str, np.ndarray]:
+    """Values of nested dictionaries and lists by the keys that lead to them."""
+    found: dict[str, list[Any]] = {}
+    for keys, value in _leaves(table):
+        found.setdefault(".".join(keys), []).append(value)
+    return {name: np.array(values, dtype=object) for name, values in found.items()}
+
+
+def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield from _leaves(one, *keys, key)
+    elif isinstance(value, list):
+        for one in value:
+            yield from _leaves(one, *keys)
+    else:
+        yield keys, math.nan if value is None else value  # what JSON has for numbers that are not finite
+
+
+_READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": _of_toml}
+"""End of a file's name -> what reads it."""

@@ -1,0 +1,266 @@
+"""`hexmj rerun`: a result is made again from its manifest, and what is not equal to the last bit has its reasons."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from hexmj import netcdf
+from hexmj.cli.words import deciding, files
+from hexmj.files import sealed, write_whole
+from hexmj.paper.protocol import QUICK
+from hexmj.results import save_dataset
+from hexmj.same_numbers import Compared, compared
+from hexmj.sweeps.plain import digest
+from hexmj.timing import Acceleration
+
+FLSS = ("flss", "--velocities", "0.5", "--starts", "40", "--window", "start")
+
+COMMANDS = {
+    "flss": FLSS,
+    "walk": ("walk", "--physical", "--velocity", "0.5", "--window", "10"),
+    "search": (
+        *("search", "--form", "hws", "--starts", "20", "--window", "start", "--budget", "20"),
+        *("--refine-starts", "20", "--refine-budget", "4", "--verdict-starts", "20"),
+    ),
+    "compare": ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "3", "--window", "10", "--no-video"),
+}
+
+MINE = """
+from dataclasses import dataclass
+from hexmj.controllers import Step, stepwise
+
+@dataclass(frozen=True)
+class Drags:
+    name: str = "drags"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        x = starts.copy()
+
+        def step(v):
+            x[:] = x + 1.0 * (stride.pep_min - x) * stride.dt
+            return Step(x, x > -15.0)
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Where results are copied from."""
+    return tmp_path_factory.mktemp("made")
+
+
+@pytest.fixture
+def flss(run, made, tmp_path) -> Path:
+    """A result of its own, which a test may change."""
+    if not (made / "flss").exists():
+        assert run(*FLSS, "--out", made / "flss")[0] == 0
+    return Path(shutil.copytree(made / "flss", tmp_path / "flss"))
+
+
+def edit(path: Path, **changed: object) -> None:
+    told = json.loads(path.read_text())
+    path.write_text(json.dumps(told | changed))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_result_made_again_is_equal_to_the_last_bit(run, tmp_path, name):
+    workers = ["--threads", 1, "--json"]
+    assert run(*COMMANDS[name], *workers, "--out", tmp_path / "out")[0] == 0
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert manifest["command"] == list(COMMANDS[name])
+    assert str(tmp_path) not in json.dumps(manifest)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+    code, text, _ = run("rerun", tmp_path / "out", *(["--processes", 1] if name == "compare" else ["--threads", 2]))
+    told = " ".join(text.split())
+    assert code == 0, text
+    assert "values are equal to the last bit" in told and "although" not in told
+    assert all(file in text for file in manifest["files"])
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+
+
+def test_the_paper_recomputed(run, tmp_path, monkeypatch):
+    few = replace(QUICK, samples=1, sample=5, velocities=(0.3,), acceleration=Acceleration(rate=0.001))
+    monkeypatch.setattr("hexmj.paper.protocol.QUICK", few)
+    assert run("reproduce", "--quick", "--only", "ldvs-accelerated", "--out", tmp_path)[0] == 0
+    code, text, _ = run("rerun", tmp_path, "--json")
+    assert code == 0
+    (result,) = json.loads(text)["results"]
+    assert result["files"]["claims.md"] == "not compared"
+    assert {"claims.ours.walk.value", "claims.ours.start.low"} <= {
+        one["name"] for one in result["files"]["claims.json"]
+    }
+
+
+def test_a_number_that_was_changed_is_found_and_named(run, flss):
+    data = xr.load_dataset(flss / "flss.nc")
+    data.high.values[0] += 1e-9
+    write_whole(flss / "flss.nc", sealed(netcdf.encode(data)))
+    code, text, _ = run("rerun", flss)
+    told = " ".join(text.split())
+    assert code == 1
+    assert "high 1 1 differ, by at most 1e-09" in told
+    assert "low 1 equal" in told
+    assert "1 of 14 values differ; what else differs, and may be why: changed since they were written (flss.nc)" in told
+    code, text, _ = run("rerun", flss / "manifest.json", "--json")
+    answer = json.loads(text)
+    (result,) = answer["results"]
+    (high,) = [one for one in result["files"]["flss.nc"] if one["differ"]]
+    assert (code, answer["equal"], high["name"], high["values"]) == (1, False, "high", 1)
+    assert high["most"] == pytest.approx(1e-9)
+    assert result["files"]["flss.png"] == "not compared"
+    assert result["differs"] == {"files": ["flss.nc"]}
+
+
+def test_where_the_manifest_knows_no_reason_it_says_so(run, flss):
+    data = xr.load_dataset(flss / "flss.nc")
+    data.flss.values[:] = 2.0
+    write_whole(flss / "flss.nc", sealed(netcdf.encode(data)))
+    edit(flss / "manifest.json", files={"flss.nc": digest((flss / "flss.nc").read_bytes())})
+    code, text, _ = run("rerun", flss)
+    assert code == 1
+    assert "nothing that the manifest knows of differs" in " ".join(text.split())
+
+
+def test_what_differs_is_named_even_where_all_numbers_are_equal(run, flss):
+    path = flss / "manifest.json"
+    manifest = json.loads(path.read_text())
+    assert {"python", "hexmj", "numpy", "numba", "mujoco"} <= set(manifest["versions"])
+    edit(
+        path,
+        versions=manifest["versions"] | {"numba": "0.1"},
+        code={name: one for name, one in manifest["code"].items() if name != "hexmj.walks"},
+        processor=[*manifest["processor"], "AVX1024"],
+        settings=manifest["settings"] | {"seed": 7},
+    )
+    code, text, _ = run("rerun", flss)
+    told = " ".join(text.split())
+    assert code == 0
+    numba = manifest["versions"]["numba"]
+    assert f"although not all is as it was: versions (numba 0.1, now {numba}), code (hexmj.walks)" in told
+    assert "processor (AVX1024 then, not now), settings (seed)" in told
+
+
+def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(MINE)
+    Path("fields.toml").write_text('controller = "mine.py:Drags"\n[fields]\nname = "other"\n')
+    words = ["flss", "--model", "fields.toml", "--velocities", 0.5, "--starts", 20, "--window", 30, "--physical"]
+    code, _, error = run(*words, "--out", "out")
+    assert code == 0, error
+    assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"mine.py", "fields.toml"}
+    assert run("rerun", "out")[0] == 0
+    Path("mine.py").write_text(MINE.replace("1.0 *", "0.5 *"))
+    code, text, _ = run("rerun", "out")
+    told = " ".join(text.split())
+    assert code == 1
+    assert "what else differs, and may be why: your files (mine.py)" in told
+    Path("mine.py").unlink()
+    code, _, error = run("rerun", "out")
+    assert code == 2
+    assert "mine.py, with which out/manifest.json was made, is no file here; expected to run where" in error
+
+
+def test_a_folder_means_all_its_manifests(run, flss):
+    shutil.copy(flss / "manifest.json", flss / "vp-manifest.json")
+    code, text, _ = run("rerun", flss, "--json")
+    assert code == 0
+    assert [Path(one["manifest"]).name for one in json.loads(text)["results"]] == ["manifest.json", "vp-manifest.json"]
+
+
+OLD = {"settings": {"seed": 0}, "versions": {"numpy": "2.4.6"}, "machine": "x86_64"}
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("{", "cannot be read as JSON"),
+        ("[" * 100_000, "cannot be read as JSON"),
+        ("\udcff", "is no text in UTF-8"),
+        ("[1]", "is no manifest; expected one that a hexmj command wrote"),
+        (json.dumps(OLD), "has format 1; expected 2: make the result anew with this version"),
+        (json.dumps(OLD | {"format": 3}), "has format 3; expected 2"),
+        ({"command": "flss"}, "command = 'flss'; expected list[str]"),
+        ({"command": []}, "names no command"),
+        ({"code": {"hexmj": 1}}, "code = {'hexmj': 1}; expected dict[str, str]"),
+        ({"command": ["dance"]}, "this version cannot run hexmj dance"),
+        ({"command": ["flss", "--help"]}, "this version cannot run hexmj flss --help"),
+        ({"command": ["doctor"]}, "this version cannot run hexmj doctor"),
+        ({"command": ["rerun", "."]}, "this version cannot run hexmj rerun ."),
+        ({"files": {"flss.png": ""}}, "names no file with numbers"),
+        ({"files": {"flss.nc": "", "more.nc": ""}}, "names more.nc, which is not beside it"),
+    ],
+)
+def test_a_manifest_that_makes_no_sense_gets_a_sentence(run, flss, content, sentence):
+    path = flss / "manifest.json"
+    if isinstance(content, dict):
+        edit(path, **content)
+    else:
+        path.write_bytes(content.encode(errors="surrogateescape"))
+    code, out, error = run("rerun", flss)
+    assert (code, out) == (2, "")
+    assert sentence in error.splitlines()[-1]
+
+
+def test_no_manifest_gets_a_sentence(run, tmp_path):
+    assert "holds no manifest.json" in run("rerun", tmp_path)[2]
+    assert "nowhere cannot be read: No such file" in run("rerun", tmp_path / "nowhere")[2]
+
+
+def test_a_result_that_cannot_be_read_gets_a_sentence(run, flss):
+    (flss / "flss.nc").write_text("nothing")
+    code, _, error = run("rerun", flss)
+    assert code == 2
+    assert "flss.nc cannot be read as NetCDF" in error
+
+
+def test_words_that_decide_nothing_are_left_out(tmp_path, monkeypatch):
+    words = ["compare", "--out", "there", "--models", "a", "--json", "--threads=2", "--velocities", "0.1", "0.2"]
+    words += ["--processes", "3", "--out=x"]
+    assert deciding(words) == ["compare", "--models", "a", "--velocities", "0.1", "0.2"]
+    assert deciding(["walk", "--out"]) == ["walk"]
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine.py", "weights.toml", "a.nc"):
+        Path(name).write_text("")
+    assert files(["render", "a.nc", "--model=mine.py:X", "--beside", "weights.toml"]) == [
+        *map(Path, ("a.nc", "mine.py", "weights.toml"))
+    ]
+
+
+def test_every_bit_counts(tmp_path):
+    """Zeros of both signs differ, not-a-number is itself, and infinity is far from everything."""
+    nan, inf = np.nan, np.inf
+    old = {"x": [0.0, nan, inf, 1.0, 2.0], "n": [1, 2, 3, 4, 5], "t": list("abcde"), "b": [True] * 5, "gone": [0] * 5}
+    new = {"x": [-0.0, nan, inf, 1.5, inf], "n": [1, 2, 3, 4, 7], "t": list("abcdx"), "b": [True] * 5, "came": [0] * 5}
+    for name, values in (("old", old), ("new", new)):
+        data = xr.Dataset({key: ("i", one) for key, one in values.items()})
+        save_dataset(data.assign_attrs(seed=len(name)), tmp_path / f"{name}.nc")
+    assert sorted(compared(tmp_path / "old.nc", tmp_path / "new.nc"), key=lambda one: one.name) == [
+        Compared("(attributes)", 1, 0, None),
+        Compared("b", 5, 0, None),
+        Compared("came", 5, 5, None, "not there then"),
+        Compared("gone", 5, 5, None, "not there now"),
+        Compared("n", 5, 1, 2.0),
+        Compared("t", 5, 1, None),
+        Compared("x", 5, 3, inf),
+    ]
+
+
+def test_json_and_toml_are_compared_by_their_keys(tmp_path):
+    (tmp_path / "old.json").write_text('{"claims": [{"key": "a", "value": 1.0}, {"key": "b", "value": null}], "n": 1}')
+    (tmp_path / "new.json").write_text('{"claims": [{"key": "a", "value": 1.25}, {"key": "b", "value": 2}], "n": 1.0}')
+    assert compared(tmp_path / "old.json", tmp_path / "new.json") == [
+        Compared("claims.key", 2, 0, None),
+        Compared("claims.value", 2, 2, np.inf),
+        Compared("n", 1, 1, 0.0),
+    ]
+    (tmp_path / "old.toml").write_text("[weights]\na = 0.1\nb = [1, 2]\n")
+    (tmp_path / "new.toml").write_text("[weights]\na = 0.10000000000000002\nb = [1]\n")
+    a, b = compared(tmp_path / "old.toml", tmp_path / "new.toml")
+    assert (a.differ, a.most) == (1, pytest.approx(1.4e-17, rel=0.1))
+    assert (b.differ, b.misfit) == (2, "shape (2,) then, (1,) now")
