@@ -15,11 +15,14 @@ from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
-from hexmj.legs import CENTRED, FIG1, MIRROR
+from hexmj.legs import CENTRED, FIG1, MIRROR, Geometry
 from hexmj.measures.kinematic import first_loss, walk
+from hexmj.stability import walk_margin
 from hexmj.timing import Acceleration, Stride
 
 STRIDE = Stride()
+NEAR = Geometry(origins=(7.0, 2.0, -4.0), lateral=(10.0, 25.0, 16.0))
+"""Legs so near each other that tips pass those ahead of them, and any one may be the foremost."""
 
 
 def random_weights(rng: np.random.Generator) -> Weights:
@@ -41,7 +44,7 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
     size=st.sampled_from([1, 2, LANES - 1, LANES, LANES + 3]),
     threads=st.sampled_from([1, 2, 3]),
     order=st.sampled_from(["printed", "undelayed", "sequential"]),
-    geometry=st.sampled_from([FIG1, CENTRED]),
+    geometry=st.sampled_from([FIG1, CENTRED, NEAR]),
     velocity=st.floats(0.0, 0.99),
     rate=st.one_of(st.none(), st.floats(1e-5, 0.02)),
 )
@@ -63,6 +66,28 @@ def test_equals_plain_network_to_the_last_bit(seed, size, threads, order, geomet
         assert lost[i] == ((unstable[0] + 1) * stride.dt if unstable else np.inf)
 
 
+@pytest.mark.parametrize("geometry", [FIG1, NEAR])
+def test_any_posture_is_stable_where_its_plain_form_is(geometry):
+    """Legs stand and swing at random, and a step at V_r = 0 hardly moves them."""
+    rng, size, stride = np.random.default_rng(10), 1500, Stride(geometry=geometry)
+    tips, standing = random_starts(rng, size), rng.random((size, 6)) < 0.6
+    plan = UNCOORDINATED.begin(tips, np.zeros(size), stride)
+    plan.see(tips, standing)
+    lost, now = plan.first_losses_after(0, 1), zip(plan.tips.tolist(), plan.standing.tolist(), strict=True)
+    assert np.array_equal(lost, [0.0 if plain.stable(x, s, stride) else 1.0 for x, s in now])
+    assert plan.done == 1
+    assert 0 < (lost > 0).sum() < size
+
+
+@pytest.mark.parametrize("unseen", [0, 1, 40])
+def test_losses_that_are_not_seen_do_not_count(unseen):
+    starts, seen = random_starts(np.random.default_rng(11), LANES + 7), 100
+    lost = UNCOORDINATED.begin(starts, np.full(len(starts), 0.5), STRIDE).first_losses_after(unseen, seen)
+    unstable = walk_margin(walk(starts, UNCOORDINATED, 0.5, 0.1 * (unseen + seen)))[unseen:] <= 0.0
+    assert np.array_equal(lost, np.where(unstable.any(axis=0), unseen + 1 + np.argmax(unstable, axis=0), 0))
+    assert (lost > 0).any()
+
+
 @pytest.mark.parametrize("controller", [HWS, LDVS])
 def test_published_sets_equal_plain_network(controller):
     starts = random_starts(np.random.default_rng(1), 2)
@@ -77,10 +102,11 @@ def test_does_not_depend_on_threads_batch_or_neighbours_in_the_batch():
     starts = random_starts(np.random.default_rng(2), 3 * LANES + 5)
     whole = walk(starts, LDVS, 0.4, 60.0, threads=1)
     threaded = walk(starts, LDVS, 0.4, 60.0, threads=2)
-    part = walk(starts[70:101], LDVS, 0.4, 60.0)
+    some = slice(LANES + 1, 3 * LANES + 2)
+    part = walk(starts[some], LDVS, 0.4, 60.0)
     assert np.array_equal(whole.x, threaded.x)
-    assert np.array_equal(whole.x[:, 70:101], part.x)
-    assert np.array_equal(whole.stance[:, 70:101], part.stance)
+    assert np.array_equal(whole.x[:, some], part.x)
+    assert np.array_equal(whole.stance[:, some], part.stance)
 
 
 def test_does_not_depend_on_the_number_of_lanes(tmp_path, monkeypatch):

@@ -82,6 +82,20 @@ def test_few_feet_are_never_stable():
     assert len(support_polygon(feet, two)) == 2
 
 
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.sampled_from([0.0, 2.0]))
+def test_feet_in_a_line_are_never_stable(seed, standing, beside):
+    """They have no polygon, and the margin is the distance to the nearest point of their line."""
+    rng = np.random.default_rng(seed)
+    along, angle = rng.integers(-20, 20, 6), rng.integers(4) * np.pi / 2
+    turn = np.round([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    feet, stance = np.stack([along, np.full(6, beside)], axis=1) @ turn, np.arange(6) < standing
+    first, last = along[stance].min(), along[stance].max()
+    off = max(first, -last, 0)
+    assert stability_margin(feet, stance) == pytest.approx(-np.hypot(off, beside))
+    assert np.array_equal(support_polygon(feet, stance), feet[stance])
+
+
 def test_feet_in_one_place():
     corners = np.array([[10.0, 10.0], [10.0, -10.0], [-10.0, -10.0], [-10.0, 10.0], [10.0, 10.0], [0.0, 1.0]])
     assert stability_margin(corners, np.ones(6, dtype=bool)) == pytest.approx(10.0)
