@@ -1,4 +1,4 @@
-"""The words behind `hexmj`: which can be read, which decide what comes of a command, what files and modules they name."""
+"""The words behind `hexmj`: which can be read, which decide what comes of a command, and what files they name."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
