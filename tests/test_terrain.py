@@ -191,7 +191,7 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
         ({"grounds": ("gap",), "lengths": (0.0,)}, "ground_length = 0.0; expected above 0"),
         (
             {"grounds": ("rough",), "heights": (9.0,)},
-            "ground_height = 9.0; expected above 0 and at most 8 mm where rough",
+            "ground_height = 9.0; expected 0.1 to 8 mm where rough",
         ),
         ({"grounds": ("flat",)}, "'flat' is none of step, gap, hurdle, rough"),
         ({"grasps": (-1.0,)}, "grasp = -1.0; expected 0 to 100"),
