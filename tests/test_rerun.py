@@ -85,16 +85,14 @@ def test_a_result_made_again_is_equal_to_the_last_bit(run, tmp_path, name):
 
 
 def test_the_paper_recomputed(run, tmp_path, monkeypatch):
-    few = replace(QUICK, samples=1, sample=5, velocities=(0.3,), acceleration=Acceleration(rate=0.001))
+    few = replace(QUICK, samples=1, sample=5, velocities=(0.1, 0.9), acceleration=Acceleration(rate=0.001))
     monkeypatch.setattr("hexmj.paper.protocol.QUICK", few)
     assert run("reproduce", "--quick", "--only", "ldvs-accelerated", "--out", tmp_path)[0] == 0
     code, text, _ = run("rerun", tmp_path, "--json")
     assert code == 0
     (result,) = json.loads(text)["results"]
     assert result["files"]["claims.md"] == "not compared"
-    assert {"claims.ours.walk.value", "claims.ours.start.low"} <= {
-        one["name"] for one in result["files"]["claims.json"]
-    }
+    assert "claims.ours.walk.value" in {one["name"] for one in result["files"]["claims.json"]}
 
 
 def test_a_number_that_was_changed_is_found_and_named(run, flss):
