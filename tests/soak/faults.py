@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 ERRORS = {"EIO": errno.EIO, "ENOSPC": errno.ENOSPC, "EROFS": errno.EROFS, "torn": errno.ENOSPC}
-"""What the system says; torn: after half of the bytes."""
+"""What the system says."""
 
-KINDS = "EIO", "ENOSPC", "torn", "short", "exit", "kill"
-"""Short: half of the bytes, and no error; exit: before the call; kill: SIGKILL after half of the bytes, or the call."""
+KINDS = "EIO", "torn", "short", "exit", "kill"
+"""Torn: a disk that is full after half of the bytes, and stays so; short: half of the bytes, and no error; exit: before
+the call; kill: SIGKILL after half of the bytes, or the call."""
 
 LEFT = 77
 """Exit code of a process that left."""

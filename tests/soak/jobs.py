@@ -113,11 +113,16 @@ def loses_a_process(folder: Path, **how: Any) -> None:
     run([Cell(f"{seed}", killed, {"seed": seed}) for seed in (0, 1)], folder / "walks", **how)
 
 
-def command(folder: Path) -> None:
+def command(folder: Path, *more: str) -> None:
     """The command, as from a terminal."""
     words = "compare", "--models", f"{__file__}:Counted", "--velocities", "0.3", "0.5", "--starts", "2"
-    sys.argv = ["hexmj", *words, "--window", "2", "--no-video", "--out", str(folder)]
+    sys.argv = ["hexmj", *words, "--window", "2", "--no-video", *more, "--out", str(folder)]
     main()
+
+
+def on_processes(folder: Path) -> None:
+    """The command, whose cells are computed by two processes."""
+    command(folder, "--processes", "2")
 
 
 @dataclass(frozen=True)
@@ -139,7 +144,8 @@ JOBS = {
     "physical on processes": Job(partial(pooled, physical), 2, "physical"),
     "physical search": Job(partial(searched, conditions=hexmj.Conditions())),
     "killed process": Job(partial(pooled, loses_a_process), like="sweep"),
-    "command": Job(command, 1, "physical"),
+    "command": Job(command),
+    "command on processes": Job(on_processes, 2, "command"),
 }
 
 

@@ -3,6 +3,7 @@
 A line of JSON on standard input is a task; one on standard output says how it ended.
 """
 
+import io
 import json
 import os
 import signal
@@ -46,7 +47,7 @@ def born(task: dict[str, Any]) -> dict[str, Any]:
     began = time.monotonic()
     if (child := os.fork()) == 0:
         os.setsid()
-        with told.open("w") as file, redirect_stderr(file), redirect_stdout(file):
+        with told.open("w") as file, open(os.devnull, "w") as printed, redirect_stderr(file), redirect_stdout(printed):
             code = live(**task)
         os._exit(code)
     if moment is not None:
@@ -70,7 +71,8 @@ def main() -> None:
         if job not in known:
             with TemporaryDirectory() as folder:
                 os.environ[LOG] = f"{folder}/log"
-                JOBS[job].work(Path(folder))
+                with redirect_stdout(io.StringIO()):
+                    JOBS[job].work(Path(folder))
             known.add(job)
         print(json.dumps(born(task)), flush=True)
 
