@@ -37,6 +37,18 @@ def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.nd
     return np.concatenate(list(draw_slabs(n_starts, seed, given("stride", stride, Stride))))
 
 
+def draw_start(start: int, seed: int, stride: Stride) -> np.ndarray:
+    """One of the starts of `draw_starts`, (1, leg) [mm], without those before it.
+
+    Raises:
+        InputError: a number or a seed that makes no sense.
+    """
+    start, seed = whole("start", start, 0, MOST_STARTS), whole("seed", seed, 0)
+    source = np.random.PCG64(seed)
+    source.advance(6 * start)  # a tip takes one step of it
+    return np.random.Generator(source).uniform(stride.pep0, stride.aep0, (1, 6))
+
+
 def draw_slabs(n_starts: int, seed: int, stride: Stride) -> Iterator[np.ndarray]:
     """The starts of `draw_starts`, (start, leg) [mm], `SLAB` at a time."""
     rng = np.random.default_rng(seed)

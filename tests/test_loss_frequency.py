@@ -8,7 +8,7 @@ from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
-from hexmj.starts import SLAB, draw_starts
+from hexmj.starts import SLAB, draw_start, draw_starts
 from hexmj.timing import Acceleration, Stride, observation_time
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]
@@ -52,6 +52,7 @@ def test_starts_lie_in_s_and_do_not_depend_on_their_number():
     assert starts.shape == (1000, 6)
     assert ((starts > -10) & (starts < 10)).all()
     assert np.array_equal(draw_starts(10, seed=3), starts[:10])
+    assert np.array_equal(draw_start(999, 3, Stride()), starts[999:])
     assert not np.array_equal(draw_starts(10, seed=4), starts[:10])
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError
 from hexmj.progress import progress_bar
 from hexmj.timing import observation_time
 
@@ -28,12 +27,10 @@ def recorded(
     from hexmj.measures.kinematic import walk
     from hexmj.measures.physical import physical_walk
     from hexmj.replay.recording import record, record_plan
-    from hexmj.starts import draw_starts
+    from hexmj.starts import draw_start
 
-    if start < 0:
-        raise InputError(f"start = {start}; expected at least 0")
     stride, acceleration = command.walks.stride, command.accelerating.procedure
-    starts = draw_starts(start + 1, command.walks.seed, stride)[start:]
+    starts = draw_start(start, command.walks.seed, stride)
     time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     if not physical:

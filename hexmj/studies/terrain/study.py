@@ -36,6 +36,10 @@ FARTHER = Conditions.of(ground_at=80.0)
 """Walks have found their gait before they come to an obstacle."""
 
 
+SIZED = {"heights": {"step", "hurdle", "rough"}, "lengths": {"gap"}}
+"""Name of a list of sizes -> the obstacles that have them."""
+
+
 @dataclass(frozen=True)
 class Terrain(SameStarts):
     """The same starts on flat ground and to every obstacle, with and without grasping feet, at every velocity."""
@@ -66,6 +70,9 @@ class Terrain(SameStarts):
         valid = get_args(ObstacleKind)
         if wrong := [one for one in self.grounds if one not in valid]:
             raise InputError(f"grounds = {list(self.grounds)}; {wrong[0]!r} is none of {', '.join(valid)}")
+        for name, grounds in SIZED.items():
+            if not grounds & {*self.grounds} and [*getattr(self, name)] != [*getattr(Terrain, name)]:
+                raise InputError(f"{name} = {getattr(self, name)}; only {', '.join(sorted(grounds))} have them")
         for grasp in self.grasps:
             self.conditions.but(grasp=grasp)
         _ = self.obstacles
