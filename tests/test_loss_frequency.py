@@ -78,6 +78,13 @@ def test_samples_of_the_protocol():
     assert np.isnan(flss(LDVS, [0.5], n_starts=100, window="start").sample_sd.item())
 
 
+def test_progress_is_the_share_of_starts_and_velocities(monkeypatch):
+    monkeypatch.setattr("hexmj.starts.SLAB", 1000)
+    told: list[float] = []
+    flss(UNCOORDINATED, [0.9, 0.95], n_starts=1500, window=0.1, progress=told.append)
+    assert told == pytest.approx([1 / 3, 1 / 3, 1 / 6, 1 / 6])
+
+
 def test_slabs_are_one_stream():
     """More starts than a slab holds are those of one draw, and so is their measure."""
     size = SLAB + 1500
