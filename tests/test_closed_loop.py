@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import hexmj
 from hexmj.controllers.protocol import Sensed
@@ -10,9 +10,10 @@ from hexmj.controllers.reads_legs import SensedPlan
 from hexmj.environments import dm
 from hexmj.legs import MIRROR
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
-from hexmj.physics.drive import Push
+from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
+from hexmj.rotations import heading, rotated, turned
 
 LDVS, UNCOORDINATED = hexmj.LDVS, hexmj.UNCOORDINATED
 READING = hexmj.ReadsLegs(LDVS)
@@ -33,6 +34,47 @@ def test_fed_back_its_own_plan_it_is_the_open_loop(settled, monkeypatch):
     """Bit for bit, plan and body: reading nothing else, targets at +-dt and steps one by one change nothing."""
     monkeypatch.setattr(SensedPlan, "sense", lambda *_: None)
     assert same(physical_outcomes(settled, READING, 0.5, 40.0), physical_outcomes(settled, LDVS, 0.5, 40.0))
+
+
+def test_what_a_plan_is_told_is_what_the_chunks_show(settled, monkeypatch):
+    """Before each step: angles and motion of now, forces and contacts of the physics step before."""
+    told: list[Sensed] = []
+    monkeypatch.setattr(SensedPlan, "sense", lambda _, sensed: told.append(sensed))
+    plan = READING.begin(settled.starts, np.full(12, 0.7), STRIDE)
+    chunks = list(drive(settled, plan, 40.0))
+    columns, m = settled.compiled.columns, settled.substeps
+    fell = np.isin(np.arange(12), np.concatenate([one.ids[one.fell] for one in chunks]))
+    assert 0 < fell.sum() < 12
+    steps, ids = slice(m, 400 * m, m), np.flatnonzero(~fell)
+    qpos, sensors, standing, force = (
+        np.concatenate([getattr(one, name)[np.isin(one.ids, ids)] for one in chunks], axis=1)
+        for name in ("qpos", "sensors", "standing", "force")
+    )
+
+    def heard(name: str) -> np.ndarray:
+        """(start, step, ...), what is said before the first step left out."""
+        return np.stack([getattr(one, name)[np.isin(one.ids, ids)] for one in told[1:]], axis=1)
+
+    now, before = qpos[:, steps], slice(m - 1, 400 * m - 1, m)
+    joints, contact = heard("joints"), heard("contact")
+    assert_array_equal(joints.reshape(*joints.shape[:2], -1), now[..., columns.qpos])
+    assert_array_equal(contact, standing[:, before])
+    assert_array_equal(heard("load"), sensors[:, before, columns.touch])
+    assert_array_equal(heard("torques").reshape((*joints.shape[:2], -1)), force[:, before])
+    assert_allclose(heard("tips"), settled.compiled.forward(joints))
+    leans = [-rotated(now[..., 3:7], axis)[..., 2] for axis in np.eye(3)[:2]]
+    assert_allclose(np.sin(heard("tilt")), np.stack(leans, axis=-1), atol=1e-12)
+    moved = np.diff(qpos[..., :3], axis=1)[:, before] / settled.compiled.model.opt.timestep
+    ahead = turned(moved[:, :, None, :2], -heading(now[..., 3:7]))[:, :, 0]
+    assert np.median(np.abs(heard("velocity")[..., :2] - ahead)) < 1e-6  # all but steps in parts
+    assert np.median(np.abs(heard("velocity")[..., 2] - moved[..., 2])) < 1e-6
+    earlier = np.concatenate([np.ones_like(contact[:, :1]), contact[:, :-1]], axis=1)
+    assert_array_equal(heard("gained"), contact & ~earlier)
+    assert_array_equal(heard("lost"), earlier & ~contact)
+    assert heard("gained").any()
+    assert told[0].contact.all()
+    assert_array_equal(told[0].load, settled.load)
+    assert_array_equal(told[0].torques.reshape(12, -1), settled.torques)
 
 
 def test_feedback_is_felt(settled):

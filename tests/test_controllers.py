@@ -76,6 +76,25 @@ def test_a_foreign_controller_has_the_same_losses_whatever_is_held_at_a_time(mon
     assert hexmj.flss(Own(), [0.5], n_starts=50).equals(hexmj.flss(LDVS, [0.5], n_starts=50))
 
 
+def test_a_centre_of_mass_on_the_edge_is_lost():
+    """From the third step on L2 and R2, the last that stand, are exactly beside O; then they may be anywhere."""
+
+    def on_the_edge(walk: PlannedWalk, done: int) -> dict[str, Any]:
+        middle = {3: -4.0}.get(done, -5.0)
+        return {"x": np.array([0.0, middle, 0.0, 0.0, middle, 0.0]), "stance": np.array(2 * [True, True, False])}
+
+    plan = Own(on_the_edge).begin(np.zeros((2, 6)), np.zeros(2), STRIDE)
+    assert np.array_equal(planned_losses(plan, np.array([9, 2])), [3, 0])
+
+
+@pytest.mark.parametrize("steps", [(-1, 0), (0, 11), (0,), (0, np.nan)])
+def test_losses_that_make_no_sense_are_refused(steps, monkeypatch):
+    plan = LDVS.begin(np.zeros((2, 6)), np.full(2, 0.5), STRIDE)
+    monkeypatch.setattr(plan, "first_losses", lambda _: np.array(steps))
+    with pytest.raises(hexmj.InputError, match="expected a step from 0 on for each start"):
+        first_losses(plan, np.array(10))
+
+
 @pytest.fixture(scope="module")
 def settled():
     return settle(hexmj.draw_starts(2, 0))

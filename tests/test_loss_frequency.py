@@ -70,13 +70,21 @@ def test_threads_do_not_matter():
     assert one.equals(two)
 
 
-def test_samples_of_the_protocol():
-    table = flss(LDVS, [0.5], n_starts=3000, window="start")
-    times = first_loss(draw_starts(3000, 0), LDVS, 0.5, 40.0)
-    lost = np.isfinite(times).reshape(3, 1000).mean(axis=1)
+@pytest.mark.parametrize("samples", [2, 3])
+def test_samples_of_the_protocol(samples):
+    table = flss(LDVS, [0.5], n_starts=1000 * samples, window="start")
+    times = first_loss(draw_starts(1000 * samples, 0), LDVS, 0.5, 40.0)
+    lost = np.isfinite(times).reshape(samples, 1000).mean(axis=1)
     assert table.sample_sd.item() == pytest.approx(lost.std(ddof=1))
     assert table.flss.item() == pytest.approx(lost.mean())
     assert np.isnan(flss(LDVS, [0.5], n_starts=100, window="start").sample_sd.item())
+
+
+def test_progress_is_the_share_of_starts_and_velocities(monkeypatch):
+    monkeypatch.setattr("hexmj.starts.SLAB", 1000)
+    told: list[float] = []
+    flss(UNCOORDINATED, [0.9, 0.95], n_starts=1500, window=0.1, progress=told.append)
+    assert told == pytest.approx([1 / 3, 1 / 3, 1 / 6, 1 / 6])
 
 
 def test_slabs_are_one_stream():
@@ -127,7 +135,17 @@ def test_nonsense_gets_a_clear_sentence(change, words):
         flss(LDVS, **arguments)
 
 
-@pytest.mark.parametrize(("change", "words"), [({"seed": -1}, "seed = -1"), ({"n_starts": 0}, "at least 1")])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seed": -1}, "seed = -1"),
+        ({"n_starts": 0}, "at least 1"),
+        ({"low": -0.5}, "velocity range -0.5 to 0.5; expected 0 <= low <= high < 1"),
+        ({"high": 0.05}, "velocity range 0.1 to 0.05"),
+        ({"high": 1.0}, "velocity range 0.1 to 1.0"),
+    ],
+)
 def test_nonsense_for_a_range_gets_a_clear_sentence(change, words):
+    arguments = {"low": 0.1, "high": 0.5, "n_starts": 10} | change
     with pytest.raises(InputError, match=words):
-        flss_over_range(LDVS, 0.1, 0.5, **change)
+        flss_over_range(LDVS, **arguments)

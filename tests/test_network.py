@@ -79,6 +79,16 @@ def test_any_posture_is_stable_where_its_plain_form_is(geometry):
     assert 0 < (lost > 0).sum() < size
 
 
+def test_a_centre_of_mass_on_the_edge_is_not_stable():
+    """L2 and R2 exactly beside O are the rear or the front edge; half a millimetre back or ahead, they hold it."""
+    ahead, behind = np.array(2 * [True, True, False]), np.array(2 * [False, True, True])
+    tips, standing = np.zeros((4, 6)), np.array([ahead, ahead, behind, behind])
+    tips[:, [1, 4]] = np.array([-4.0, -4.5, -4.0, -3.5])[:, np.newaxis]
+    plan = UNCOORDINATED.begin(tips, np.zeros(4), STRIDE)
+    plan.see(tips, standing)
+    assert np.array_equal(plan.first_losses_after(0, 1), [1, 0, 1, 0])
+
+
 @pytest.mark.parametrize("unseen", [0, 1, 40])
 def test_losses_that_are_not_seen_do_not_count(unseen):
     starts, seen = random_starts(np.random.default_rng(11), LANES + 7), 100

@@ -12,7 +12,7 @@ from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
-from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import physical_flss
 from hexmj.measures.physical import physical_outcomes, physical_walk
@@ -20,7 +20,8 @@ from hexmj.physics.backend import STATE
 from hexmj.physics.drive import drive
 from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.settling import Settled, settle
-from hexmj.rotations import rotated
+from hexmj.rotations import heading, rotated, turned
+from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 
 MM, G = 1e-3, 1e-3  # in m and kg
@@ -200,6 +201,57 @@ def test_tracking_is_a_percentile_and_depth_the_most_of_all_feet():
     assert_allclose(outcomes.tracking, whole, atol=0.011)
     assert_array_equal(outcomes.depth, deepest)
     assert (shown <= deepest).all()
+
+
+@pytest.mark.parametrize(
+    ("controller", "velocity", "vp"), [(LDVS, 0.5, 400.0), (UNCOORDINATED, 0.7, 80.0), (LDVS, 0.01, 80.0)]
+)
+def test_outcomes_are_what_the_chunks_show(controller, velocity, vp):
+    """Whole walks and plain arrays instead of sums; falls, a slow walk that commands 0.3 mm, one substep a step."""
+    settled, duration = settle(draw_starts(6, 0), Conditions.of(vp=vp)), 30.0
+    compiled, m, dt = settled.compiled, settled.substeps, settled.stride.dt
+    outcomes = physical_outcomes(settled, controller, velocity, duration)
+    walked = physical_walk(settled.starts, controller, velocity, duration, conditions=settled.conditions)
+    chunks = list(drive(settled, begin(controller, settled.starts, velocity, settled.stride), duration))
+    (corners, radii), columns = compiled.trunk_corners, compiled.columns
+    for start in range(6):
+        rows = [(one, int(np.flatnonzero(one.ids == start)[0])) for one in chunks if start in one.ids]
+        fell = rows[-1][0].fell[rows[-1][1]]
+        until = [one.valid[row] for one, row in rows]
+        qpos, sensors, force, depth = (
+            [getattr(one, name)[row, :valid] for (one, row), valid in zip(rows, until, strict=True)]
+            for name in ("qpos", "sensors", "force", "depth")
+        )
+        slid, contacts = 0.0, 0
+        for one in sensors:  # from substep to substep of a chunk
+            feet, touch = one[:, columns.foot].reshape(-1, 6, 3), one[:, columns.touch] > 0
+            both = touch[1:] & touch[:-1]
+            slid += np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1)[both].sum()
+            contacts += both.sum()
+        q, shown, torques = np.concatenate(qpos), np.concatenate(sensors), np.abs(np.concatenate(force))
+        lowest = q[:, None, 2] + rotated(q[:, None, 3:7], corners)[..., 2] - radii
+        upright = rotated(q[:, 3:7], np.array([0.0, 0.0, 1.0]))[:, 2]
+        taken = len(q) - 1 if fell else round(duration / dt) * m
+        assert outcomes.clearance[start] == pytest.approx(lowest.min())
+        assert outcomes.tilt[start] == pytest.approx(np.arccos(upright.min()))
+        assert outcomes.slip[start] == pytest.approx(slid / contacts / compiled.model.opt.timestep)
+        assert outcomes.saturation[start] == (torques >= 0.999 * compiled.torque_limits).mean()
+        assert outcomes.depth[start] == max(0.0, np.concatenate(depth)[: len(q) - fell].max())
+        assert outcomes.speed[start] == pytest.approx((q[-1, 0] - settled.qpos[start, 0]) / (velocity * dt * taken / m))
+        assert outcomes.fall[start] == (pytest.approx(taken / m * dt) if fell else np.inf)
+        trunk = shown[-1, columns.trunk] > 0
+        assert outcomes.fall_part[start] == (np.argmax(trunk) if fell else -1)
+        steps, centre = slice(m, None, m), shown[:, columns.centre_of_mass]
+        feet = shown[:, columns.foot].reshape(-1, 6, 3) - centre[:, None]
+        seen = turned(feet[..., :2], -heading(q[:, 3:7]))[steps]
+        known = slice(len(seen))
+        assert_allclose(walked.centre_of_mass[known, start], centre[steps])
+        assert_allclose(walked.measured.feet[known, start], seen, atol=1e-9)
+        standing = np.concatenate([one.standing[row, :valid] for (one, row), valid in zip(rows, until, strict=True)])
+        assert_array_equal(walked.measured.stance[known, start], standing[steps])
+        assert np.isnan(walked.measured.x[len(seen) :, start]).all()
+    assert_array_equal(outcomes.measured_loss, loss_time(walked.measured))
+    assert np.isfinite(outcomes.fall).any() == (velocity == 0.7)
 
 
 def test_targets_belong_to_the_state_that_is_shown():

@@ -20,13 +20,16 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import compare, physical_flss
+from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.clock import stopped_clock
 from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import Push, drive
+from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
+from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 
@@ -76,6 +79,7 @@ def test_measured_tips_follow_the_plan(walked):
     both = walked.planned.stance & walked.measured.stance
     off = np.abs(walked.measured.feet - walked.planned.feet)[both]
     assert np.percentile(off, 95) < 2.0
+    assert np.array_equal(walked.outcomes.measured_loss, loss_time(walked.measured))
     assert walked.outcomes.unreachable.sum() == 0
     assert walked.outcomes.saturation.max() < 0.02
 
@@ -113,6 +117,26 @@ def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller,
             sleep(0.005)
     cast(Generator, walking).close()
     assert mujoco.get_mjcb_time() is None
+
+
+@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
+def test_progress_is_the_share_of_the_substeps(settled, controller):
+    told: list[float] = []
+    steps, plan = 45 * settled.substeps, begin(controller, settled.starts, 0.2, settled.stride)
+    for chunk in drive(settled, plan, 4.5, progress=told.append):
+        assert sum(told) == pytest.approx(chunk.first / steps)  # of the chunks before
+        assert all(one > 0 for one in told)
+    assert len(told) > 1
+    assert sum(told) == pytest.approx(1.0)
+
+
+def test_progress_is_done_where_all_have_fallen():
+    settled, told = settle(draw_starts(3, 0)), []
+    plan = begin(UNCOORDINATED, settled.starts, 0.7, settled.stride)
+    *_, last = drive(settled, plan, 1e4, progress=told.append)
+    assert last.fell.all()
+    assert sum(told[:-1]) < 0.1
+    assert sum(told) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("vp", [80.0, 400.0])
@@ -231,7 +255,8 @@ def test_its_state_is_written_into_the_folder_given_and_nowhere_else(diverged, s
     assert data.warning.number.any()
 
 
-def test_a_diverged_state_goes_on_as_it_did(tmp_path, monkeypatch):
+@pytest.mark.parametrize("parts", [2, 4])
+def test_a_diverged_state_goes_on_as_it_did(parts, tmp_path, monkeypatch):
     """With the time step, the contacts and the push of its own roll, fine as it may be, and its conditions."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
     conditions = Conditions.of(load=1.0, grasp=0.5, friction=0.7)
@@ -241,18 +266,18 @@ def test_a_diverged_state_goes_on_as_it_did(tmp_path, monkeypatch):
     batch.push[1] = 7.0
     batch.qvel[1] = 1e12
     with pytest.raises(Diverged) as error:
-        batch.roll(ids, two.ctrl[:, np.newaxis].repeat(4, axis=1), parts=4)
+        batch.roll(ids, two.ctrl[:, np.newaxis].repeat(parts, axis=1), parts)
     assert error.value.start == 1
     path = save_state(walk_error(error.value, "resting", 0.0, conditions), tmp_path)
     model, data = replay(path)
-    step = two.compiled.model.opt.timestep / 4
+    step = two.compiled.model.opt.timestep / parts
     assert model.opt.timestep == step
     assert (model.pair_solref[:, 0] == 2 * step).all()
     assert (model.pair_friction[:, 0] == 0.7).all()
     assert model.body_mass.sum() == pytest.approx(2.0, rel=1e-4)
     assert np.array_equal(data.qpos, two.qpos[1])
     assert data.xfrc_applied[two.compiled.root, 1] == 7.0
-    assert np.load(path)["ctrl"].shape == (4, model.nu)
+    assert np.load(path)["ctrl"].shape == (parts, model.nu)
 
 
 def test_starts_out_of_reach_are_refused():
@@ -264,6 +289,37 @@ def test_targets_out_of_reach_are_counted():
     low = Conditions.of(standing_height=7.0, step_height=14.0)
     outcomes = physical_outcomes(settle(draw_starts(4, 0), low), LDVS, 0.5, 40.0)
     assert outcomes.unreachable.sum() > 0
+
+
+def test_legs_out_of_reach_keep_their_last_angles_however_the_plan_is_divided():
+    """Chunk by chunk or step by step: the same targets, all numbers, and as many misses."""
+    settled = settle(draw_starts(4, 0), Conditions.of(standing_height=7.0, step_height=14.0))
+    plans = [OrdersFromPlan(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 40.0) for _ in range(2)]
+    chunks, steps = (
+        list(iter(lambda one=one, steps=steps: one.ahead(np.arange(4), steps), None))
+        for one, steps in zip(plans, (None, 1), strict=True)
+    )
+    (control, missed), (control_by_step, missed_by_step) = (
+        [np.concatenate([getattr(one, name) for one in each], axis=1) for name in ("control", "missed")]
+        for each in (chunks, steps)
+    )
+    assert np.array_equal(control, control_by_step)
+    assert np.array_equal(missed, missed_by_step)
+    angles, out = control[:, :-1].reshape(4, -1, 6, 3), missed
+    assert out.any()
+    assert np.array_equal(angles[:, 1:][out[:, 1:]], angles[:, :-1][out[:, 1:]])
+
+
+def test_feet_grasp_while_the_plan_lets_them_stand():
+    """From the substep on in which a step of the plan begins; the one after the last step is like the last."""
+    settled = settle(draw_starts(3, 0), Conditions.of(grasp=0.5))
+    orders = OrdersFromPlan(settled, begin(UNCOORDINATED, settled.starts, 0.5, settled.stride), 12.0)
+    ids, m = np.array([2, 0]), settled.substeps
+    grasp = np.concatenate([one.control[:, :, 18:] for one in iter(lambda: orders.ahead(ids), None)], axis=1)
+    stance = walk(settled.starts, UNCOORDINATED, 0.5, 12.0).stance[:, ids].swapaxes(0, 1)
+    assert np.array_equal(grasp[:, :-1].reshape(2, -1, m, 6), stance[:, :, np.newaxis].repeat(m, axis=2))
+    assert np.array_equal(grasp[:, -1], stance[:, -1])
+    assert not stance.all()
 
 
 def test_comparison_holds_every_answer():

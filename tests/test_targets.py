@@ -1,5 +1,7 @@
 """Laws of the tip targets: no jumps, a lift that takes its time in milliseconds, plan and target agree."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -10,7 +12,7 @@ from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
-from hexmj.physics.foot_path import EVENLY, TipTargets
+from hexmj.physics.foot_path import EVENLY, TipTargets, standing_tips
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk
@@ -131,6 +133,27 @@ def test_a_leg_that_swings_back_is_lifted_at_once():
     height = tips[0, :, 0, 2] + path.standing_height
     full = m + round(path.lift_time / 1000.0 / conditions.timestep(STRIDE))  # it swings from the first step's end
     assert_allclose(height[full - 1 :], path.step_height)
+
+
+def test_a_leg_that_swings_on_its_spot_is_lifted_until_that_is_where_its_swing_ends():
+    """Two legs that stay where they are in swing: one shall come down ahead of there, the other there."""
+    conditions, steps, start = Conditions(), 60, np.zeros((1, 6))
+    x, stance, aep = np.zeros((steps, 6)), np.ones((steps, 6), dtype=bool), np.full((steps, 6), STRIDE.aep0)
+    stance[:, :2], aep[:, 1] = False, 0.0
+    plan = replace(planned(x, stance), aep=aep[:, np.newaxis])
+    height = TipTargets(start, conditions, STRIDE).follow(plan, np.arange(1))[0, -1, :, 2]
+    path = conditions.path
+    assert height[0] == pytest.approx(path.step_height - path.standing_height)
+    assert_array_equal(height[1:], -path.standing_height)
+
+
+def test_feet_that_stand_still_have_standing_tips():
+    starts, conditions = draw_starts(3, 2), Conditions()
+    plan = begin(UNCOORDINATED, starts, 0.0, STRIDE)
+    standing = standing_tips(starts, conditions.path.standing_height, STRIDE)
+    tips = TipTargets(starts, conditions, STRIDE).follow(plan.advance(4), np.arange(3))
+    assert standing.shape == (3, 6, 3)
+    assert_array_equal(tips, np.broadcast_to(standing[:, np.newaxis], tips.shape))
 
 
 @pytest.mark.parametrize(("vp", "m"), [(400.0, 1), (80.0, 2), (20.0, 8)])
