@@ -218,7 +218,8 @@ def _regimes(
         if len(begin) - settled < CYCLES:
             continue
         begin, touch, end = begin[settled:], touch[settled:], end[settled:]
-        periods[n] = (end - begin).mean(axis=0)
+        span = end[-1] - begin[0]
+        periods[n] = span / np.round(span / (end[-1] - begin[-1]))  # legs raised with leg 1 may skip or repeat a cycle
         duty_factor[n] = 1.0 - (touch - begin).mean(axis=0) / periods[n]
         phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
         reached[n] = begin[0, 0]
