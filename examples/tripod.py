@@ -42,7 +42,7 @@ class Tripod:
 
 
 if __name__ == "__main__":
-    velocities = [0.1, 0.3, 0.5]
+    velocities = [0.3, 0.5]
     for controller in (Tripod(), hexmj.LDVS):
         kinematic = hexmj.flss(controller, velocities, n_starts=200)
         physical = hexmj.physical_flss(controller, velocities, n_starts=8)

@@ -26,7 +26,7 @@ from hexmj.sweeps import Cell, conduct
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
-WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "30", "--window", "60"]
+WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "12", "--window", "60"]
 
 
 @pytest.fixture(scope="module")

@@ -83,9 +83,10 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
                 f" expected {kind} of the shape {expected}"
             )
         may_be_unknown = name in ("aep", "height")
-        if (bad := np.argwhere(np.isinf(values) if may_be_unknown else ~np.isfinite(values))).size:
-            known = "a number, or NaN where nothing tells" if may_be_unknown else "a number"
-            raise InputError(f"a plan's {name} is {values[tuple(bad[0])]} in {place(walk, bad[0])}; expected {known}")
+        bad = np.isinf(values) if may_be_unknown else ~np.isfinite(values)
+        if bad.any():
+            at, known = np.argwhere(bad)[0], "a number, or NaN where nothing tells" if may_be_unknown else "a number"
+            raise InputError(f"a plan's {name} is {values[tuple(at)]} in {place(walk, at)}; expected {known}")
     return walk
 
 
