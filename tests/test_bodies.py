@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from film_reader import read_film
-from hexmj.bodies.compiled import CompiledBody, kinematics
+from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, Body, Leg, Servo
 from hexmj.bodies.gains import gains, longest_lever
 from hexmj.bodies.grounds import depth_in_ground, ground_level
@@ -24,7 +24,7 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
 from hexmj.errors import InputError
-from hexmj.legs import FIG1, LEGS
+from hexmj.legs import FIG1
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
 from hexmj.replay.film import gl
@@ -32,6 +32,7 @@ from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.starts import draw_starts
+from other_bodies import found, renamed
 from test_inverse_kinematics import any_hexapod
 
 NAMES = ("name", "text", "paths", "nnames", "nbuffer")
@@ -215,70 +216,6 @@ def test_a_body_of_any_hinges_compiles_and_can_be_loaded(tmp_path: Path, hinges:
     assert compiled.torque_limits.tolist() == 6 * hinges * [gains(plain_model(body), body).torque]
     assert compiled.trunk_corners[0].shape == (8, 3)
     stands_and_steps(compiled)
-
-
-def found(tree: ElementTree.Element, path: str) -> ElementTree.Element:
-    """The element at a path."""
-    element = tree.find(path)
-    assert element is not None
-    return element
-
-
-RENAMED = {"mesothorax": "keel", "metathorax": "stern", "prothorax": "neck", "head": "bow", "abdomen": "tail_boom"}
-RENAMED |= {"ground": "pool_floor", "home": "at_anchor"}
-RENAMED |= {
-    f"{leg}_{old}": f"{new}_of_{place}"
-    for leg, place in zip(LEGS, ("alpha", "beta", "gamma", "delta", "epsilon", "zeta"), strict=True)
-    for old, new in {
-        "thorax_coxa": "yaw", "coxa_trochanter": "lift", "femur_tibia": "bend",
-        "coxa": "hip", "femur": "thigh", "tibia": "shank", "foot": "toe",
-    }.items()
-}  # fmt: skip
-"""Every name that the description gives, to another."""
-
-LONG = ("fron", "midd", "hind")
-"""How classes of leg segments begin in the MJCF."""
-
-
-def renamed(folder: Path, factor: float = 1.05) -> Body:
-    """The stick insect with every name another, legs longer by a factor, and its home posture anew."""
-    tree = ElementTree.fromstring(STICK_INSECT.text())
-    placed = [e for e in tree.iter() if e.get("name", "").endswith(("_femur", "_tibia", "_foot"))]
-    drawn = [geom for one in tree.iter("default") if one.get("class", "")[:4] in LONG for geom in one.findall("geom")]
-    for element in (*placed, *drawn):
-        for attribute in {"fromto", "pos"} & element.attrib.keys():
-            longer = [repr(factor * float(number)) for number in element.attrib[attribute].split()]
-            element.set(attribute, " ".join(longer))
-    for element in tree.iter():
-        for attribute in {"name", "joint", "geom1", "geom2", "site", "objname", "body"} & element.attrib.keys():
-            if element.tag not in ("material", "texture", "mesh"):
-                element.set(attribute, RENAMED.get(element.attrib[attribute], element.attrib[attribute]))
-    tree.set("model", "stretched")
-    file = folder / "stretched.xml"
-    file.write_text(ElementTree.tostring(tree, encoding="unicode"))
-    body = replace(
-        STICK_INSECT,
-        name="stretched",
-        mjcf=file,
-        root=RENAMED[STICK_INSECT.root],
-        trunk=tuple(RENAMED[part] for part in STICK_INSECT.trunk),
-        legs=tuple(
-            Leg(tuple(RENAMED[name] for name in leg.joints), RENAMED[leg.foot], tuple(RENAMED[p] for p in leg.parts))
-            for leg in STICK_INSECT.legs
-        ),
-        ground=RENAMED["ground"],
-        home=RENAMED["home"],
-        lengths=STICK_INSECT.lengths.scaled(factor),
-    )
-    tips = np.stack([body.lines.origin, body.lines.y, 6 * [-body.standing_height]], axis=-1)
-    joints, reachable = kinematics(mujoco.MjModel.from_xml_path(str(file)), body).inverse(tips)
-    assert reachable.all()
-    angles = " ".join(repr(float(angle)) for angle in joints.ravel())
-    key = found(tree, "keyframe/key")
-    key.set("qpos", f"0 0 {body.standing_height + 0.4} 1 0 0 0 {angles}")
-    key.set("ctrl", angles)
-    file.write_text(ElementTree.tostring(tree, encoding="unicode"))
-    return body
 
 
 def stands_and_steps(compiled: CompiledBody) -> None:
