@@ -18,6 +18,9 @@ from hexmj.errors import InputError
 
 Of = TypeVar("Of")
 
+LABEL = 200
+"""Characters of the longest name."""
+
 _NAMES = {
     float: "a number",
     int: "a whole number",
@@ -74,6 +77,17 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
         if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
             return np.array(array, dtype=float)
     raise InputError(f"{name} = {_shown(values)}; expected numbers")
+
+
+def label(name: str, value: Any) -> str:
+    """A short text of one line, fit to be shown and to stand in the name of a file.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not (0 < len(typed(name, value, str)) <= LABEL and value.isprintable()):
+        raise InputError(f"{name} = {_shown(value)}; expected 1 to {LABEL} printable characters")
+    return value
 
 
 def states(name: str, values: ArrayLike) -> np.ndarray:

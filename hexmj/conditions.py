@@ -17,6 +17,15 @@ from hexmj.timing import Stride
 GroundKind = Literal["flat", "step", "gap", "hurdle", "rough"]
 """Kinds of ground, see `Ground.ground`."""
 
+OBEYED: dict[GroundKind, tuple[str, ...]] = {
+    "flat": (),
+    "step": ("ground_height", "ground_at"),
+    "gap": ("ground_at", "ground_length"),
+    "hurdle": ("ground_height", "ground_at", "ground_length"),
+    "rough": ("ground_height", "ground_at", "ground_seed"),
+}
+"""Kind of ground -> the fields of `Ground` that it obeys."""
+
 
 @dataclass(frozen=True)
 class Bound:

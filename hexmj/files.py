@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from uuid import uuid4
 
+from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.locks import among_writers
 
@@ -24,6 +25,17 @@ SEAL = len(MARK) + 64
 
 PART = ".part-"
 """Begins the names of files that are being written; a killed process leaves them, the next run removes them."""
+
+
+def path_of(path: Path | str) -> Path:
+    """A path as the system takes it.
+
+    Raises:
+        InputError: it is none.
+    """
+    if "\0" in str(typed("path", path, Path | str)):
+        raise InputError(f"path = {str(path)!r:.80}; expected one without a null character")
+    return Path(path)
 
 
 def write_whole(path: Path, content: bytes) -> Path:

@@ -13,6 +13,9 @@ try:
 except ImportError:  # no Unix
     fcntl = None
 
+FLAGS = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+"""No pipe is waited for, and no link is followed."""
+
 NAME = ".lock"
 """File that is locked, in the folder; says who holds it."""
 
@@ -74,8 +77,10 @@ def among_writers(folder: Path, alone: bool = False) -> Iterator[bool]:
 def _held(path: Path) -> int:
     """The lock file, held, and not one that its holder has taken away by now."""
     while True:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0), 0o666)
+        file = os.open(path, os.O_RDWR | os.O_CREAT | FLAGS, 0o666)
         try:
+            if os.fstat(file).st_nlink > 1:
+                raise OSError(f"{NAME} is a link to another file")
             if fcntl:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             with suppress(FileNotFoundError):

@@ -11,11 +11,18 @@ if TYPE_CHECKING:
 
 
 def encode(data: "xr.Dataset") -> bytes:
-    """A dataset as it stands in its file, before the seal; the bits of all numbers stay."""
+    """A dataset as it stands in its file, before the seal; the bits of all numbers stay.
+
+    Raises:
+        InputError: something that NetCDF cannot hold.
+    """
     plain = data.drop_encoding()
     for variable in plain.variables.values():
         variable.encoding["_FillValue"] = None
-    return bytes(plain.to_netcdf(engine="h5netcdf"))
+    try:
+        return bytes(plain.to_netcdf(engine="h5netcdf"))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"NetCDF cannot hold this: {error}; expected arrays, numbers and texts") from None
 
 
 def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":

@@ -16,6 +16,8 @@ from hexmj.errors import InputError
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
+NOWHERE = "a foot that stands is at NaN or infinity; expected all that stand to be somewhere"
+
 
 def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = None) -> np.ndarray:
     """Signed distance from the centre of mass to the nearest edge of the support polygon.
@@ -38,7 +40,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
             f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
         )
     if not np.isfinite(points[stands]).all():
-        raise InputError("a foot that stands is at NaN or infinity; expected all that stand to be somewhere")
+        raise InputError(NOWHERE)
     shape = stands.shape[:-1]
     points, stands = points.reshape(-1, *points.shape[-2:]), stands.reshape(-1, stands.shape[-1])
     margin = np.empty(len(points))
@@ -60,6 +62,8 @@ def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
 def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:
     """Time of the first loss of static stability (Eq. 7), (start,) [time units]; inf where there is none."""
     lost = walk_margin(walk, threads) <= 0.0
+    if not len(lost):
+        raise InputError("a walk of 0 steps; expected at least 1")
     return np.where(lost.any(axis=0), walk.time[np.argmax(lost, axis=0)], np.inf)
 
 
@@ -71,17 +75,22 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
         stance: which of them stand, (leg,).
 
     Raises:
-        InputError: shapes that do not fit.
+        InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
     tips, stands = numbers("feet", feet), states("stance", stance)
     if tips.ndim != 2 or tips.shape[1] != 2 or stands.shape != tips.shape[:1]:
         raise InputError(f"feet of the shape {tips.shape}, stance of {stands.shape}; expected (leg, 2) and (leg,)")
     points = tips[stands]
-    if len(points) < 3 or np.linalg.matrix_rank(points - points[0]) < 2:
+    if not np.isfinite(points).all():
+        raise InputError(NOWHERE)
+    if len(points) < 3 or np.linalg.matrix_rank(spread := points - points[0]) < 2:
         return points
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
-    return points[ConvexHull(points).vertices]
+    try:
+        return points[ConvexHull(spread / np.abs(spread).max()).vertices]
+    except QhullError:  # within its rounding all lie on one line
+        return points
 
 
 @njit(cache=True, nogil=True)

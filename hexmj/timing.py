@@ -20,6 +20,9 @@ WINDOWS = ("walk", "start")
 MOST_STEPS = 10**9
 """Longest walk [steps]; far beyond any use."""
 
+FAR = 1e6
+"""Farther than any leg reaches [mm]."""
+
 
 @dataclass(frozen=True)
 class Stride:
@@ -38,8 +41,8 @@ class Stride:
 
     def __post_init__(self) -> None:
         check_types(self)
-        if not all(math.isfinite(v) for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
-            raise InputError(f"aep0, pep0, pep_min and dt must be finite; given {self}")
+        if not all(abs(v) <= FAR for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
+            raise InputError(f"{self}; expected aep0, pep0 and pep_min between -{FAR:g} and {FAR:g} mm")
         if not self.pep_min <= self.pep0 < self.aep0:
             raise InputError(
                 f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"

@@ -32,6 +32,18 @@ class Walk:
     geometry: Geometry = FIG1
     """Origins of the legs' axes."""
 
+    def __post_init__(self) -> None:
+        typed("geometry", self.geometry, Geometry)
+        shape = np.shape(self.stance)
+        for name in _arrays(self):
+            values, kind = np.asarray(getattr(self, name)), bool if name == "stance" else float
+            expected = {"time": shape[:1], "velocity": shape[:2]}.get(name, shape)
+            if len(shape) != 3 or values.shape != expected or values.dtype != kind:
+                raise InputError(
+                    f"a walk's {name} is {values.dtype} of the shape {values.shape}; expected {np.dtype(kind)} of the"
+                    f" shape {expected}: its steps, starts and legs"
+                )
+
     @property
     def feet(self) -> np.ndarray:
         """(step, start, leg, 2) tips from the centre of mass: ahead, to the left [mm]."""

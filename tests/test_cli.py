@@ -215,7 +215,8 @@ def test_the_order_of_updates_reaches_the_network(run, tmp_path):
 
 
 def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
-    words = [*map(str, SEARCH), "--refine-starts", "20000", "--refine-budget", "40", "--json", "--out"]
+    changed = {"100": "20000", "20": "40"}  # refined for longer
+    words = [*(changed.get(str(word), str(word)) for word in SEARCH), "--json", "--out"]
     running = subprocess.Popen(
         [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")],
         stdout=subprocess.DEVNULL,
@@ -332,8 +333,23 @@ NONSENSE = [
     (["search", "--velocities", "0.1", "1.5"], "expected 0 <= low <= high < 1"),
     (["search", "--velocities", "0", "0.5"], "has no period"),
     (["search", "--velocity", "0.1", "--velocities", "0.1", "0.5"], "expected one velocity or one range"),
-    (["search", "--population", "0"], "expected at least 2 individuals"),
-    (["search", "--algorithm", "cmaes", "--population", "1"], "expected at least 4 individuals"),
+    (["search", "--begin", "ldvs", "--form", "hws"], "ldvs has weights that the form hws lacks; expected a set of it"),
+    (["search", "--begin", "own-0.1", "--form", "ldvs"], "own-0.1 has weights that the form ldvs lacks"),
+    (["flss", "--physical", "--ground-height", "5"], "--ground-height with --ground flat; expected it with a ground"),
+    (
+        ["flss", "--physical", "--ground", "gap", "--ground-height", "5"],
+        "--ground-height with --ground gap; expected",
+    ),
+    (["walk", "--physical", "--ground", "step", "--ground-seed", "4"], "--ground-seed with --ground step; expected it"),
+    (
+        ["flss", "--velocities", "0.3", "--velocities", "0.5"],
+        "--velocities was given twice; expected",
+    ),
+    (["flss", "--out", ""], "'' stands alone; expected options, each with its values"),
+    (["flss", "--starts", "5", "--"], "'--' stands alone; expected options, each with its values"),
+    (["flss", "--aep0", "1e308", "--pep0=-1e308", "--pep-min=-1e308"], "expected aep0, pep0 and pep_min between"),
+    (["search", "--population", "0"], "expected a whole number of at least 2"),
+    (["search", "--algorithm", "cmaes", "--population", "1"], "expected a whole number of at least 4"),
     (["search", "--budget", "0"], "at least one generation, 10 evaluations"),
     (["search", "--refine-starts", "0"], "starts = 0; expected"),
     (["search", "--verdict-starts", "0"], "starts = 0; expected"),

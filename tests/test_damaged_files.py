@@ -19,11 +19,12 @@ from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError, SimulationError
 from hexmj.files import MARK, opened, read_sealed, sealed, unsealed
 from hexmj.measures.kinematic import walk
+from hexmj.measures.physical import physical_walk
 from hexmj.paper.found_sets import found_sets
 from hexmj.physics.divergence import replay, save_state
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
-from hexmj.replay.recording import load_recording, record_plan, save_recording
+from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.results import results_folder, save_dataset
 from hexmj.starts import draw_starts
 from hexmj.sweeps import Cell, KeptValues, run
@@ -117,6 +118,7 @@ FALSE: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
         r"planned_x is float64 of .*; expected float64 over \('step', 'leg'\)",
     ),
     "legs": (lambda r: r.assign_coords(leg=list("abcdef")), "leg = .'a'.*; expected .'L1'"),
+    "lines of a title": (lambda r: changed(r, title="a\nb"), "title = 'a.*; expected at most 1000 printable"),
     "nameless": (lambda r: r.drop_vars("leg"), "leg = None; expected"),
 }
 
@@ -135,6 +137,16 @@ def test_a_recording_that_makes_no_sense_is_neither_written_read_nor_filmed(reco
     path.write_bytes(sealed(netcdf.encode(false)))
     with pytest.raises(InputError, match=rf"^{re.escape(str(path))}: .*{said}"):
         load_recording(path)
+
+
+def test_a_fall_is_where_the_poses_end_and_has_its_part(tmp_path):
+    walked = record(physical_walk(draw_starts(1, 0), LDVS, 0.3, 10.0))
+    for values, said in {
+        "100 poses are known; expected the 30 before fall_time = 3": {"fall_time": 3.0, "fall_part": 4},
+        "fall_time = inf and fall_part = 4; expected a fall to have its part": {"fall_part": 4},
+    }.items():
+        with pytest.raises(InputError, match=values):
+            save_recording(changed(walked, **said), tmp_path / "recording.nc")
 
 
 def test_a_recording_that_was_edited_is_written_again(recording, tmp_path):

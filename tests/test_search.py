@@ -360,9 +360,9 @@ def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_al
         (lambda: Effort(budget=0), "at least one generation, 10 evaluations"),
         (lambda: Effort("annealing"), "valid names: evolution, cmaes"),  # pyright: ignore[reportArgumentType]
         (lambda: Effort(refine_budget=-1), "expected 0 or more"),
-        (lambda: search(PROBLEM, Effort(population=0)), "expected at least 2 individuals"),
-        (lambda: search(PROBLEM, Effort("cmaes", population=0)), "expected at least 4 individuals"),
-        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain = 0.0; expected a finite number above 0"),
+        (lambda: search(PROBLEM, Effort(population=0)), "population = 0; expected a whole number of at least 2"),
+        (lambda: Effort("cmaes", population=3), "population = 3; expected a whole number of at least 4"),
+        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain = 0.0; expected above 0 and at most 1e.06"),
         (lambda: search(PROBLEM, Effort(starts=0)), "starts = 0; expected"),
         (lambda: search(PROBLEM, Effort(refine_starts=0)), "starts = 0; expected"),
         (lambda: search(PROBLEM, Effort(seed=-1)), "seed = -1; expected"),

@@ -162,6 +162,19 @@ def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
     assert plain(tmp_path / "here" / "body.xml") != there
 
 
+def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
+    body, parts, shape = tmp_path / "body.xml", tmp_path / "parts.xml", tmp_path / "shapes" / "leg.stl"
+    shape.parent.mkdir()
+    body.write_text('<mujoco><compiler meshdir="shapes"/><include file="parts.xml"/></mujoco>')
+    found = set()
+    for text in ("<mujoco/>", "<mujoco><asset><mesh file='leg.stl'/></asset></mujoco>"):
+        parts.write_text(text)
+        for content in (b"a", b"b"):
+            shape.write_bytes(content)
+            found.add(plain(body))
+    assert len(found) == 3
+
+
 def test_every_setting_is_in_the_name() -> None:
     cells = [
         Cell("a", odd_bits, {"seed": 0}),
@@ -201,15 +214,17 @@ TOY = {
     "toy/__init__.py": "from toy.film import show\nfrom toy.walk import walk",
     "toy/study.py": "import numpy\nfrom toy import walk\nfrom typing import TYPE_CHECKING\n"
     "if TYPE_CHECKING:\n    import toy.film\ndef cell(controller=None): ...",
-    "toy/walk.py": "def walk():\n    from toy.inner import deep\n    return deep, 'own.toml'",
+    "toy/walk.py": "def walk():\n    from toy.inner import deep\n    return deep, 'own.toml', 'data/more.toml'",
     "toy/inner/__init__.py": "",
     "toy/inner/deep.py": "from . import deeper",
     "toy/inner/deeper.py": "import scipy.stats",
     "toy/own.toml": "p = 1",
+    "toy/data/more.toml": "q = 1",
+    "here.json": "{}",
     "toy/film.py": "import matplotlib\ndef show(): ...",
     "toy/cli.py": "import toy.study",
     "helper.py": "",
-    "mine.py": "from helper import *\n" + MINE,
+    "mine.py": "from helper import *\nHERE = 'here.json'\n" + MINE,
 }
 PRINT_STEM = """
 from hexmj.loaded import importable
@@ -247,18 +262,23 @@ def unedited(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: str) -> None:
     record = json.loads(unedited)
     within = {"toy", "toy.study", "toy.walk", "toy.inner", "toy.inner.deep", "toy.inner.deeper"} | {
-        "toy/own.toml",
-        "helper",
+        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper"),
     }
     assert {name for name in record["sources"] if name.startswith(("toy", "helper"))} == within
-    assert [name for name in record["sources"] if name.startswith("mine.py@")]
+    assert [name.rpartition("@")[2][12:] for name in record["sources"] if name.startswith("mine.py@")] == [
+        "",
+        ", here.json",
+    ]
     assert set(record["versions"]) == {"python", "numpy", "scipy"}
     for name in ("toy/film.py", "toy/cli.py"):
         (toy / name).write_text(TOY[name] + "\n# edited")
     assert toy_record(toy) == unedited
 
 
-@pytest.mark.parametrize("name", ["toy/study.py", "toy/inner/deeper.py", "toy/own.toml", "mine.py", "helper.py"])
+@pytest.mark.parametrize(
+    "name",
+    ["toy/study.py", "toy/inner/deeper.py", "toy/own.toml", "toy/data/more.toml", "here.json", "mine.py", "helper.py"],
+)
 def test_an_edit_within_reach_is_another_name(toy: Path, unedited: str, name: str) -> None:
     (toy / name).write_text(TOY[name] + "\n# edited")
     assert toy_record(toy) != unedited
@@ -583,6 +603,24 @@ def test_a_ledger_loses_at_most_a_line_that_is_not_whole(tmp_path: Path) -> None
         again = ledger(tmp_path)
         assert again.known >= 4
         assert again(rows).tobytes() == values.tobytes()
+
+
+def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_path: Path) -> None:
+    ledger(tmp_path)(np.ones((2, 2)))
+    (path,) = (tmp_path / "kept").iterdir()
+    other = KeptValues(Cell("squares", squares, {"log": tmp_path, "more": 1}), tmp_path / "other")
+    record, lines = path.read_text().split("\n", 1)
+    row = np.ones(2).tobytes()
+    for line in (
+        *map(other._line, [row, row], [3.0, -1.0]),
+        "zz 0x1p-1 00000000\n",
+        "00\n",
+        ledger(tmp_path)._line(row, np.nan),
+    ):
+        path.write_text(f"{record}\n{line}")
+        assert ledger(tmp_path).known == 0
+    path.write_text(f"{record}\n{lines}")
+    assert ledger(tmp_path).known == 1
 
 
 def test_a_ledger_of_another_search_is_refused(tmp_path: Path) -> None:

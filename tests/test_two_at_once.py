@@ -82,6 +82,15 @@ def test_a_lock_is_held_by_one_at_a_time(tmp_path):
         pass
 
 
+@pytest.mark.parametrize("link", [os.symlink, os.link])
+def test_a_lock_that_is_a_link_empties_no_file(tmp_path, link):
+    (precious := tmp_path / "precious").write_text("precious")
+    link(precious, tmp_path / ".lock")
+    with pytest.raises(InputError, match="cannot be written: "), locked(tmp_path):
+        pass
+    assert precious.read_text() == "precious"
+
+
 def test_what_a_killed_writer_left_is_in_nobody_s_way(tmp_path):
     (tmp_path / ".part-0123.nc").write_bytes(b"half")
     data = xr.Dataset({"x": ("n", [1.0])})

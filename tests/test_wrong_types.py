@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,18 @@ from hexmj.conditions import Ground, Masses, TimeScale
 from hexmj.controllers.asking import begin
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
+from hexmj.environments import dm
 from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import settle
-from hexmj.walks import one_start
+from hexmj.search import problems, stages
+from hexmj.walks import one_start, part_of
 
 anything: Any = hexmj
 LDVS, STRIDE = anything.LDVS, hexmj.Stride()
+search: Any = stages.search
+Sample: Any = problems.Sample
 STARTS = np.zeros((2, 6))
 FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
 STANDS = np.ones((2, 6), dtype=bool)
@@ -54,11 +59,27 @@ def physical_walk(duration: Any = 5.0, **options: Any):
     return hexmj.physical_walk(STARTS, LDVS, 0.3, duration, **options)
 
 
+def environment_step(action: Any) -> None:
+    environment = dm.load(0.3, actions="tips", duration=5.0)
+    environment.reset()
+    environment.step(action)
+
+
+def save(**attributes: Any) -> None:
+    with TemporaryDirectory() as folder:
+        hexmj.save_recording(hexmj.record(physical_walk()).assign_attrs(attributes), Path(folder) / "recording.nc")
+
+
+def of_centred_lines() -> Any:
+    return hexmj.record_plan(walk(), hexmj.Conditions(), hexmj.Stride(geometry=hexmj.CENTRED))
+
+
 def nan_tips() -> Any:
     walked = walk()
     return replace(walked, x=np.full_like(walked.x, np.nan))
 
 
+PROBLEM = anything.Problem(hexmj.NetworkForm("hws"), 0.3, 0.3)
 MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
 
 BAD: list[tuple[Callable[[], Any], str]] = [
@@ -176,6 +197,45 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.load_controller(3), "name = 3; expected a text"),  # pyright: ignore
     (lambda: compare(folder=3), "folder = 3; expected a Path or a text or None"),
     (lambda: hexmj.support_polygon("feet", STANDS[0]), "feet = 'feet'; expected numbers"),
+    (lambda: hexmj.support_polygon(FEET[0] * np.nan, STANDS[0]), "a foot that stands is at NaN or infinity"),
+    (lambda: settle(STARTS, {}), "conditions = {}; expected a Conditions"),  # pyright: ignore
+    (lambda: settle(STARTS, None, 0), "stride = 0; expected a Stride"),  # pyright: ignore
+    (lambda: dm.load(conditions={}), "conditions = {}; expected a Conditions"),  # pyright: ignore
+    (lambda: dm.load(stride=[]), "stride = []; expected a Stride"),  # pyright: ignore
+    (lambda: dm.load("0.3"), "velocity = '0.3'; expected a number"),  # pyright: ignore
+    (lambda: dm.load(actions=[]), "actions = []; valid names: joints, tips"),  # pyright: ignore
+    (lambda: dm.load(duration=[10.0, 20.0]), "duration = [10.0, 20.0]; expected a number"),  # pyright: ignore
+    (lambda: dm.load(controller="ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
+    (lambda: environment_step(np.zeros(18) + 1j), "action = array([0.+1.j, "),
+    (lambda: environment_step(["0.1"] * 18), "action = ['0.1', "),
+    (lambda: hexmj.loss_time(replace(walk(), time=np.ones(3))), "a walk's time is float64 of the shape (3,); expected"),
+    (lambda: hexmj.loss_time(replace(walk(), x="no")), "a walk's x is <U2 of the shape (); expected float64"),
+    (lambda: hexmj.loss_time(replace(walk(), geometry=3)), "geometry = 3; expected a Geometry"),
+    (lambda: hexmj.loss_time(part_of(walk(), slice(0))), "a walk of 0 steps; expected at least 1"),
+    (lambda: compare({"a\nb": LDVS}), "a controller's name = 'a\\nb'; expected 1 to 200 printable characters"),
+    (lambda: compare({1: LDVS}), "a controller's name = 1; expected a text"),
+    (lambda: compare(executor=3), "executor = 3; expected an Executor or None"),
+    (lambda: compare(progress=3), "progress = 3; expected a function or None"),
+    (lambda: compare(folder="a\0b"), "path = 'a\\x00b'; expected one without a null character"),
+    (lambda: save(title="two\nlines"), "no recording: title = 'two\\nlines'; expected at most 1000 printable"),
+    (lambda: anything.Problem("ldvs", 0.3, 0.3), "form = 'ldvs'; expected a frozen dataclass such as NetworkForm"),
+    (
+        lambda: anything.Problem(hexmj.NetworkForm, 0.3, 0.3),
+        "form = <class 'hexmj.search.",
+    ),
+    (lambda: anything.Effort(begin="ldvs"), "controller = 'ldvs'; expected a controller"),
+    (lambda: anything.Effort(starts=0), "starts = 0; expected a whole number of at least 1"),
+    (lambda: anything.Effort(seed=-1), "seed = -1; expected a whole number of at least 0"),
+    (lambda: anything.Effort(population=10**12, budget=10**12), "population = 1000000000000; expected a whole number"),
+    (lambda: search(3, anything.Effort()), "problem = 3; expected a Problem"),
+    (lambda: search(PROBLEM, 3), "effort = 3; expected an Effort"),
+    (lambda: search(PROBLEM, anything.Effort(), folder=3), "path = 3; expected a Path or a text"),
+    (lambda: search(PROBLEM, anything.Effort(domain=1e308)), "domain = 1e+308; expected above 0 and at most"),
+    (lambda: Sample(PROBLEM, 3, 0).costs(np.zeros(10)), "vectors of the shape (10,); expected (candidate, parameter)"),
+    (lambda: Sample(3, 1, 0), "problem = 3; expected a Problem"),
+    (lambda: save(extra=None), "NetCDF cannot hold this: "),
+    (lambda: save(extra={"a": 1}), "NetCDF cannot hold this: "),
+    (lambda: of_centred_lines(), "the plan's lines are Geometry("),
 ]
 
 

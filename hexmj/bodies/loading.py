@@ -15,6 +15,7 @@ from hexmj.bodies.grounds import lay_ground
 from hexmj.conditions import Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
+from hexmj.sweeps.plain import content
 
 
 def compile_body(conditions: Conditions, timestep: float | None = None, *, looks: bool = True) -> CompiledBody:
@@ -34,7 +35,7 @@ def compile_body(conditions: Conditions, timestep: float | None = None, *, looks
     if not 0 < timestep <= body.longest_step:
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
     made_of = {"masses": conditions.masses, "contact": conditions.contact, "ground": conditions.ground}
-    compiled = _compiled(Conditions(**made_of, body=body), looks, body.text())
+    compiled = _compiled(Conditions(**made_of, body=body), looks, content(body.mjcf))
     model = copy.copy(compiled.model)
     model.opt.timestep = timestep
     return replace(compiled, model=model, conditions=conditions)
@@ -46,12 +47,12 @@ def plain_model(body: Body) -> mujoco.MjModel:
     Raises:
         InputError: it does not compile, or it is not as described.
     """
-    return _plain_model(body, body.text())
+    return _plain_model(body, content(body.mjcf))
 
 
 @lru_cache(maxsize=16)
-def _plain_model(body: Body, text: str) -> mujoco.MjModel:
-    """The same; `text` is the file as it is now, so that an edited one is compiled anew."""
+def _plain_model(body: Body, files: bytes) -> mujoco.MjModel:
+    """The same; `files` is what they hold now, so that edited ones are compiled anew."""
     try:
         model = _spec(body).compile()
     except ValueError as error:
@@ -66,10 +67,10 @@ def gravity(body: Body) -> float:
 
 
 @lru_cache(maxsize=16)
-def _compiled(conditions: Conditions, looks: bool, text: str) -> CompiledBody:
-    """The body under some conditions, for the file as it is now."""
+def _compiled(conditions: Conditions, looks: bool, files: bytes) -> CompiledBody:
+    """The body under some conditions, for its files as they are now."""
     body, masses, contact = conditions.body, conditions.masses, conditions.contact
-    plain, spec = _plain_model(body, text), _spec(body)
+    plain, spec = _plain_model(body, files), _spec(body)
     spec.compiler.discardvisual = not looks
     complete(spec, plain, body, gains(plain, body))
     lay_ground(spec, conditions.ground, body)

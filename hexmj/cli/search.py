@@ -18,8 +18,10 @@ from hexmj.results import results_folder, save_dataset, save_text
 from hexmj.starts import SAMPLE
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
 
+    from hexmj.controllers.protocol import Controller
     from hexmj.search.forms import Form
     from hexmj.search.problems import Problem
     from hexmj.search.stages import Effort, Found
@@ -198,7 +200,7 @@ class Search(WalkingCommand):
     ) -> None:
         from hexmj.controllers.named import load_controller
 
-        vectors = {name: problem.form.vector(load_controller(one)) for name, one in self._beside.items()}
+        vectors = {name: _numbers(problem.form, load_controller(one)) for name, one in self._beside.items()}
         parameters = new_table("parameter", "found", *vectors)
         for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
             parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
@@ -217,6 +219,16 @@ class Search(WalkingCommand):
             self.conditions_line(self.physical),
             *map(str, files),
         )
+
+
+def _numbers(form: "Form", controller: "Controller") -> "np.ndarray":
+    """The parameters of a controller, (parameter,), NaN where it has none of a name."""
+    from hexmj.controllers.cruse1998 import Cruse1998
+    from hexmj.search.network_forms import FORMS, NetworkForm
+
+    if isinstance(form, NetworkForm) and isinstance(controller, Cruse1998):
+        return FORMS[form.name].vector(controller.weights)
+    return form.vector(controller)
 
 
 def _judged(verdict: "xr.Dataset") -> dict[str, Any]:

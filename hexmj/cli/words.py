@@ -20,8 +20,13 @@ def checked(words: list[str]) -> list[str]:
     """The words of a command line, if a person could have typed and read them.
 
     Raises:
-        InputError: a word that is no print, or a book.
+        InputError: a word that is empty, no print, or a book, or an option that is given twice.
     """
+    if alone := [word for word in words if word in ("", "--")]:
+        raise InputError(f"{alone[0]!r} stands alone; expected options, each with its values")
+    options = [word.partition("=")[0] for word in words if word.startswith("--")]
+    if twice := [one for i, one in enumerate(options) if one in options[:i]]:
+        raise InputError(f"{literal(twice[0][:LONGEST])} was given twice; expected every option once")
     for word in words:
         if len(word) > LONGEST or not word.isprintable():
             raise InputError(f"{literal(word)}: expected words of at most {LONGEST} printable characters")

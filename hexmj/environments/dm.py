@@ -42,10 +42,11 @@ from dm_env import specs
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.bodies.loading import compile_body
+from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, ReadingPlan
+from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.physics.backend import AFTER, Rolled
@@ -110,12 +111,12 @@ def load(
     Raises:
         InputError: a value that makes no sense; here, or for an action in `step`.
     """
-    conditions, stride = conditions or Conditions(), stride or Stride()
-    if not 0 < velocity < 1:
+    conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
+    if not 0 < (velocity := typed("velocity", velocity, float)) < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p")
-    if actions not in TASKS:
-        raise InputError(f"actions = {actions!r}; valid names: {', '.join(TASKS)}")
-    whole = float(steps_within(duration, stride) * stride.dt)
+    typed("actions", actions, Literal["joints", "tips"])
+    check_controller_type(controller)
+    whole = float(steps_within(typed("duration", duration, float), stride) * stride.dt)
     task = TASKS[actions](velocity, controller, conditions, stride, whole, seed)
     compiled = compile_body(conditions, conditions.timestep(stride))
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
@@ -261,7 +262,7 @@ class Walking(control.Task):
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
         """Advance the plan by one step and tell the joints where to go."""
-        spec, action = self.action_spec(physics), np.asarray(action, dtype=float)
+        spec, action = self.action_spec(physics), numbers("action", action)
         if action.shape != spec.shape:
             raise InputError(f"an action has the shape {action.shape}; expected {spec.shape}")
         within = (action >= spec.minimum - ROUNDING) & (action <= spec.maximum + ROUNDING)

@@ -11,6 +11,7 @@ from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress
 from hexmj.starts import draw_starts
+from hexmj.sweeps.plain import content
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ UNITS = {
 
 @lru_cache(maxsize=1)
 def settled_starts(
-    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None, mjcf: str
+    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None, mjcf: bytes
 ) -> Settled:
     """The seed's starts at rest, for the body's MJCF as it is; kept, since every controller begins with the same."""
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
@@ -66,7 +67,7 @@ def outcome_table(
     """
     import xarray as xr
 
-    settled = settled_starts(n_starts, seed, conditions, stride, threads, conditions.body.text())
+    settled = settled_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
     outcomes = physical_outcomes(
         settled, controller, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
     )

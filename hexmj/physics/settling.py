@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import compile_body
+from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import STATE, Diverged, MujocoBatch
@@ -79,7 +80,7 @@ def settle(
         InputError: a start that the legs cannot reach, or more adhesion than the contacts can hold.
         SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
     """
-    conditions, stride = conditions or Conditions(), stride or Stride()
+    conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
     height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
     x = checked_starts(starts, stride)
     compiled = compile_body(conditions, conditions.timestep(stride), looks=False)

@@ -12,7 +12,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.files import read_sealed, sealed, write_whole
+from hexmj.files import path_of, read_sealed, sealed, write_whole
 from hexmj.legs import LEGS
 from hexmj.literal import literal
 from hexmj.measures.compare import REPORTED
@@ -75,6 +75,8 @@ def record_plan(
     typed("conditions", conditions, Conditions)
     typed("stride", stride, Stride)
     planned = one_start(typed("plan", plan, PlannedWalk), start)
+    if plan.geometry != stride.geometry:
+        raise InputError(f"the plan's lines are {plan.geometry}; expected those of the stride, {stride.geometry}")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((len(plan.time), ROOT_QPOS))
@@ -106,7 +108,7 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
         InputError: it is no recording, see `check_recording`, or cannot be written.
     """
     _check(typed("recording", recording, xr.Dataset))
-    return write_whole(Path(typed("path", path, str | Path)), sealed(netcdf.encode(recording)))
+    return write_whole(path_of(path), sealed(netcdf.encode(recording)))
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
@@ -115,7 +117,7 @@ def load_recording(path: Path | str) -> xr.Dataset:
     Raises:
         InputError: it cannot be read, is damaged, or is no recording.
     """
-    path = Path(typed("path", path, str | Path))
+    path = path_of(path)
     recording = netcdf.decode(
         read_sealed(path),
         f"{path} is damaged, or was not written by hexmj.save_recording of this version; expected a recording",

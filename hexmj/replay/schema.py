@@ -10,7 +10,7 @@ import xarray as xr
 
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError
+from hexmj.errors import LONGEST, InputError
 from hexmj.legs import LEGS, Geometry
 from hexmj.timing import Stride
 
@@ -142,6 +142,8 @@ def check_settings(recording: xr.Dataset) -> None:
         if not _alike(given[name], usual):
             value = np.asarray(given[name]).tolist()
             raise InputError(f"no recording: attribute {name} = {value!r:.80}; expected one such as {usual!r}")
+    if not (title := given["title"]).isprintable() or len(title) > LONGEST:
+        raise InputError(f"no recording: title = {title!r:.80}; expected at most {LONGEST} printable characters")
     lines: Any = {name: tuple(map(float, given[name])) for name in ("origins", "lateral")}
     Stride(**{name: float(given[name]) for name in ("aep0", "pep0", "pep_min", "dt")}, geometry=Geometry(**lines))
 
@@ -183,5 +185,16 @@ def _check_laws(recording: xr.Dataset, poses: int) -> None:
     qpos = recording["qpos"].values
     if np.isnan(qpos[:poses]).any():
         raise InputError("no recording: qpos is known again after it was unknown; expected a fall to be the end")
+    if "fall_time" in recording:
+        _check_fall(recording["fall_time"].item(), recording["fall_part"].item(), time, poses)
     if not np.allclose((qpos[:poses, 3:7] ** 2).sum(axis=1), 1.0, ROUNDING, ROUNDING):
         raise InputError("no recording: qpos holds a quaternion that is not of unit length")
+
+
+def _check_fall(fall: float, part: int, time: np.ndarray, poses: int) -> None:
+    """Refuse a fall of no part, a part without a fall, and poses that are known after it or unknown before."""
+    if math.isfinite(fall) != (part >= 0):
+        raise InputError(f"no recording: fall_time = {fall:g} and fall_part = {part}; expected a fall to have its part")
+    before = int((time <= fall + ROUNDING).sum())
+    if poses != before:
+        raise InputError(f"no recording: {poses} poses are known; expected the {before} before fall_time = {fall:g}")

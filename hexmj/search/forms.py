@@ -1,7 +1,7 @@
 """Forms: which numbers of a controller a search chooses, as a vector; `network_forms` has those of the 1998 network."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 
 
+@runtime_checkable
 class Form(Protocol):
     """A frozen dataclass that turns vectors into controllers."""
 

@@ -40,7 +40,8 @@ def _symmetric(size: Literal[9, 10]) -> Parameters:
     names = [f.name for f in fields(Symmetric) if f.name != "p34_i" or size == 10]
 
     def vector(weights: AnyWeights) -> np.ndarray:
-        return np.array([getattr(weights, name, np.nan) for name in names])
+        known = isinstance(weights, Symmetric)
+        return np.array([getattr(weights, name) if known else np.nan for name in names])
 
     return Parameters(tuple(names), Symmetric.from_vector, vector)
 
@@ -110,4 +111,9 @@ class NetworkForm:
         """See `Form.vector`."""
         if not isinstance(controller, Cruse1998):
             raise InputError(f"{controller.name} has no weights; expected a set of the 1998 network")
-        return FORMS[self.name].vector(controller.weights)
+        vector = FORMS[self.name].vector(controller.weights)
+        if np.isfinite(vector).all():
+            kept, every = general(self.controller(vector).weights), general(controller.weights)
+            if np.array_equal(kept.to_vector(), every.to_vector()):
+                return vector
+        raise InputError(f"{controller.name} has weights that the form {self.name} lacks; expected a set of it")

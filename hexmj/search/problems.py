@@ -1,15 +1,14 @@
 """What is minimised (paper, Section 3): Problem 1, a fixed velocity, and Problem 2, velocities drawn from a range."""
 
-import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, is_dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, numbers, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.physics.settling import Settled
+
+FARTHEST = 1e6
+"""Greatest reach of a first population."""
 
 REFUSED = 1.0
 """Cost of a candidate that its controller refuses: as if every start lost stability."""
@@ -55,6 +57,8 @@ class Problem:
 
     def __post_init__(self) -> None:
         check_types(self)
+        if not (is_dataclass(self.form) and not isinstance(self.form, type) and isinstance(self.form, Form)):
+            raise InputError(f"form = {self.form!r:.80}; expected a frozen dataclass such as NetworkForm or FieldsForm")
         if not 0 <= self.low <= self.high < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         if self.feedback and not self.conditions:
@@ -70,8 +74,8 @@ class Problem:
 
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
         """Where a search begins, see `Form.box`; at `begin`, if one is given."""
-        if not 0 < reach < math.inf:
-            raise InputError(f"domain = {reach}; expected a finite number above 0")
+        if not 0 < typed("domain", reach, float) <= FARTHEST:
+            raise InputError(f"domain = {reach}; expected above 0 and at most {FARTHEST:g}")
         form = self.form
         return Domain(*form.box(reach), form.binary, form.vector(begin) if begin else form.begin)
 
@@ -99,6 +103,7 @@ class Sample:
     seed: int
 
     def __post_init__(self) -> None:
+        check_types(self)
         check_draw(self.n_starts, self.seed)
 
     @cached_property
@@ -117,7 +122,15 @@ class Sample:
         return []
 
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
-        """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else."""
+        """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else.
+
+        Raises:
+            InputError: no such vectors.
+        """
+
+        vectors = numbers("vectors", vectors)
+        if vectors.shape[1:] != (len(self.problem.form.names),):
+            raise InputError(f"vectors of the shape {vectors.shape}; expected (candidate, parameter)")
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
             try:

@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from hexmj.checks import check_types
-from hexmj.controllers.protocol import Controller
+from hexmj.checks import check_types, typed, whole
+from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.files import path_of
 from hexmj.locks import locked
 from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
 from hexmj.search.problems import Problem, Sample
+from hexmj.starts import check_draw
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps.plain import plain
 
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
 
 Costs = Callable[[np.ndarray], np.ndarray]
 """(candidate, parameter) -> (candidate,)."""
+
+MOST = 10_000
+"""Individuals of the largest population."""
 
 ALGORITHMS = {"evolution": Evolution, "cmaes": CovarianceAdaptation}
 
@@ -69,6 +74,11 @@ class Effort:
 
     def __post_init__(self) -> None:
         check_types(self)
+        whole("population", self.population, 4 if self.algorithm == "cmaes" else 2, MOST, " individuals")
+        check_draw(self.starts, self.seed)
+        check_draw(self.refine_starts, self.seed)
+        if self.begin is not None:
+            check_controller_type(self.begin)
         if self.budget < self.population:
             raise InputError(f"budget = {self.budget}; expected at least one generation, {self.population} evaluations")
         if self.refine_budget < 0:
@@ -111,6 +121,10 @@ def search(
         InputError: settings that make no sense, a file that is damaged or cannot be written, or a folder in use.
         SimulationError: a physical walk that failed; the evaluations before it are kept.
     """
+    typed("problem", problem, Problem)
+    typed("effort", effort, Effort)
+    typed("progress", progress, Progress | None)
+    folder = None if folder is None else path_of(folder)
     with locked(folder) if folder else nullcontext():
         return _search(problem, effort, folder, threads, progress)
 

@@ -3,8 +3,8 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed.  What a module imports for its types alone is left out,
 except where an `__init__` loads names as they are used; a name that an `__init__` passes on is followed to the one
-module it comes from.  Data files (TOML, XML, JSON) that a module names count like its source, if they lie beside it or
-in the package's `assets`.
+module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, count like its
+source, if they lie beside it, in the package's `assets` or, for a user's own, in the current folder.
 """
 
 import ast
@@ -28,7 +28,7 @@ CARRIERS = {
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 
-DATA = re.compile(r"""["']([\w. -]+\.(?:toml|xml|json))["']""")
+DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
 
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
@@ -82,7 +82,7 @@ def code(modules: frozenset[str]) -> Code:
         else:
             module = _read(name, file)
             sources[module_label(name)] = digest(module.source.encode())
-            sources |= _data(file, module.source)
+            sources |= _data(module_label(name), file, module.source)
             passed_on = {module.bound[attribute]} if attribute in module.bound else set()
             if attribute and _file(inner := f"{name}.{attribute}"):
                 passed_on.add((inner, ""))
@@ -141,11 +141,16 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, tuple[str, str]]
             yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
 
 
-def _data(file: Path, source: str) -> dict[str, str]:
-    """Digests of the data files that a source names."""
-    folders = file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"
-    found = {folder / name for name in DATA.findall(source) for folder in folders}
-    return {f"{path.parent.name}/{path.name}": digest(path.read_bytes()) for path in found if path.is_file()}
+def _data(module: str, file: Path, source: str) -> dict[str, str]:
+    """Digests of the data files that a module's source names."""
+    folders = [file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"]
+    folders += [] if file.is_relative_to(PACKAGE) else [Path.cwd()]
+    found = {name: {folder / name for folder in folders if (folder / name).is_file()} for name in DATA.findall(source)}
+    return {
+        f"{module}, {name}": digest(b"".join(path.read_bytes() for path in sorted(paths)))
+        for name, paths in found.items()
+        if paths
+    }
 
 
 @cache

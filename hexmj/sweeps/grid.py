@@ -1,5 +1,6 @@
 """Cells computed one after another or on any executor, kept as they finish, and put together along named axes."""
 
+import os
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
@@ -7,8 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
+from hexmj.checks import typed
 from hexmj.errors import InputError
-from hexmj.files import prepare
+from hexmj.files import path_of, prepare
 from hexmj.progress import Progress
 from hexmj.sweeps.cells import Cell
 from hexmj.sweeps.files import read, write
@@ -70,13 +72,14 @@ def finish(
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
-    folder = None if folder is None else Path(folder)
-    executor, progress, threads = how.get("executor"), how.get("progress"), how.get("threads")
+    folder = None if folder is None else path_of(folder)
+    executor = typed("executor", how.get("executor"), Executor | None)
+    progress, threads = typed("progress", how.get("progress"), Progress | None), how.get("threads")
     records = [cell.record() if folder else "" for cell in cells]
     paths = [
         folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
     ]
-    if folder and not all(path and path.exists() for path in paths):
+    if folder and not all(path and os.path.exists(path) for path in paths):
         prepare(folder)
     whole = sum(cell.work for cell in cells)
     told = [0.0] * len(cells)

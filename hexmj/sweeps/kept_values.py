@@ -1,7 +1,9 @@
 """Many small values of a pure function, kept line by line in one file: the evaluations of a search."""
 
+import math
 import os
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +34,10 @@ class KeptValues:
         """
         self._cell, self._threads = cell, threads
         self._values: dict[bytes, float] = {}
-        self._path = None
+        self._path, self._seed = None, 0
         if folder:
             record = cell.record()
+            self._seed = zlib.crc32(record.encode())
             self._path = folder / f"{cell.stem(record)}.jsonl"
             self._begin(self._path, record)
         self.known = len(self._values)
@@ -49,7 +52,7 @@ class KeptValues:
             picked = rows[list(new.values())]
             values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
-                _add(self._path, "".join(map(_line, new, values.tolist())))
+                _add(self._path, "".join(map(self._line, new, values.tolist())))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])
 
@@ -62,20 +65,18 @@ class KeptValues:
                     raise InputError(f"{path} is damaged, or of another search; delete it, and it is made anew")
                 lines = file.read().decode(errors="replace").split("\n")
         for line in lines:
-            text = line.rpartition(" ")[0]
-            if text and line == _checked(text):
-                row, value = text.split(" ")
-                self._values[bytes.fromhex(row)] = float.fromhex(value)
+            row, _, value = line.rpartition(" ")[0].partition(" ")
+            with suppress(ValueError):  # of what is no line
+                key, number = bytes.fromhex(row), float.fromhex(value)
+                if f"{line}\n" == self._line(key, number) and math.isfinite(number):
+                    self._values[key] = number
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 
-
-def _line(row: bytes, value: float) -> str:
-    return _checked(f"{row.hex()} {value.hex()}") + "\n"
-
-
-def _checked(text: str) -> str:
-    return f"{text} {zlib.crc32(text.encode()):08x}"
+    def _line(self, row: bytes, value: float) -> str:
+        """With a checksum that no line of another cell has."""
+        text = f"{row.hex()} {value.hex()}"
+        return f"{text} {zlib.crc32(text.encode(), self._seed):08x}\n"
 
 
 def _add(path: Path, text: str, begin: bool = False) -> None:

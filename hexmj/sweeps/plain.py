@@ -1,6 +1,7 @@
 """Settings as plain JSON: what a cell is named by and what its file tells."""
 
 import hashlib
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
@@ -10,6 +11,9 @@ from typing import Any
 import numpy as np
 
 from hexmj.errors import InputError
+
+NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["']""")
+"""Files and their folders in an MJCF."""
 
 
 def plain(value: Any) -> Any:
@@ -31,7 +35,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, Path):
-        return f"{value.name}@{digest(value.read_bytes())}" if value.is_file() else str(value)
+        return f"{value.name}@{digest(content(value))}" if value.is_file() else str(value)
     raise InputError(
         f"{value!r:.80} is no setting; expected a number, text, a path, a frozen dataclass, or a tuple, dict or array"
         " (float64, int64, bool) of these"
@@ -68,6 +72,21 @@ def classes(value: Any) -> Iterator[type]:
     elif _frozen(value):
         yield type(value)
         yield from classes([getattr(value, one.name) for one in fields(value)])
+
+
+def content(path: Path) -> bytes:
+    """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there."""
+    texts, names, folders = [path.read_bytes()], list[str](), {""}
+    for text in texts:
+        for kind, value in NAMED.findall(text.decode(errors="replace")) if path.suffix == ".xml" else ():
+            if kind != "file":
+                folders.add(value)
+            elif value not in names:
+                names.append(value)
+                if (included := path.parent / value).suffix == ".xml" and included.is_file():
+                    texts.append(included.read_bytes())
+    files = {path.parent / folder / name for name in names for folder in folders}
+    return b"".join([*texts, *(file.read_bytes() for file in sorted(files) if file.is_file())])
 
 
 def digest(content: bytes) -> str:

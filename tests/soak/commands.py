@@ -21,7 +21,7 @@ SMALL = {
     "converge": "--vps 400 --starts 2 --window 2",
     "terrain": "--grounds step --heights 1 --velocities 0.5 --starts 1 --grasps 0",
     "map": "--values 80 --velocities 0.5 --starts 2 --window 3",
-    "disturb": "--velocities 0.5 --starts 2 --window 3",
+    "disturb": "--velocities 0.5 --starts 2 --window 3 --disturbances halt --strategies reorganise",
     "rerun": "nowhere",
     "check-controller": "nobody",
     "doctor": "--json",
@@ -65,7 +65,8 @@ def command_lines(draw: st.DrawFn) -> tuple[str, ...]:
     line += ["--out", "out"] if "--out" in options else []
     word = st.one_of(st.sampled_from(NUMBERS), st.sampled_from(WORDS + choices), st.text(max_size=12))
     typed = word.filter(lambda word: "\0" not in word)
-    for option in draw(st.lists(st.sampled_from(options), max_size=4)):
+    fewest = draw(st.sampled_from((0, 1, 1, 1, 1)))
+    for option in draw(st.lists(st.sampled_from(options), min_size=fewest, max_size=4)):
         line += [option, *draw(st.one_of(st.lists(typed, max_size=2), typed.map(lambda word: [word])))]
     return tuple(line)
 

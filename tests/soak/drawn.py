@@ -1,5 +1,6 @@
 """Inputs of each kind, drawn from a seed and tried one by one."""
 
+import gc
 import re
 import warnings
 from collections import Counter
@@ -75,3 +76,5 @@ def _warm() -> None:
     files.originals()
     hexmj.flss(hexmj.LDVS, [0.5], n_starts=2, window=3.0, threads=1)
     hexmj.compare(hexmj.LDVS, [0.5], n_starts=1, window=2.0, threads=1)
+    gc.collect()
+    gc.freeze()  # what is here stays shared with the processes to come
