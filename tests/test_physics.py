@@ -265,10 +265,11 @@ def test_its_state_is_written_into_the_folder_given_and_nowhere_else(diverged, s
 
 
 def test_a_roll_is_mujocos_own_steps(settled):
-    """To the last bit, with what the solver goes on from."""
+    """To the last bit, with what the solver goes on from, and so after steps in parts."""
     model, ids = settled.compiled.model, np.array([3])
     control = settled.ctrl[ids, np.newaxis].repeat(5, axis=1) + np.linspace(0.0, 0.1, 5)[:, np.newaxis]
     batch, data = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model)
+    batch.roll(ids, control, 4)
     batch.put(ids, settled.state[ids])
     rolled = batch.roll(ids, control)
     data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = np.split(settled.state[3], [model.nq, model.nq + model.nv])

@@ -85,7 +85,7 @@ GROUPS = {
     ),
     "stability": (Module("stability.py", ("tests/test_stability.py",), ""),),
     "losses": (
-        Module("measures/kinematic.py", ("tests/test_loss_frequency.py",), ""),
+        Module("measures/kinematic.py", ("tests/test_stability.py", "tests/test_loss_frequency.py"), ""),
         Module("controllers/losses.py", ("tests/test_controllers.py",), "loss or lost or makes_no_sense or on_paper"),
     ),
     "drive": (
