@@ -14,10 +14,12 @@ import pytest
 
 import hexmj
 from hexmj.controllers import Sensed, Step, named, stepwise
+from hexmj.controllers.asking import advanced
 from hexmj.controllers.conformance import FIRST, check_controller, findings
 from hexmj.controllers.cruse1998.presets import weights_toml
 from hexmj.controllers.losses import first_losses, planned_losses
 from hexmj.controllers.protocol import Controller, ReadingPlan, settings_of
+from hexmj.legs import CENTRED
 from hexmj.measures.physical import physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
@@ -67,11 +69,16 @@ def test_fast_losses_are_those_of_the_plan(name, order):
         assert 0 < (fast > 0).sum() < 70
 
 
-def test_a_foreign_controller_has_the_same_losses_whatever_is_held_at_a_time(monkeypatch):
+@pytest.mark.parametrize("held", [350, 49])
+def test_a_foreign_controller_has_the_same_losses_whatever_is_held_at_a_time(held, monkeypatch):
+    """Seven steps, or one, and none beyond what was asked for."""
     starts, velocity, steps = hexmj.draw_starts(50, 0), np.full(50, 0.5), np.full(50, 400)
     whole = first_losses(Own().begin(starts, velocity, STRIDE), steps)
-    monkeypatch.setattr("hexmj.controllers.losses.HELD", 350)
-    assert np.array_equal(first_losses(Own().begin(starts, velocity, STRIDE), steps), whole)
+    monkeypatch.setattr("hexmj.controllers.losses.HELD", held)
+    plan = Own().begin(starts, velocity, STRIDE)
+    assert np.array_equal(first_losses(plan, steps), whole)
+    assert (whole == 0).any()
+    assert plan.done == 400
     assert np.array_equal(whole, LDVS.begin(starts, velocity, STRIDE).first_losses(steps))
     assert hexmj.flss(Own(), [0.5], n_starts=50).equals(hexmj.flss(LDVS, [0.5], n_starts=50))
 
@@ -193,6 +200,7 @@ def test_a_stepwise_plan_hears_what_it_is_told():
         (Step(True, True), "x of a step is of type bool; expected numbers"),
         (Step(None, True), "x of a step is of type object; expected numbers"),  # pyright: ignore[reportArgumentType]
         (Step(0.0, True, height="high"), "height of a step is of type"),  # pyright: ignore[reportArgumentType]
+        (Step([[0.0], [0.0, 1.0]], True), "x of a step is .* expected one array"),  # pyright: ignore[reportArgumentType]
         ((0.0, True), r"a step gave \(0.0, True\); expected a Step"),
     ],
 )
@@ -296,6 +304,10 @@ def test_feedback_needs_plans_that_can_be_steered():
     reading = hexmj.ReadsLegs(Own())
     with pytest.raises(hexmj.InputError, match="feedback around own; expected a controller whose plans can go on"):
         reading.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+    with pytest.raises(
+        hexmj.InputError, match=r"feedback around .*; expected another: this one reads the legs already"
+    ):
+        hexmj.ReadsLegs(hexmj.ReadsLegs(LDVS)).begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
 
 
 @pytest.mark.parametrize("acceleration", [None, hexmj.Acceleration(rate=0.01)])
@@ -440,6 +452,7 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("steps", spoilt(starts_halved), "starts are changed as it goes on; expected the plan to work on a copy"),
     ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]}), r"x is float64 of the shape \(600, 1, 6\); expected"),
     ("steps", walks_changed(lambda walk: {"stance": 1.0 * walk.stance}), "stance is float64 .* expected bool"),
+    ("steps", walks_changed(lambda walk: {"geometry": CENTRED}), "geometry = .*; expected that of the stride"),
     ("times", walks_changed(lambda walk: {"time": walk.time - 0.1}), "expected k dt"),
     ("times", walks_changed(lambda walk: {"velocity": np.full_like(walk.velocity, 0.5)}), "expected V_r as commanded"),
     ("steps", steps_changed(x=lambda walk: np.where(walk.stance[0], walk.x[0], np.nan)), "x is nan in step"),
@@ -524,6 +537,13 @@ class Liar:
         true = plan.advance
         plan.advance = lambda steps: LIES[self.lie](true(steps))
         return plan
+
+
+def test_a_plan_that_goes_on_by_other_steps_is_refused():
+    plan = LDVS.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+    true, plan.advance = plan.advance, lambda steps: true(steps + 1)
+    with pytest.raises(hexmj.InputError, match="a plan is at step 4 after it was asked for 3 more; expected 3"):
+        advanced(plan, 3)
 
 
 @pytest.mark.parametrize("lie", LIES)

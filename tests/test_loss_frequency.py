@@ -114,6 +114,15 @@ def test_generalised_flss_averages_over_velocities():
     assert flss_over_range(LDVS, 0.6, 0.6, n_starts=2000, window="start")[0] == ends[1]
 
 
+def test_seven_samples_are_drawn_unless_told():
+    usual = flss_over_range(UNCOORDINATED, 0.8, 0.9, window="start")
+    assert usual == flss_over_range(UNCOORDINATED, 0.8, 0.9, window="start", n_starts=7000)
+
+
+def test_a_range_may_begin_at_a_stand():
+    assert flss_over_range(UNCOORDINATED, 0.0, 0.0, n_starts=20, window=10.0)[0] == 0.0
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -220,6 +220,17 @@ def test_acceleration_is_eq_11_step_by_step():
     assert (np.diff(walked.velocity[:150, 0]) > 0).all()
 
 
+def test_steps_end_beyond_aep_and_pep_not_at_them():
+    at_pep = UNCOORDINATED.begin(np.full((1, 6), STRIDE.pep0), np.zeros(1), STRIDE)
+    assert at_pep.advance(5).stance.all()
+    swinging = UNCOORDINATED.begin(np.zeros((1, 6)), np.zeros(1), STRIDE)
+    swinging.see(np.full((1, 6), 9.9), np.zeros((1, 6), dtype=bool))
+    steps = swinging.advance(2)
+    assert (steps.x[0] == STRIDE.aep0).all()
+    assert not steps.stance[0].any()
+    assert steps.stance[1].all()
+
+
 def test_tips_stay_within_the_step_range():
     walked = walk(random_starts(np.random.default_rng(6), 100), LDVS, 0.7, 100.0)
     assert walked.x.max() <= 10.0 + 0.1 + 1e-9

@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, Cruse1998, Symmetric, Weights
 from hexmj.controllers.cruse1998.presets import OWN, weights_toml
 from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError
-from hexmj.legs import N1, N2, N3, N4
+from hexmj.legs import N1, N2, N3, N4, Geometry
 from hexmj.measures.kinematic import flss, walk
-from hexmj.timing import Stride
+from hexmj.starts import MOST_DRAWN, draw_starts
+from hexmj.timing import Acceleration, Stride
 
 ROOT = Path(__file__).parents[1]
 
@@ -129,10 +131,35 @@ def test_weights_off_the_neighbour_sets():
     p1[0, 5] = 1.0
     with pytest.raises(InputError, match="p1 of leg 1 from leg 6"):
         Weights(p1, *(np.zeros((6, 6)) for _ in range(6)))
+    with pytest.raises(InputError, match=r"p1 has shape \(5, 6\); expected \(6, 6\)"):
+        Weights(np.zeros((5, 6)), *(np.zeros((6, 6)) for _ in range(6)))
+    with pytest.raises(InputError, match="p31 holds a number that is not finite"):
+        Weights(*(np.full((6, 6), np.nan if kind == 2 else 0.0) for kind in range(7)))
+    with pytest.raises(InputError, match="p1_i = inf; expected a finite number"):
+        Symmetric(p1_i=np.inf)
     with pytest.raises(InputError, match="expected 58"):
         Weights.from_vector([0.0] * 10)
     with pytest.raises(InputError, match="expected 10"):
         Symmetric.from_vector([0.0] * 8)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: Geometry(lateral=(18.0, 0.0, 15.0)), "expected finite origins and lateral distances above 0 mm"),
+        (lambda: Geometry(origins=(28.0, float("inf"), -20.0)), "expected finite origins"),
+        (lambda: Acceleration(start=1.0), r"velocity at the start = 1.0; expected 0 <= V_r\(0\) < 1"),
+        (lambda: Acceleration(rate=0.0), "acceleration = 0.0; expected a finite number above 0"),
+        (lambda: Conditions.of(gravity=1.0), "condition 'gravity'; valid names: "),
+        (
+            lambda: draw_starts(MOST_DRAWN + 1, 0),
+            f"starts = {MOST_DRAWN + 1}; expected at most {MOST_DRAWN} in one array",
+        ),
+    ],
+)
+def test_settings_that_make_no_sense(made, words):
+    with pytest.raises(InputError, match=words):
+        made()
 
 
 @pytest.mark.parametrize(

@@ -222,6 +222,15 @@ def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
         settle(draw_starts(2, 0), Conditions.of(settling_time=1.0))
 
 
+def test_an_insect_that_diverges_as_it_settles_is_an_error(monkeypatch):
+    def diverge(*_):
+        raise Diverged(1, "mjWARN_BADQACC", {"qpos": np.zeros(25)})
+
+    monkeypatch.setattr(MujocoBatch, "rest", diverge)
+    with pytest.raises(SimulationError, match="start 1 diverged while settling, at 0 time units: mjWARN_BADQACC"):
+        settle(draw_starts(2, 0))
+
+
 @pytest.fixture(scope="module")
 def diverged(tmp_path_factory) -> SimulationError:
     """Of a walk whose start 1 is too fast from the beginning."""
@@ -253,6 +262,22 @@ def test_its_state_is_written_into_the_folder_given_and_nowhere_else(diverged, s
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
     mujoco.mj_step(model, data)
     assert data.warning.number.any()
+
+
+def test_a_roll_is_mujocos_own_steps(settled):
+    """To the last bit, with what the solver goes on from, and so after steps in parts."""
+    model, ids = settled.compiled.model, np.array([3])
+    control = settled.ctrl[ids, np.newaxis].repeat(5, axis=1) + np.linspace(0.0, 0.1, 5)[:, np.newaxis]
+    batch, data = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model)
+    batch.roll(ids, control, 4)
+    batch.put(ids, settled.state[ids])
+    rolled = batch.roll(ids, control)
+    data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = np.split(settled.state[3], [model.nq, model.nq + model.nv])
+    for n in range(5):
+        data.ctrl[:] = control[0, n]
+        mujoco.mj_step(model, data)
+        assert np.array_equal(rolled.after[0, n], np.concatenate([data.qpos, data.qvel, data.qacc_warmstart]))
+        assert np.array_equal(rolled.sensors[0, n], data.sensordata)
 
 
 @pytest.mark.parametrize("parts", [2, 4])

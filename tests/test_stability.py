@@ -109,11 +109,12 @@ def test_shapes_that_do_not_fit():
         stability_margin(np.zeros((4, 6, 2)), np.ones(6, dtype=bool))
 
 
-def test_support_polygon_is_the_hull_counter_clockwise():
-    feet = planned_feet(np.zeros(6))
-    corners = support_polygon(feet, np.ones(6, dtype=bool))
-    x, y = corners.T
-    assert 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)) == pytest.approx(ConvexHull(feet).volume)
+@pytest.mark.parametrize("standing", [[0, 1, 3], [0, 2, 4], [1, 2, 4, 5], [0, 1, 2, 3, 4, 5]])
+def test_support_polygon_is_the_hull_counter_clockwise(standing):
+    feet, stance = planned_feet(np.zeros(6)), np.isin(np.arange(6), standing)
+    for mirrored in (feet, feet * [1.0, -1.0]):
+        x, y = support_polygon(mirrored, stance).T
+        assert 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)) == pytest.approx(ConvexHull(feet[stance]).volume)
 
 
 def test_mirrored_postures_have_equal_margins():

@@ -177,6 +177,7 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
     ("moves", "struck"),
     [
         ((-1.0, -1.0, -1.0, -1.0, -1.0), (0, 0, 0, 0)),
+        ((-1.0, -1.0, -1.0, 0.2, -1.0), (0, 0, 0, 0)),
         ((-1.0, -1.0, -1.0, 0.21, -1.0), (0, 0, 1, 0)),
         ((-1.0, -1.0, -1.0, -0.3, -0.04), (0, 0, 0, 1)),  # above ground, on at its speed
         ((-0.3, -0.04, -0.04, -0.04, -0.04), (0, 0, 0, 0)),  # not asked in the middle of a step of the network

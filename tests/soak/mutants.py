@@ -32,9 +32,10 @@ SECONDS = 300.0
 NARROW = ("LANES = 64\n", "LANES = 3\n")
 """The kernel without its compiler is as slow as it is wide; what it gives does not depend on that."""
 
-WALKS = "fed_back or batch or told or lifted or settled or push_gives or reach or diverged or progress or grasp"
+WALKS = "fed_back or batch or told or lifted or settled or push_gives or reach or diverge or progress or grasp or roll"
 MEASURES = (
-    "chunks_show or tracking or belong or settled or whole or after_a_fall or bounce or follow or reach or any_batch"
+    "chunks_show or tracking or beyond or belong or settled or whole or after_a_fall or bounce or follow or reach"
+    " or any_batch"
 )
 
 CONFTEST = """
@@ -84,7 +85,7 @@ GROUPS = {
     ),
     "stability": (Module("stability.py", ("tests/test_stability.py",), ""),),
     "losses": (
-        Module("measures/kinematic.py", ("tests/test_loss_frequency.py",), ""),
+        Module("measures/kinematic.py", ("tests/test_stability.py", "tests/test_loss_frequency.py"), ""),
         Module("controllers/losses.py", ("tests/test_controllers.py",), "loss or lost or makes_no_sense or on_paper"),
     ),
     "drive": (
