@@ -3,15 +3,22 @@
 import signal
 import sys
 
+STOPS = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+"""What stops the command as Ctrl-C does."""
+
 
 def main() -> None:
-    """Run the command line; Ctrl-C and SIGTERM stop it, exit code 130."""
+    """Run the command line; Ctrl-C, SIGTERM and a terminal that closes stop it, exit code 130."""
     try:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        for one in STOPS:
+            if signal.getsignal(one) != signal.SIG_IGN:  # as `nohup` has it
+                signal.signal(one, signal.default_int_handler)
         from hexmj.cli.main import main as command
 
         command()
     except KeyboardInterrupt:
+        for one in (signal.SIGINT, *STOPS):
+            signal.signal(one, signal.SIG_IGN)
         print("hexmj: stopped", file=sys.stderr)
         sys.exit(130)
 

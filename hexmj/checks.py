@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from numbers import Integral, Real
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -77,6 +78,17 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
         if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
             return np.array(array, dtype=float)
     raise InputError(f"{name} = {_shown(values)}; expected numbers")
+
+
+def path_of(path: Path | str) -> Path:
+    """A path as the system takes it.
+
+    Raises:
+        InputError: it is none.
+    """
+    if "\0" in str(typed("path", path, Path | str)):
+        raise InputError(f"path = {str(path)!r:.80}; expected one without a null character")
+    return Path(path)
 
 
 def label(name: str, value: Any) -> str:

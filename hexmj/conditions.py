@@ -104,7 +104,7 @@ class FootContact:
     """Coefficient of sliding friction between the ground and feet or trunk."""
     grasp: float = 0.0
     """Adhesion of a foot that the plan lets stand, in multiples of the insect's weight; what presses the feet too
-    deep into the ground is refused as the insect settles, about 15 for the stick insect."""
+    deep into the ground is refused as the insect settles, about 10 for the stick insect."""
 
     __post_init__ = check_types
 
@@ -169,7 +169,7 @@ class Conditions:
         if self.ground.ground == "rough":
             rough = Bound(lengths.lowest_bump, lengths.highest_bump, "mm where rough", closed=True)
             rough.check("ground_height", self.ground.ground_height)
-        whole("ground_seed", self.ground.ground_seed, 0)
+        whole("ground_seed", self.ground.ground_seed, 0, 2**63 - 1)
 
     @classmethod
     def of(cls, **values: Any) -> "Conditions":

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from uuid import uuid4
 
-from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.locks import among_writers
 
@@ -23,19 +22,14 @@ MARK = b"\nhexmj, sha256 "
 SEAL = len(MARK) + 64
 """Length of both [bytes]."""
 
+WRITTEN: dict[Path, str] = {}
+"""File -> SHA-256 of what this process wrote to it last, whatever another one has put there since."""
+
+WRITING: set[Path] = set()
+"""What this process is writing at this moment."""
+
 PART = ".part-"
 """Begins the names of files that are being written; a killed process leaves them, the next run removes them."""
-
-
-def path_of(path: Path | str) -> Path:
-    """A path as the system takes it.
-
-    Raises:
-        InputError: it is none.
-    """
-    if "\0" in str(typed("path", path, Path | str)):
-        raise InputError(f"path = {str(path)!r:.80}; expected one without a null character")
-    return Path(path)
 
 
 def write_whole(path: Path, content: bytes) -> Path:
@@ -57,18 +51,21 @@ def replacing(path: Path) -> Iterator[Path]:
         InputError: it cannot be written; what stood there before still does.
     """
     part = path.absolute().with_name(f"{PART}{uuid4().hex}{path.suffix}")
+    WRITING.add(part)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with among_writers(path.parent):
             yield part
             with part.open("rb+") as file:
                 os.fsync(file.fileno())
+                WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
             os.replace(part, path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+        WRITING.discard(part)
 
 
 def prepare(folder: Path) -> None:

@@ -1,5 +1,6 @@
-"""Work on all cores: contiguous blocks of starts on a pool of threads that release the GIL."""
+"""What this machine has, and work on all of its cores: blocks of starts on a pool of threads that release the GIL."""
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -15,6 +16,14 @@ def cores() -> int:
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def memory() -> float:
+    """This machine's memory [bytes]; infinite where the operating system does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return math.inf
 
 
 def thread_count(threads: int | None = None) -> int:

@@ -17,7 +17,7 @@ from hexmj.legs import FIG1, Geometry
 WINDOWS = ("walk", "start")
 """Named observation times, see `observation_time`."""
 
-MOST_STEPS = 10**9
+MOST_STEPS = 10**7
 """Longest walk [steps]; far beyond any use."""
 
 FAR = 1e6

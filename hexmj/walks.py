@@ -36,9 +36,10 @@ class Walk:
         typed("geometry", self.geometry, Geometry)
         shape = np.shape(self.stance)
         for name in _arrays(self):
-            values, kind = np.asarray(getattr(self, name)), bool if name == "stance" else float
+            values, kind = getattr(self, name), bool if name == "stance" else float
+            typed(f"a walk's {name}", values, np.ndarray)
             expected = {"time": shape[:1], "velocity": shape[:2]}.get(name, shape)
-            if len(shape) != 3 or values.shape != expected or values.dtype != kind:
+            if len(shape) != 3 or values.shape != expected or values.dtype != kind or np.ma.is_masked(values):
                 raise InputError(
                     f"a walk's {name} is {values.dtype} of the shape {values.shape}; expected {np.dtype(kind)} of the"
                     f" shape {expected}: its steps, starts and legs"

@@ -1,6 +1,7 @@
 """The examples' own controllers go through everything, and bodies do what plans ask for."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -259,3 +260,30 @@ def test_a_controller_that_breaks_a_law_ends_the_command_with_1(run, tmp_path):
     assert code == 1
     (wrong,) = (line for line in out.splitlines() if not line.startswith("well"))
     assert "x is 99 mm in step 0, start 0 (V = 0), leg L1; expected -21 to 11 mm" in wrong
+
+
+CHATTY = """
+from dataclasses import dataclass
+import hexmj
+print("module")
+
+@dataclass(frozen=True)
+class Chatty:
+    name: str = "chatty"
+
+    def begin(self, *asked, **how):
+        print("begin")
+        return hexmj.LDVS.begin(*asked, **how)
+"""
+
+
+@pytest.mark.parametrize("more", [(), ("--processes", "2")])
+def test_what_a_controller_prints_is_no_answer(tmp_path, more):
+    (tmp_path / "mine.py").write_text(CHATTY)
+    words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--window", "3"]
+    command = [sys.executable, "-m", "hexmj", *words, "--no-video", "--json", *more]
+    paths = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
+    done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, env=paths)
+    assert json.loads(done.stdout)["chatty"]["kinematic"]
+    assert "module\n" in done.stderr
+    assert "begin\n" in done.stderr

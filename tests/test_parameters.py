@@ -168,7 +168,7 @@ def test_settings_that_make_no_sense(made, words):
         ({"dt": 0.0}, "dt = 0.0; expected a time step above 0"),
         ({"aep0": -11.0}, "expected pep_min <= pep0 < aep0"),
         ({"pep_min": 0.0}, "expected pep_min <= pep0 < aep0"),
-        ({"pep0": float("nan")}, "must be finite"),
+        ({"pep0": float("nan")}, "expected aep0, pep0 and pep_min between"),
         ({"geometry": "fig1"}, "geometry = 'fig1'; expected a Geometry"),
     ],
 )

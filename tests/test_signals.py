@@ -72,7 +72,8 @@ def test_while_processes_compute_cells(tmp_path, by, group):
     assert not list(tmp_path.rglob("manifest.json"))
 
 
-def test_while_a_search_evaluates(tmp_path):
+@pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGHUP])
+def test_while_a_search_evaluates(tmp_path, by):
     out = tmp_path / "evaluations"
-    stopped(started("search", "--out", str(tmp_path), until=out / "population-*.jsonl", wait=1.0), signal.SIGTERM)
+    stopped(started("search", "--out", str(tmp_path), until=out / "population-*.jsonl", wait=1.0), by)
     assert {path.suffix for path in out.iterdir()} == {".jsonl"}, "the lock is gone, the evaluations are not"

@@ -56,7 +56,7 @@ def _plain_model(body: Body, files: bytes) -> mujoco.MjModel:
     try:
         model = _spec(body).compile()
     except ValueError as error:
-        raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
+        raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {_sentence(error)}") from None
     check_described(model, body)
     return model
 
@@ -80,11 +80,18 @@ def _compiled(conditions: Conditions, looks: bool, files: bytes) -> CompiledBody
         load.explicitinertial = True
     if contact.grasp:
         _add_grasp(spec, body, contact.grasp * body.mass * gravity(body))
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise InputError(f"{conditions.ground} cannot be built: {_sentence(error)}") from None
     model.pair_friction[:, :2] = contact.friction
     if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
         _redistribute(model, body, masses)
     return measured(model, conditions)
+
+
+def _sentence(error: ValueError) -> str:
+    return " ".join(str(error).split())
 
 
 def _spec(body: Body) -> mujoco.MjSpec:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
@@ -12,6 +13,7 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
+from hexmj.cli import answers
 from hexmj.cli.words import checked, typed
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.literal import literal
@@ -61,13 +63,11 @@ def main() -> None:
     try:
         try:
             options = options_of(words := checked(sys.argv[1:]))
-            with typed(words):
+            with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
         finally:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()
-    except KeyboardInterrupt:
-        sys.exit(_complain("stopped", 130))
     except InputError as error:
         sys.exit(_complain(error, 2))
     except SimulationError as error:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.cli import words
 from hexmj.errors import InputError
-from hexmj.files import opened, read_text
+from hexmj.files import WRITTEN, opened, read_text
 from hexmj.loaded import importable
 from hexmj.results import json_text, save_text
 from hexmj.sweeps.code import code
@@ -81,7 +81,7 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         code={name: one for name, one in made.sources.items() if name.partition("@")[2] not in own.values()},
         own=own,
         processor=_processor(),
-        files={file.relative_to(path.parent).as_posix(): _digest(file) for file in written},
+        files={file.relative_to(path.parent).as_posix(): _written(file) for file in written},
     )
     return save_text(json_text({"format": FORMAT} | asdict(told)) + "\n", path)
 
@@ -175,6 +175,11 @@ def _processor() -> list[str]:
     extensions: Any = np.show_config(mode="dicts")
     extensions = extensions.get("SIMD Extensions", {})
     return [platform.machine(), *extensions.get("baseline", ()), *extensions.get("found", ())]
+
+
+def _written(path: Path) -> str:
+    """Of a file as this process wrote it."""
+    return WRITTEN[path.absolute()][: len(digest(b""))]
 
 
 def _digest(path: Path) -> str:

@@ -3,6 +3,7 @@
 Each command is a frozen dataclass made of these parts, and offers just the options that it obeys.
 """
 
+import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -161,6 +162,7 @@ class Sweepers:
             try:
                 yield executor
             except KeyboardInterrupt:  # nobody waits for cells that are stopped
+                threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
                 for worker in active_children():
                     worker.terminate()
                 raise

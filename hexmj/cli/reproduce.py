@@ -8,6 +8,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import new_table, print_json, show
+from hexmj.errors import InputError
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder
 
@@ -18,7 +19,7 @@ class Reproduce:
 
     quick: bool = False
     """Fewer starts and velocities, under a minute; the full protocol takes several."""
-    only: tuple[str, ...] = ()
+    only: tuple[str, ...] | None = None
     """Keys of the claims to judge, without figures; all unless given."""
     seed: int = 1998
     """Seed of the random starts; the ideal sets were searched with 0 and 1."""
@@ -34,13 +35,15 @@ class Reproduce:
         from hexmj.paper.reproduce import reproduce
         from hexmj.paper.table import HEADS, claims_json, summary
 
+        if self.only == ():
+            raise InputError("--only without keys; expected at least one, or no --only for all")
         results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with progress_bar("reproducing") as progress, self.sweepers.executor() as executor:
             rows, files = reproduce(
-                self.out, protocol, self.only, executor=executor, progress=progress, threads=self.sweepers.threads
+                self.out, protocol, self.only or (), executor=executor, progress=progress, threads=self.sweepers.threads
             )
-        settings = {"protocol": asdict(protocol), "only": self.only}
+        settings = {"protocol": asdict(protocol), "only": self.only or ()}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})

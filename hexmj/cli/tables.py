@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hexmj import results
+from hexmj.cli.answers import ANSWERS
 from hexmj.literal import literal
 from hexmj.results import json_text
 
@@ -62,4 +63,4 @@ def show(*parts: Any) -> None:
 
 
 def print_json(value: dict[str, Any]) -> None:
-    print(json_text(value))
+    print(json_text(value), file=ANSWERS.get())

@@ -15,9 +15,12 @@ from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, ch
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.threads import thread_count
+from hexmj.threads import memory, thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk
+
+KEPT = 400
+"""Memory that a step of a start takes while it is planned [bytes]."""
 
 
 def begin(
@@ -67,6 +70,7 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     Raises:
         InputError: it does not, or it raised something.
     """
+    _check_memory(steps, len(plan.starts))
     end = plan.done + steps
     with said("a plan, advance"):
         walk = plan.advance(steps)
@@ -87,7 +91,23 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
         if bad.any():
             at, known = np.argwhere(bad)[0], "a number, or NaN where nothing tells" if may_be_unknown else "a number"
             raise InputError(f"a plan's {name} is {values[tuple(at)]} in {place(walk, at)}; expected {known}")
+    if walk.geometry != plan.stride.geometry:
+        raise InputError(f"a plan's geometry = {walk.geometry}; expected that of the stride")
+    if not np.allclose(walk.time, np.arange(end - steps + 1, end + 1) * plan.stride.dt, 1e-9, 0.0):
+        raise InputError(f"a plan's time is not that of its steps to {end}; expected k dt")
+    if not ((walk.velocity >= 0.0) & (walk.velocity < 1.0)).all():
+        raise InputError("a plan's velocity is below 0 or not below 1; expected V_r as it was commanded")
     return walk
+
+
+def _check_memory(steps: int, n_starts: int) -> None:
+    """Refuse steps that this machine's memory cannot hold."""
+    needed, there = KEPT * steps * n_starts, memory()
+    if needed > there:
+        raise InputError(
+            f"{steps} steps of {n_starts} starts, kept whole, take {needed / 1e9:.3g} GB; expected at most the"
+            f" {there / 1e9:.3g} GB of this machine"
+        )
 
 
 def place(walk: PlannedWalk, at: Sequence[int]) -> str:

@@ -172,7 +172,11 @@ def check_controller_type(controller: object) -> None:
     Raises:
         InputError: no frozen dataclass with a name and a method `begin`.
     """
-    if not (is_dataclass(controller) and not isinstance(controller, type) and isinstance(controller, Controller)):
+    try:
+        well = is_dataclass(controller) and not isinstance(controller, type) and isinstance(controller, Controller)
+    except Exception:  # of a property of a user's own
+        well = False
+    if not well:
         raise InputError(
             f"controller = {controller!r:.200}; expected a controller, a frozen dataclass with a name and a method"
             " begin, as a preset or hexmj.load_controller gives one"

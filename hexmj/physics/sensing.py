@@ -50,7 +50,7 @@ class Senses:
         self._before[ids] = contact
         joints, root = qpos[:, self._compiled.columns.qpos].reshape(len(ids), 6, -1), qpos[:, 3:ROOT_QPOS]
         return Sensed(
-            ids=ids,
+            ids=ids.copy(),
             tips=self._compiled.forward(joints),
             contact=contact,
             gained=contact & ~before,

@@ -19,6 +19,10 @@ from hexmj.physics.foot_path import standing_tips
 from hexmj.starts import checked_starts
 from hexmj.timing import Stride
 
+RESTING = 2.0 / 3.0
+"""How much of the depth at which steps are taken finely adhesion may press a foot in at rest; the rest is for walking,
+see `docs/exploded_walks.md`."""
+
 
 @dataclass(frozen=True, eq=False)
 class Settled:
@@ -122,7 +126,7 @@ def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
     Every step would be taken finely then, on contacts so hard that they throw the insect off.
     """
     deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.contact.grasp
-    allowed = SINK * compiled.conditions.path.standing_height
+    allowed = RESTING * SINK * compiled.conditions.path.standing_height
     if deepest > allowed:
         raise InputError(
             f"grasp = {grasp:g}: it presses feet {deepest:.3g} mm into the ground at rest; expected at most"

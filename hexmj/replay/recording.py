@@ -9,10 +9,10 @@ from hexmj import netcdf
 from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.checks import typed
+from hexmj.checks import path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.files import path_of, read_sealed, sealed, write_whole
+from hexmj.files import read_sealed, sealed, write_whole
 from hexmj.legs import LEGS
 from hexmj.literal import literal
 from hexmj.measures.compare import REPORTED

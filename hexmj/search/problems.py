@@ -127,7 +127,6 @@ class Sample:
         Raises:
             InputError: no such vectors.
         """
-
         vectors = numbers("vectors", vectors)
         if vectors.shape[1:] != (len(self.problem.form.names),):
             raise InputError(f"vectors of the shape {vectors.shape}; expected (candidate, parameter)")
@@ -137,6 +136,10 @@ class Sample:
                 candidate = self.problem.controller(vector)
             except (InputError, ValueError):
                 return REFUSED
+            except Exception as error:
+                raise InputError(
+                    f"{self.problem.form!r:.80} makes no controller of {vector}: {error!r:.200}"
+                ) from error
             return self._losses(candidate, [self.problem.window], threads)[0] / self.n_starts
 
         if self.problem.conditions or len(vectors) == 1:

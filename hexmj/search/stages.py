@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from hexmj.checks import check_types, typed, whole
+from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
-from hexmj.files import path_of
 from hexmj.locks import locked
 from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation

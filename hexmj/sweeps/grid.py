@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
-from hexmj.checks import typed
+from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import path_of, prepare
+from hexmj.files import prepare
 from hexmj.progress import Progress
 from hexmj.sweeps.cells import Cell
 from hexmj.sweeps.files import read, write

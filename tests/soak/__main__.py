@@ -8,11 +8,10 @@ import sys
 import time
 from argparse import ArgumentParser
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from tests.soak.drawn import KINDS, try_inputs
+from tests.soak.drawn import KINDS, Tried, try_inputs
 
 SHARES = {"commands": 0.5, "calls": 0.3, "files": 0.2}
 CHUNK = 500
@@ -34,8 +33,8 @@ def main() -> None:
         for number in range(max(1, round(told.inputs * share / CHUNK)))
     ]
     began, faults, codes = time.monotonic(), {}, {kind: Counter() for kind in shares}
-    with ProcessPoolExecutor(told.processes, get_context("spawn"), max_tasks_per_child=4) as workers:
-        for done, tried in enumerate(workers.map(try_inputs, *zip(*jobs, strict=True)), 1):
+    with get_context("spawn").Pool(told.processes, maxtasksperchild=4) as workers:  # an executor may hang at a new one
+        for done, tried in enumerate(workers.imap_unordered(_try, jobs), 1):
             codes[tried.kind].update(tried.codes)
             for fault, example in tried.faults.items():
                 if (tried.kind, fault) not in faults:
@@ -52,6 +51,10 @@ def main() -> None:
     told.out.write_text(json.dumps(summary, indent=2) + "\n")
     print(json.dumps(summary | {"faults": len(faults)}))
     sys.exit(bool(faults))
+
+
+def _try(job: tuple[str, int, int]) -> Tried:
+    return try_inputs(*job)
 
 
 def _tell(done: int, jobs: int, seconds: float) -> None:

@@ -31,6 +31,6 @@ class Film:
         for name, size, most in (("width", self.width, 1920), ("height", self.height, 1080)):
             if not (64 <= size <= most and size % 2 == 0):
                 raise InputError(f"{name} = {size}; expected an even number of pixels from 64 to {most}")
-        for name, value, most in (("fps", self.fps, 240), ("slow_motion", self.slow_motion, 1000)):
-            if not 0 < value <= most:
-                raise InputError(f"{name} = {value}; expected above 0 and at most {most}")
+        for name, value, least, most in (("fps", self.fps, 1, 240), ("slow_motion", self.slow_motion, 0.001, 1000)):
+            if not least <= value <= most:
+                raise InputError(f"{name} = {value}; expected {least} to {most}")
