@@ -12,7 +12,7 @@ from hexmj import LDVS, ReadsLegs, compare, draw_starts
 from hexmj.controllers.asking import begin
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.backend import STATE
-from hexmj.physics.clock import stopped_clock
+from hexmj.physics.callbacks import stopped_clock
 from hexmj.physics.foot_path import TipTargets
 from hexmj.physics.settling import Settled, settle
 

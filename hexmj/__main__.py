@@ -17,8 +17,6 @@ def main() -> None:
 
         command()
     except KeyboardInterrupt:
-        for one in (signal.SIGINT, *STOPS):
-            signal.signal(one, signal.SIG_IGN)
         print("hexmj: stopped", file=sys.stderr)
         sys.exit(130)
 

@@ -335,6 +335,7 @@ SECOND = STICK_INSECT.legs[1]
     [
         ({"mjcf": Path("nowhere.xml")}, r"mjcf = 'nowhere\.xml' is no file"),
         ({"trunk": ()}, "at least one part"),
+        ({"trunk": ("head", "L1_tibia")}, "trunk part 'L1_tibia' is a leg's"),
         ({"trunk": ("head", "head")}, "trunk name 'head' twice"),
         ({"legs": STICK_INSECT.legs[:5]}, "5 legs; expected 6"),
         ({"legs": changed_leg(joints=SECOND.joints[:2])}, "3, 2, 3, 3, 3, 3 joints; expected equally many"),
@@ -384,6 +385,9 @@ def test_descriptions_that_the_mjcf_does_not_fit_are_refused(changes: dict[str, 
         ('gravity="0 0 -9810"', 'gravity="1 0 -9810"', "expected it to point down"),
         ('<geom name="L2_foot" class="foot"', '<geom name="L2_foot" class="foot" size="0.5"', "feet have the radii"),
         ("<mujoco model", "<mujoco mod", "does not compile"),
+        ("</worldbody>", '</worldbody><equality><weld body1="mesothorax"/></equality>', "1 equality constraints"),
+        ('gravity="0 0 -9810"', 'gravity="0 0 -9810" density="1000" viscosity="10"', "density = 1000, viscosity = 10"),
+        ('<body name="mesothorax"', '<body name="mesothorax" gravcomp="1"', "gravity is compensated"),
     ],
 )
 def test_mjcfs_that_cannot_walk_are_refused(tmp_path: Path, old: str, new: str, message: str):

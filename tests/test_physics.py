@@ -23,7 +23,7 @@ from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import Diverged, MujocoBatch
-from hexmj.physics.clock import stopped_clock
+from hexmj.physics.callbacks import stopped_clock
 from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.orders import OrdersFromPlan

@@ -90,6 +90,12 @@ def _in_the_rest(model: mujoco.MjModel, body: Body) -> Iterator[str]:
         yield f"the ground {body.ground!r} is no plane; expected a geom of type plane"
     if model.opt.gravity[:2].any() or not model.opt.gravity[2] < 0:
         yield f"gravity = {model.opt.gravity.tolist()}; expected it to point down"
+    if model.neq:
+        yield f"its MJCF has {model.neq} equality constraints; expected none, which might hold it up"
+    if model.opt.density or model.opt.viscosity:
+        yield f"density = {model.opt.density:g}, viscosity = {model.opt.viscosity:g}; expected 0, as in a vacuum"
+    if model.body_gravcomp.any():
+        yield "gravity is compensated for some of its parts; expected them to be as heavy as they are"
     mass = model.body_subtreemass[model.body(body.root).id]
     if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
         yield f"mass = {body.mass:g} g, but its MJCF weighs {mass:.6g} g; expected the same"

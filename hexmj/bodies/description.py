@@ -199,6 +199,7 @@ class Body:
             has, least = ", ".join(map(str, numbers)), FEWEST_JOINTS
             yield f"its legs have {has} joints; expected equally many in each, at least {least}"
         parts = tuple(part for leg in self.legs for part in leg.parts)
+        yield from (f"trunk part {name!r} is a leg's; expected other parts" for name in self.trunk if name in parts)
         named = {"joints": self.joints, "feet": self.feet, "trunk": self.trunk, "parts of legs": parts}
         for kind, names in named.items():
             twice = (name for i, name in enumerate(names) if name in names[:i])

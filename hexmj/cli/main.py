@@ -68,6 +68,8 @@ def main() -> None:
         finally:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(_complain("stopped", 130))
     except InputError as error:
         sys.exit(_complain(error, 2))
     except SimulationError as error:

@@ -14,6 +14,7 @@ import numpy as np
 from hexmj.cli import words
 from hexmj.errors import InputError
 from hexmj.files import WRITTEN, opened, read_text
+from hexmj.literal import literal
 from hexmj.loaded import importable
 from hexmj.results import json_text, save_text
 from hexmj.sweeps.code import code
@@ -83,7 +84,18 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         processor=_processor(),
         files={file.relative_to(path.parent).as_posix(): _written(file) for file in written},
     )
+    for name in _left_by_another(path, told.files):
+        print(f"hexmj: {literal(str(path.parent / name))} is left from an earlier command", file=sys.stderr)
     return save_text(json_text({"format": FORMAT} | asdict(told)) + "\n", path)
+
+
+def _left_by_another(path: Path, written: dict[str, str]) -> list[str]:
+    """Files beside a manifest, and named in it as it is now, that are none of those written."""
+    try:
+        before = read_manifest(path).files if path.is_file() else {}
+    except InputError:
+        before = {}
+    return [name for name in before if name not in written and (path.parent / name).is_file()]
 
 
 def read_manifest(path: Path) -> Manifest:

@@ -11,7 +11,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.physics.clock import stopped_clock
+from hexmj.physics.callbacks import stopped_clock, unlogged
 from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
@@ -108,7 +108,7 @@ class MujocoBatch:
         ids = np.arange(len(control))
         before = self.replayed(ids)
         self._batch.bind("ctrl")[:] = control
-        with stopped_clock():
+        with stopped_clock(), unlogged():
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
         self._check(ids, before, control[:, np.newaxis])
 
@@ -119,7 +119,7 @@ class MujocoBatch:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
         record = (AFTER, "sensordata", "actuator_force")
-        with stopped_clock():
+        with stopped_clock(), unlogged():
             seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
             self._check(ids, before, control)
             self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.files import opened
 
 NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["']""")
 """Files and their folders in an MJCF."""
@@ -76,7 +77,7 @@ def classes(value: Any) -> Iterator[type]:
 
 def content(path: Path) -> bytes:
     """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there."""
-    texts, names, folders = [path.read_bytes()], list[str](), {""}
+    texts, names, folders = [_read(path)], list[str](), {""}
     for text in texts:
         for kind, value in NAMED.findall(text.decode(errors="replace")) if path.suffix == ".xml" else ():
             if kind != "file":
@@ -84,9 +85,14 @@ def content(path: Path) -> bytes:
             elif value not in names:
                 names.append(value)
                 if (included := path.parent / value).suffix == ".xml" and included.is_file():
-                    texts.append(included.read_bytes())
+                    texts.append(_read(included))
     files = {path.parent / folder / name for name in names for folder in folders}
-    return b"".join([*texts, *(file.read_bytes() for file in sorted(files) if file.is_file())])
+    return b"".join([*texts, *(_read(file) for file in sorted(files) if file.is_file())])
+
+
+def _read(path: Path) -> bytes:
+    with opened(path) as file:
+        return file.read()
 
 
 def digest(content: bytes) -> str:

@@ -11,7 +11,7 @@ from collections import Counter
 from multiprocessing import get_context
 from pathlib import Path
 
-from tests.soak.drawn import KINDS, Tried, try_inputs
+from tests.soak.drawn import KINDS, try_job
 
 SHARES = {"commands": 0.5, "calls": 0.3, "files": 0.2}
 CHUNK = 500
@@ -34,7 +34,7 @@ def main() -> None:
     ]
     began, faults, codes = time.monotonic(), {}, {kind: Counter() for kind in shares}
     with get_context("spawn").Pool(told.processes, maxtasksperchild=4) as workers:  # an executor may hang at a new one
-        for done, tried in enumerate(workers.imap_unordered(_try, jobs), 1):
+        for done, tried in enumerate(workers.imap_unordered(try_job, jobs), 1):
             codes[tried.kind].update(tried.codes)
             for fault, example in tried.faults.items():
                 if (tried.kind, fault) not in faults:
@@ -51,10 +51,6 @@ def main() -> None:
     told.out.write_text(json.dumps(summary, indent=2) + "\n")
     print(json.dumps(summary | {"faults": len(faults)}))
     sys.exit(bool(faults))
-
-
-def _try(job: tuple[str, int, int]) -> Tried:
-    return try_inputs(*job)
 
 
 def _tell(done: int, jobs: int, seconds: float) -> None:

@@ -38,6 +38,11 @@ class Tried:
     """What is wrong -> the first input of which it is."""
 
 
+def try_job(job: tuple[str, int, int]) -> Tried:
+    """`try_inputs` with all of its arguments in one."""
+    return try_inputs(*job)
+
+
 def try_inputs(kind: str, inputs: int, number: int) -> Tried:
     """Draw so many inputs of a kind from the seed `number`, and try each in a process of its own."""
     drawn, work = KINDS[kind]
