@@ -15,6 +15,10 @@ class InputError(Exception):
         return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST // 2]} [...] {sentence[-LONGEST // 2 :]}"
 
 
+class OutOfReach(InputError):
+    """A plan whose tips a body cannot reach, so that it does not walk."""
+
+
 class SimulationError(RuntimeError):
     """A physical simulation that did not settle or diverged; it is never counted as an outcome."""
 

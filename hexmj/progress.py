@@ -1,5 +1,6 @@
 """A progress bar on standard error for long work."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -9,7 +10,10 @@ Progress = Callable[[float], None]
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
-    """Show a bar while the block runs; call what it gives with the fraction done since the last call."""
+    """Show a bar in a terminal while the block runs; call what it gives with the fraction done since the last call."""
+    if not (sys.stderr and sys.stderr.isatty()):
+        yield lambda _: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar

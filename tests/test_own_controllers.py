@@ -21,6 +21,7 @@ from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
+from hexmj.search.problems import Sample
 from hexmj.walks import PlannedWalk
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -287,3 +288,30 @@ def test_what_a_controller_prints_is_no_answer(tmp_path, more):
     assert json.loads(done.stdout)["chatty"]["kinematic"]
     assert "module\n" in done.stderr
     assert "begin\n" in done.stderr
+
+
+FAR = """
+from dataclasses import dataclass, replace
+import numpy as np
+import hexmj
+from hexmj.controllers import Step, stepwise
+
+@dataclass(frozen=True)
+class Far:
+    x: float = 1e6
+    name: str = "far"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        def step(v):
+            return Step(np.full(starts.shape, self.x), np.ones(starts.shape, dtype=bool))
+        return stepwise(step, starts, velocity, stride, acceleration)
+"""
+
+
+def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome(tmp_path):
+    (tmp_path / "far.py").write_text(FAR)
+    far = hexmj.load_controller(f"{tmp_path / 'far.py'}:Far")
+    with pytest.raises(hexmj.InputError, match=r"start 0: \d+ of \d+ tips that its legs were told are out of reach"):
+        hexmj.physical_flss(far, [0.5], n_starts=2, window=5.0)
+    problem = hexmj.Problem(hexmj.FieldsForm(far), 0.5, 0.5, window=5.0, conditions=hexmj.Conditions())
+    assert Sample(problem, 2, 0).costs(np.array([[1e6], [5.0]])).tolist() == [1.0, 0.0]

@@ -8,7 +8,8 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
+from functools import cached_property
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
@@ -150,6 +151,27 @@ def test_what_is_no_setting_is_refused_in_one_sentence(value: object) -> None:
     with pytest.raises(InputError, match="is no setting; expected") as raised:
         plain({"inner": (value,)})
     assert "\n" not in str(raised.value)
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """With a setting that is no field, and something computed once."""
+
+    pull: InitVar[float] = 1.0
+    name: str = "hidden"
+
+    def __post_init__(self, pull: float) -> None:
+        assert self.doubled == 2
+        object.__setattr__(self, "kept", pull)
+
+    @cached_property
+    def doubled(self) -> int:
+        return 2
+
+
+def test_a_setting_that_no_field_tells_is_refused() -> None:
+    with pytest.raises(InputError, match=r"Hidden keeps 'kept' beside its fields; expected all settings as fields"):
+        plain(Hidden())
 
 
 def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
@@ -129,5 +129,7 @@ def _drop_output() -> None:
 
 
 def _complain(error: Exception | str, code: int) -> int:
-    print(f"hexmj: {literal(str(error))}", file=sys.stderr)
+    if sys.stderr:  # there is none where it was closed
+        with suppress(OSError):
+            print(f"hexmj: {literal(str(error))}", file=sys.stderr, flush=True)
     return code

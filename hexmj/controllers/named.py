@@ -7,7 +7,7 @@ from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, get_type_hints
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
@@ -64,6 +64,9 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         raise InputError(f"{path}: controller = {named!r}; expected module:object or file.py:object")
     found: Any = load_controller(named)
     try:
+        wanted = get_type_hints(type(found))
+        for name in [one for one in values if wanted.get(one) in (bool, int, float, str)]:
+            typed(name, values[name], wanted[name])
         return replace(found, **values)
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
@@ -72,13 +75,13 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
 def _found(where: str, what: str, name: str) -> Controller:
     """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
     module = _module(where, name)
-    if not hasattr(module, what):
+    if what not in vars(module) and not hasattr(module, "__getattr__"):
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
         raise InputError(f"controller {name!r}: no {what} there; controllers there: {', '.join(classes) or 'none'}")
-    found = getattr(module, what)
     try:
+        found = getattr(module, what)
         found = found() if isinstance(found, type) else found
-    except Exception as error:  # whatever the user's code raises
+    except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(
             f"controller {name!r}: {what} cannot be made: {error}; expected a class with defaults for all fields"
         ) from None

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from hexmj.errors import OutOfReach
 from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk
@@ -16,6 +17,9 @@ from hexmj.walks import Walk
 
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
+
+MOST_UNREACHABLE = 0.1
+"""Share of the tips that may be out of reach in a walk that counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +166,7 @@ class OutcomesSoFar:
         """How every start went, as far as the chunks reach.
 
         Raises:
+            OutOfReach: a walk of which more than `MOST_UNREACHABLE` of the tips could not be reached.
             SimulationError: a walk of which something cannot be measured, as the slip where no foot is ever in contact.
         """
         sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
@@ -183,6 +188,13 @@ class OutcomesSoFar:
             saturation=saturation,
             unreachable=self._unreachable,
         )
+        asked = 6.0 * sums.shown
+        if (lost := self._unreachable > MOST_UNREACHABLE * asked).any():
+            start = int(np.argmax(lost))
+            raise OutOfReach(
+                f"start {start}: {self._unreachable[start]} of {asked[start]:.0f} tips that its legs were told are out"
+                " of reach; expected at most a tenth, or nothing is walked"
+            )
         for name in NUMBERS:
             if (wrong := np.isnan(getattr(found, name))).any():
                 start = int(np.argmax(wrong))

@@ -12,7 +12,7 @@ from hexmj.checks import check_types, numbers, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
-from hexmj.errors import InputError
+from hexmj.errors import InputError, OutOfReach
 from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
 from hexmj.search.domain import Domain
@@ -31,7 +31,7 @@ FARTHEST = 1e6
 """Greatest reach of a first population."""
 
 REFUSED = 1.0
-"""Cost of a candidate that its controller refuses: as if every start lost stability."""
+"""Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,10 @@ class Sample:
                 raise InputError(
                     f"{self.problem.form!r:.80} makes no controller of {vector}: {error!r:.200}"
                 ) from error
-            return self._losses(candidate, [self.problem.window], threads)[0] / self.n_starts
+            try:
+                return self._losses(candidate, [self.problem.window], threads)[0] / self.n_starts
+            except OutOfReach:
+                return REFUSED
 
         if self.problem.conditions or len(vectors) == 1:
             return np.array([cost(vector, threads) for vector in vectors])

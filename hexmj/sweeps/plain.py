@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +27,11 @@ def plain(value: Any) -> Any:
         InputError: it is none of the things that a setting can be.
     """
     if _frozen(value):
+        _check_fields(value)
         return {"class": label(type(value))} | {one.name: plain(getattr(value, one.name)) for one in fields(value)}
     if isinstance(value, np.ndarray | np.generic) and value.dtype in (np.bool_, np.int64, np.float64):
         return value.tolist()
-    if value is None or isinstance(value, bool | int | float | str):
+    if value is None or type(value) in (bool, int, float, str):
         return value
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
@@ -98,6 +100,14 @@ def _read(path: Path) -> bytes:
 def digest(content: bytes) -> str:
     """Of some bytes: the first 12 digits of their SHA-256."""
     return hashlib.sha256(content).hexdigest()[:12]
+
+
+def _check_fields(value: Any) -> None:
+    """Refuse a dataclass that keeps anything, but what it computes once, where no name and no file would tell it."""
+    kind, known = type(value), {one.name for one in fields(value)}
+    cached = {name for name in dir(kind) if isinstance(getattr(kind, name, None), cached_property)}
+    if hidden := set(getattr(value, "__dict__", ())) - known - cached:
+        raise InputError(f"{label(kind)} keeps {min(hidden)!r} beside its fields; expected all settings as fields")
 
 
 def _frozen(value: Any) -> bool:
