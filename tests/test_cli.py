@@ -346,6 +346,7 @@ NONSENSE = [
         "--velocities was given twice; expected",
     ),
     (["flss", "--out", ""], "'' stands alone; expected options, each with its values"),
+    (["terrain", "--processes", "1" + 23 * "0"], "expected at least 1 and at most 1000"),
     (["reproduce", "--only"], "--only without keys; expected at least one"),
     (["walk", "--window", "1e7"], "expected at least one step, 0.1, and at most 1e+06 time units"),
     (["walk", "--physical", "--ground", "hurdle", "--ground-length", "1e-300"], "cannot be built: "),

@@ -32,6 +32,9 @@ CONTROLLER = (
 )
 """How controllers are named."""
 
+MOST_PROCESSES = 1000
+"""More than any machine has cores."""
+
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
 
 
@@ -146,10 +149,10 @@ class Sweepers:
         """The processes, or None where this one does the work.
 
         Raises:
-            InputError: no process.
+            InputError: no process, or too many.
         """
-        if self.processes < 1:
-            raise InputError(f"--processes = {self.processes}; expected at least 1")
+        if not 1 <= self.processes <= MOST_PROCESSES:
+            raise InputError(f"--processes = {self.processes}; expected at least 1 and at most {MOST_PROCESSES}")
         if self.processes == 1:
             yield None
             return
