@@ -9,6 +9,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing import current_process
 from pathlib import Path
 
 SECONDS = 60.0
@@ -67,6 +68,7 @@ def judged(work: Callable[[], None], folder: Path) -> Verdict:
 def _do(work: Callable[[], None], folder: Path) -> None:
     code = TRACEBACK
     try:
+        current_process()._config["daemon"] = False  # pyright: ignore  # as its parent is, which may have no children
         os.chdir(folder)
         for number, name in ((1, ".stdout"), (2, ".stderr")):
             os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
