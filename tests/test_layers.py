@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = (
     ("checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
-    ("progress", "results", "rotations", "same_numbers", "threads"),
+    ("progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("timing",),
     ("stability", "walks"),

@@ -3,6 +3,7 @@
 Each command is a frozen dataclass made of these parts, and offers just the options that it obeys.
 """
 
+import os
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
@@ -24,6 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
+from hexmj.signals import unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -163,6 +165,9 @@ class Sweepers:
 
         with ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent) as executor:
             try:
+                with unheard_by_children():
+                    for _ in range(self.processes):
+                        executor.submit(os.getpid)  # begins one
                 yield executor
             except KeyboardInterrupt:  # nobody waits for cells that are stopped
                 threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled

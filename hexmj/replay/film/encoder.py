@@ -1,6 +1,5 @@
 """Frames to an MP4 file, by mediapy and ffmpeg."""
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,7 @@ import mediapy
 import numpy as np
 
 from hexmj.errors import RenderingError
+from hexmj.signals import unheard_by_children
 
 FILM = "-preset veryfast -movflags +faststart"
 
@@ -31,7 +31,7 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
     writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, crf=20, ffmpeg_args=FILM)
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-        with _no_interrupts():
+        with unheard_by_children():
             writer.__enter__()
     except (OSError, RuntimeError) as error:
         raise RenderingError(f"ffmpeg cannot be run ({error}); reinstall imageio-ffmpeg") from None
@@ -39,16 +39,6 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
         yield writer.add_image
     finally:
         _close(writer)
-
-
-@contextmanager
-def _no_interrupts() -> Iterator[None]:
-    """Programs that are started meanwhile take no Ctrl-C: the film is stopped here, and ffmpeg ends with it."""
-    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
 
 
 def _close(writer: mediapy.VideoWriter) -> None:
