@@ -91,7 +91,7 @@ def path_of(path: Path | str) -> Path:
     return Path(path)
 
 
-def label(name: str, value: Any) -> str:
+def printable(name: str, value: Any) -> str:
     """A short text of one line, fit to be shown and to stand in the name of a file.
 
     Raises:

@@ -78,6 +78,7 @@ class Search(WalkingCommand):
 
         self._check()
         problem, effort = self._problem(), self._effort()
+        problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
         out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", MANIFEST))
         with progress_bar("searching") as progress:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from hexmj.checks import check_types, given, label, typed
+from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -57,7 +57,7 @@ class Comparison:
         if not self.controllers:
             raise InputError("no controller was given; expected at least one")
         for name, controller in self.controllers.items():
-            label("a controller's name", name)
+            printable("a controller's name", name)
             check_controller_type(controller)
         check_draw(self.n_starts, self.seed)
         _ = self.observed
