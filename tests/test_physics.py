@@ -271,7 +271,7 @@ def test_a_roll_is_mujocos_own_steps(settled):
     batch, data = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model)
     batch.roll(ids, control, 4)
     batch.put(ids, settled.state[ids])
-    rolled = batch.roll(ids, control)
+    rolled = batch.roll(ids, control, 1)
     data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = np.split(settled.state[3], [model.nq, model.nq + model.nv])
     for n in range(5):
         data.ctrl[:] = control[0, n]

@@ -313,7 +313,7 @@ def test_any_engine_takes_strikes_again_finely():
     assert (shown["depth"][:3] <= 0.02).all()
     assert 0.02 < shown["depth"][3].max() <= 2140.0 * PointMasses.STEP / FINEST  # no finer than this
     alone = PointMasses(np.ones(1), np.array([5000.0]))
-    assert_array_equal(shown["after"][2], alone.roll(np.array([0]), np.zeros((1, 8, 1))).after[0])
+    assert_array_equal(shown["after"][2], alone.roll(np.array([0]), np.zeros((1, 8, 1)), 1).after[0])
 
 
 def test_what_strikes_depends_on_nothing_but_itself_on_any_engine():

@@ -46,7 +46,7 @@ class Engine(Protocol):
         """Put some bodies where they shall go on from, (n, state)."""
         ...
 
-    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """Step some bodies with these controls, (n, step, actuator).
 
         With `parts` above 1 each row of the controls is a part of a step, and contacts are as hard as it allows: of
@@ -112,7 +112,7 @@ class MujocoBatch:
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
         self._check(ids, before, control[:, np.newaxis])
 
-    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
         model, before = self._model, self.replayed(ids)
         if parts > 1:

@@ -76,7 +76,7 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
     if "substeps" in saved:  # of a walk that exploded, from the beginning of a step of the plan on
         after = FineSteps.of(batch, int(saved["substeps"]), compiled).take(only, control)["after"]
     else:
-        after = batch.roll(only, control).after
+        after = batch.roll(only, control, 1).after
     return after[0, :, : compiled.model.nq]
 
 

@@ -59,20 +59,18 @@ class FineSteps:
             Diverged: a body that diverged.
         """
         m, end, before = self.substeps, control.shape[1], self.engine.states(ids)
-        shown, struck = self._roll(ids, control, 0, end)
+        shown, struck = self._roll(ids, control, 0, end, 1)
         for begin in range(0, end, m):
             if (again := np.flatnonzero(struck == begin)).size:
                 few, then = ids[again], min(begin + m, end)
                 self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
                 _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
                 if then < end:
-                    rest, struck[again] = self._roll(few, control[again], then, end)
+                    rest, struck[again] = self._roll(few, control[again], then, end, 1)
                     _show(shown, again, then, rest)
         return shown
 
-    def _roll(
-        self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int = 1
-    ) -> tuple[Shown, np.ndarray]:
+    def _roll(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> tuple[Shown, np.ndarray]:
         """Every part of some substeps; and where the first step begins in which a foot strikes, (n,), or `end`."""
         try:
             seen = self.engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)

@@ -65,7 +65,8 @@ def measured_walk(
 
     Returns:
         Columns of the chunk's substeps, (step,), the walk of these starts, and the centre of mass in the
-        world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall.
+        world, (step, n, 3) [mm].  The walk is NaN, and no foot stands, after a fall; its velocities, which are the
+        plan's, are NaN throughout.
     """
     m, stride, columns = settled.substeps, settled.stride, settled.compiled.columns
     rows = np.arange(len(chunk.ids)) if rows is None else rows
@@ -75,9 +76,8 @@ def measured_walk(
     x, y, stance = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan), np.zeros((*shape, 6), dtype=bool)
     centre, places = np.full((*shape, 3), np.nan), (columns.foot.start, columns.centre_of_mass.start)
     _look((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
-    step = (chunk.first + shown) // m
-    velocity = chunk.plan.velocity[np.maximum(step - 1 - chunk.first // m, 0)][:, chunk.ids[rows]]
-    walk = Walk(step * stride.dt, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
+    time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
+    walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
     return shown, walk, centre
 
 

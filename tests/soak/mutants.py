@@ -32,11 +32,13 @@ SECONDS = 300.0
 NARROW = ("LANES = 64\n", "LANES = 3\n")
 """The kernel without its compiler is as slow as it is wide; what it gives does not depend on that."""
 
+MEASURING = "tests/test_measuring.py"
 WALKS = "fed_back or batch or told or lifted or settled or push_gives or reach or diverge or progress or grasp or roll"
 MEASURES = (
     "chunks_show or tracking or beyond or belong or settled or whole or after_a_fall or bounce or follow or reach"
-    " or any_batch"
+    " or any_batch or test_measuring"
 )
+FELT = f"{WALKS} or bounce or test_measuring"
 
 CONFTEST = """
 from hypothesis import Phase, settings
@@ -86,7 +88,11 @@ GROUPS = {
     "stability": (Module("stability.py", ("tests/test_stability.py",), ""),),
     "losses": (
         Module("measures/kinematic.py", ("tests/test_stability.py", "tests/test_loss_frequency.py"), ""),
-        Module("controllers/losses.py", ("tests/test_controllers.py",), "loss or lost or makes_no_sense or on_paper"),
+        Module(
+            "controllers/losses.py",
+            ("tests/test_controllers.py",),
+            "loss or lost or makes_no_sense or on_paper or held",
+        ),
     ),
     "drive": (
         Module("physics/drive.py", ("tests/test_closed_loop.py", "tests/test_physics.py"), WALKS),
@@ -98,8 +104,8 @@ GROUPS = {
         Module("physics/backend.py", ("tests/test_physics.py", "tests/test_strikes.py"), f"{WALKS} or insect"),
     ),
     "measurement": (
-        Module("physics/outcomes.py", ("tests/test_physical_laws.py", "tests/test_physics.py"), MEASURES),
-        Module("physics/sensing.py", ("tests/test_closed_loop.py", "tests/test_physics.py"), f"{WALKS} or bounce"),
+        Module("physics/outcomes.py", (MEASURING, "tests/test_physical_laws.py", "tests/test_physics.py"), MEASURES),
+        Module("physics/sensing.py", (MEASURING, "tests/test_closed_loop.py", "tests/test_physics.py"), FELT),
     ),
 }
 
