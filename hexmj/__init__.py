@@ -7,6 +7,8 @@ unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import hexmj.as_run  # noqa: F401  # from now on
+
 if TYPE_CHECKING:
     from hexmj.bodies.description import Body as Body
     from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT

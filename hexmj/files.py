@@ -116,7 +116,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_text(path: Path, most: int = 1_000_000) -> str:
-    """A text in UTF-8.
+    """A text in UTF-8, with a byte-order mark or without.
 
     Raises:
         InputError: it cannot be read, or is longer than `most` bytes.
@@ -126,7 +126,7 @@ def read_text(path: Path, most: int = 1_000_000) -> str:
     if len(content) > most:
         raise InputError(f"{path} is longer than {most} bytes; expected a text that a person would write")
     try:
-        return content.decode()
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is no text in UTF-8: {error.reason} at byte {error.start}") from None
 

@@ -44,5 +44,9 @@ def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads:
             work(begin, end)
         return
     with ThreadPoolExecutor(count) as pool:
-        for future in [pool.submit(work, begin, end) for begin, end in bounds]:
-            future.result()
+        futures = [pool.submit(work, begin, end) for begin, end in bounds]
+        try:
+            for future in futures:
+                future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)

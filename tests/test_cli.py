@@ -1,6 +1,7 @@
 """The command line: JSON, files, exit codes, and the same bits whatever the threads."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -110,6 +111,19 @@ def test_without_rendering_compare_still_delivers(tmp_path):
     assert "libegl1" in done.stderr
     assert (tmp_path / "comparison.png").exists()
     assert not (tmp_path / "gait.mp4").exists()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding):
+    (tmp_path / "snow.py").write_text(
+        "import hexmj, dataclasses\nSnow = dataclasses.replace(hexmj.LDVS, name='\u2603')"
+    )
+    words = ["walk", "--model", "snow.py:Snow", "--velocity", "0.5", "--window", "2"]
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-m", "hexmj", *words], capture_output=True, env=environment, cwd=tmp_path, check=True
+    )
+    assert ("\u2603" if encoding == "utf-8" else r"\u2603") in done.stdout.decode(encoding)
 
 
 def test_physical_flss(run, tmp_path):
@@ -345,6 +359,7 @@ NONSENSE = [
         ["flss", "--velocities", "0.3", "--velocities", "0.5"],
         "--velocities was given twice; expected",
     ),
+    (["flss", "--pep-min", "-15", "--pep_min", "-12"], "--pep-min was given twice; expected every option once"),
     (["flss", "--out", ""], "'' stands alone; expected options, each with its values"),
     (["terrain", "--processes", "1" + 23 * "0"], "expected at least 1 and at most 1000"),
     (["reproduce", "--only"], "--only without keys; expected at least one"),

@@ -137,11 +137,11 @@ def test_a_centre_of_mass_on_the_edge_is_lost():
     assert np.array_equal(planned_losses(plan, np.array([9, 2])), [3, 0])
 
 
-@pytest.mark.parametrize("steps", [(-1, 0), (0, 11), (0,), (0, np.nan)])
+@pytest.mark.parametrize("steps", [(-1, 0), (0, 11), (0,), (0, np.nan), (0.0, 2.0), (True, False)])
 def test_losses_that_make_no_sense_are_refused(steps, monkeypatch):
     plan = LDVS.begin(np.zeros((2, 6)), np.full(2, 0.5), STRIDE)
     monkeypatch.setattr(plan, "first_losses", lambda _: np.array(steps))
-    with pytest.raises(hexmj.InputError, match="expected a step from 0 on for each start"):
+    with pytest.raises(hexmj.InputError, match="expected the number of a step, from 0 on, for each start"):
         first_losses(plan, np.array(10))
 
 

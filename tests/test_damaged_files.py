@@ -4,6 +4,7 @@ import io
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import xarray as xr
 from hexmj import netcdf
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.cruse1998.presets import weights_toml
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError, SimulationError
 from hexmj.files import MARK, opened, read_sealed, sealed, unsealed
@@ -261,6 +263,11 @@ def test_texts_that_no_person_would_write(tmp_path, text, said):
     (path := tmp_path / "weights.toml").write_bytes(text)
     with pytest.raises(InputError, match=said):
         load_controller(str(path))
+
+
+def test_a_text_with_a_byte_order_mark_is_one(tmp_path):
+    (path := tmp_path / "weights.toml").write_bytes(b"\xef\xbb\xbf" + weights_toml(LDVS.weights).encode())
+    assert load_controller(str(path)) == replace(LDVS, name="weights")
 
 
 def test_a_damaged_state_is_not_replayed(tmp_path):

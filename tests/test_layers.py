@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
+    ("as_run", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
     ("progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("timing",),

@@ -175,13 +175,18 @@ def test_a_setting_that_no_field_tells_is_refused() -> None:
 
 
 def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
-    for folder in ("here", "there"):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "body.xml").write_text("<mujoco/>")
-    here, there = (plain(tmp_path / folder / "body.xml") for folder in ("here", "there"))
-    assert here == there
-    (tmp_path / "here" / "body.xml").write_text("<mujoco> </mujoco>")
-    assert plain(tmp_path / "here" / "body.xml") != there
+    for kind in (Path, str):
+        for folder in ("here", "there"):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            (tmp_path / folder / "body.xml").write_text("<mujoco/>")
+        here, there = (plain(kind(tmp_path / folder / "body.xml")) for folder in ("here", "there"))
+        assert here.partition("@")[2] == there.partition("@")[2] != ""
+        assert (here == there) == (kind is Path)
+        (tmp_path / "here" / "body.xml").write_text("<mujoco> </mujoco>")
+        assert plain(kind(tmp_path / "here" / "body.xml")) != here
+    assert plain(text := str(tmp_path)) == text
+    assert plain("0.5" * 2000) == "0.5" * 2000
+    assert plain("a.b\0") == "a.b\0"
 
 
 def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
@@ -233,11 +238,12 @@ def test_any_name_becomes_a_name_of_a_file() -> None:
 
 
 TOY = {
-    "toy/__init__.py": "from toy.film import show\nfrom toy.walk import walk",
+    "toy/__init__.py": "from toy.louder import louder\nfrom toy.walk import walk\nwalk = louder(walk)",
     "toy/study.py": "import numpy\nfrom toy import walk\nfrom typing import TYPE_CHECKING\n"
     "if TYPE_CHECKING:\n    import toy.film\ndef cell(controller=None): ...",
-    "toy/walk.py": "def walk():\n    from toy.inner import deep\n    return deep, 'own.toml', 'data/more.toml'",
-    "toy/inner/__init__.py": "",
+    "toy/louder.py": "def louder(what): return what",
+    "toy/walk.py": "def walk():\n    import toy.inner.deep\n    return deep, 'own.toml', 'data/more.toml'",
+    "toy/inner/__init__.py": "GAIN = 1",
     "toy/inner/deep.py": "from . import deeper",
     "toy/inner/deeper.py": "import scipy.stats",
     "toy/own.toml": "p = 1",
@@ -246,7 +252,9 @@ TOY = {
     "toy/film.py": "import matplotlib\ndef show(): ...",
     "toy/cli.py": "import toy.study",
     "helper.py": "",
-    "mine.py": "from helper import *\nHERE = 'here.json'\n" + MINE,
+    "bare/helper.py": "",
+    "bare/deep/other.py": "",
+    "mine.py": "from helper import *\nfrom bare import helper\nimport bare.deep.other\nHERE = 'here.json'\n" + MINE,
 }
 PRINT_STEM = """
 from hexmj.loaded import importable
@@ -283,10 +291,10 @@ def unedited(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: str) -> None:
     record = json.loads(unedited)
-    within = {"toy", "toy.study", "toy.walk", "toy.inner", "toy.inner.deep", "toy.inner.deeper"} | {
-        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper"),
+    within = {"toy", "toy.study", "toy.walk", "toy.louder", "toy.inner", "toy.inner.deep", "toy.inner.deeper"} | {
+        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper", "bare.helper", "bare.deep.other"),
     }
-    assert {name for name in record["sources"] if name.startswith(("toy", "helper"))} == within
+    assert {name for name in record["sources"] if name.startswith(("toy", "helper", "bare"))} == within
     assert [name.rpartition("@")[2][12:] for name in record["sources"] if name.startswith("mine.py@")] == [
         "",
         ", here.json",
@@ -299,7 +307,11 @@ def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: 
 
 @pytest.mark.parametrize(
     "name",
-    ["toy/study.py", "toy/inner/deeper.py", "toy/own.toml", "toy/data/more.toml", "here.json", "mine.py", "helper.py"],
+    [
+        *("toy/__init__.py", "toy/study.py", "toy/louder.py", "toy/inner/__init__.py", "toy/inner/deeper.py"),
+        *("toy/own.toml", "toy/data/more.toml", "here.json", "mine.py", "helper.py"),
+        *("bare/helper.py", "bare/deep/other.py"),
+    ],
 )
 def test_an_edit_within_reach_is_another_name(toy: Path, unedited: str, name: str) -> None:
     (toy / name).write_text(TOY[name] + "\n# edited")
@@ -326,6 +338,51 @@ def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch
     monkeypatch.setitem(sources._AT_FIRST, file, 0)
     with pytest.raises(InputError, match=r"errors\.py was edited since this program began; start it again"):
         sources._read.__wrapped__(name, file)
+
+
+USED = """
+import sys
+from pathlib import Path
+import used, controller
+from hexmj.sweeps import Cell
+from hexmj.sweeps.cells import plain
+from toy.study import cell
+
+def record():
+    return Cell("toy", cell, {"controller": controller.Tripod()}).record()
+
+first = record() if sys.argv[1] != "edit" else ""
+Path("used.py").write_text("GAIN = 5.0")
+if sys.argv[1] == "again":
+    import importlib
+    importlib.reload(used)
+print(record())
+assert first in ("", record())
+"""
+
+
+def used_record(folder: Path, how: str) -> subprocess.CompletedProcess[str]:
+    (folder / "used.py").write_text("GAIN = 0.5")
+    (folder / "controller.py").write_text("import used\n" + MINE)
+    command = [sys.executable, "-c", USED, how]
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+
+
+def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(toy: Path) -> None:
+    """Whether the file was edited before the first record or after; run again, no one knows which is meant."""
+    unedited, edited, again = (used_record(toy, how) for how in ("record", "edit", "again"))
+    assert unedited.returncode == edited.returncode == 0, edited.stderr
+    assert json.loads(unedited.stdout) == json.loads(edited.stdout)
+    assert "used.py was edited while this program used it; start it again" in again.stderr
+
+
+def test_data_files_count_as_they_are_now(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("DATA = 'gains.toml'")
+    name, found = importable(tmp_path / "mine.py").__name__, []
+    for text in ("a = 1", "a = 2", "a = 1"):
+        (tmp_path / "gains.toml").write_text(text)
+        found.append(code(frozenset({name})).sources)
+    assert found[0] == found[2] != found[1]
 
 
 # The same bits, whoever computes them

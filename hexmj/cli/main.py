@@ -6,6 +6,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
+from io import TextIOWrapper
 from operator import or_
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,6 +59,9 @@ class _Listed:
 def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
     drop_vain_wish()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # neither closed nor replaced
+            stream.reconfigure(errors="backslashreplace")
     sys.path.append("")  # for modules of the user's own in the current folder, as `python -m hexmj` finds them
     options: Any = None
     try:

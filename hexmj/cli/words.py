@@ -24,7 +24,7 @@ def checked(words: list[str]) -> list[str]:
     """
     if alone := [word for word in words if word in ("", "--")]:
         raise InputError(f"{alone[0]!r} stands alone; expected options, each with its values")
-    options = [word.partition("=")[0] for word in words if word.startswith("--")]
+    options = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
     if twice := [one for i, one in enumerate(options) if one in options[:i]]:
         raise InputError(f"{literal(twice[0][:LONGEST])} was given twice; expected every option once")
     for word in words:

@@ -30,8 +30,10 @@ def first_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> n
     steps = np.broadcast_to(steps, len(plan.starts)).copy()
     with said("a plan, first_losses"):
         lost = np.asarray(plan.first_losses(steps))
-    if lost.shape != steps.shape or not ((lost >= 0) & (lost <= steps)).all():
-        raise InputError(f"first_losses of a plan gave {lost!r:.80}; expected a step from 0 on for each start")
+    if lost.shape != steps.shape or lost.dtype.kind not in "iu" or not ((lost >= 0) & (lost <= steps)).all():
+        raise InputError(
+            f"first_losses of a plan gave {lost!r:.80}; expected the number of a step, from 0 on, for each start"
+        )
     return lost
 
 

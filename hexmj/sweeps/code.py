@@ -1,22 +1,23 @@
 """The code that makes a value: the sources of all modules that it needs, and the versions of the packages.
 
 Modules are followed from import to import without running them: through this package, the package that a function or a
-user's object comes from, and whatever else is not installed.  What a module imports for its types alone is left out,
-except where an `__init__` loads names as they are used; a name that an `__init__` passes on is followed to the one
-module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, count like its
-source, if they lie beside it, in the package's `assets` or, for a user's own, in the current folder.
+user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
+for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
+the one module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, count as they
+are now, if they lie beside it, in the package's `assets` or, for a user's own, in the current folder.
 """
 
 import ast
 import re
 import sys
 import sysconfig
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
+from hexmj.as_run import as_run
 from hexmj.errors import InputError
 from hexmj.sweeps.plain import digest, module_label
 
@@ -24,11 +25,14 @@ PACKAGE = Path(__file__).parents[1]
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
-    *("hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
+    *("hexmj.as_run", "hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 
 DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
+
+_Wanted = tuple[str, str]
+"""A module, and the name that is taken from it; no name where it is the module itself."""
 
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
@@ -50,46 +54,67 @@ class _Module:
     source: str
     package: bool
     """It is an `__init__`."""
-    imports: tuple[tuple[str, str], ...]
-    """Module and the name that is taken from it; no name where it is the module itself."""
-    bound: dict[str, tuple[str, str]]
+    imports: tuple[_Wanted, ...]
+    bound: dict[str, _Wanted]
     """Name -> the import it comes from, those for types included."""
 
 
-@cache
 def code(modules: frozenset[str]) -> Code:
-    """All that some modules need, and they themselves; read once in a program, which does not see later edits either.
+    """All that some modules need, and they themselves: sources as this program ran them, data files as they are now.
 
     Raises:
-        InputError: one has no source, or a source of this package was edited since the program began.
+        InputError: one has no source, or a source was edited while this program used it.
     """
+    sources, versions, read = _needed(modules)
+    data: dict[str, str] = {}
+    for name, file, names in read:
+        as_run(file, _stamp(name))
+        data |= _data(module_label(name), file, names)
+    return Code(dict(sorted((sources | data).items())), versions)
+
+
+@cache
+def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], list[tuple[str, Path, list[str]]]]:
+    """Digests of sources, versions, and of each module its name, its file and the data files that it names."""
     followed = {PACKAGE.name} | {name.partition(".")[0] for name in modules}
-    waiting, seen = [(name, "") for name in modules], set[tuple[str, str]]()
-    sources, installed = {}, set[str]()
+    waiting, seen = [(name, "") for name in modules], set[_Wanted]()
+    sources, installed, read = {}, set[str](), []
     while waiting:
         wanted = name, attribute = waiting.pop()
         if wanted in seen:
             continue
         seen.add(wanted)
-        top = name.partition(".")[0]
-        file = _file(name)
+        top, file = name.partition(".")[0], _file(name)
         if file is None and name in modules:
             raise InputError(f"{name} has no source; to keep what comes of a class or function, write it into a file")
         if CARRIERS & {name, top, name.rpartition(".")[0]}:
             continue
-        if file is None or (top not in followed and any(file.is_relative_to(one) for one in _INSTALLED)):
-            installed |= {top} - sys.stdlib_module_names
-        else:
+        inner = [(f"{name}.{attribute}", "")] if attribute and _file(f"{name}.{attribute}") else []
+        if file and (top in followed or not any(file.is_relative_to(one) for one in _INSTALLED)):
             module = _read(name, file)
             sources[module_label(name)] = digest(module.source.encode())
-            sources |= _data(module_label(name), file, module.source)
-            passed_on = {module.bound[attribute]} if attribute in module.bound else set()
-            if attribute and _file(inner := f"{name}.{attribute}"):
-                passed_on.add((inner, ""))
-            waiting += passed_on if module.package and passed_on else module.imports
+            read.append((name, file, DATA.findall(module.source)))
+            ours = top == PACKAGE.name
+            waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
+        elif inner:  # of a folder without an `__init__`
+            waiting += inner
+        else:
+            installed |= {top} - sys.stdlib_module_names
     names = installed | ({"llvmlite"} if "numba" in installed else set())
     versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    return Code(dict(sorted(sources.items())), versions | {name: _version(name) for name in sorted(names)})
+    return sources, versions | {name: _version(name) for name in sorted(names)}, read
+
+
+def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:
+    """What a name of a module of this package needs: of an `__init__`, the one module that it comes from."""
+    passed_on = inner + ([module.bound[attribute]] if attribute in module.bound else [])
+    return passed_on if module.package and passed_on else module.imports
+
+
+def _above(name: str) -> list[_Wanted]:
+    """The package that a module lies in, which runs before it."""
+    above = name.rpartition(".")[0]
+    return [(above, "")] if above and _file(above) else []
 
 
 @cache
@@ -115,7 +140,7 @@ def _file(module: str) -> Path | None:
 def _read(name: str, file: Path) -> _Module:
     if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
         raise InputError(f"{file} was edited since this program began; start it again")
-    source = file.read_text(encoding="utf-8")
+    source = (as_run(file, _stamp(name)) or file.read_bytes()).decode()
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
     nodes = list(ast.walk(ast.parse(source)))
     guarded = [
@@ -130,7 +155,7 @@ def _read(name: str, file: Path) -> _Module:
     return _Module(source, package == name, imports, bound)
 
 
-def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, tuple[str, str]]]:
+def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
     """The names that an import binds, each with the module and the name in it."""
     if isinstance(one, ast.Import):
         for alias in one.names:
@@ -141,16 +166,18 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, tuple[str, str]]
             yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
 
 
-def _data(module: str, file: Path, source: str) -> dict[str, str]:
-    """Digests of the data files that a module's source names."""
+def _stamp(module: str) -> str:
+    """The version of a loaded file that is meant."""
+    return module.partition("@")[2]
+
+
+def _data(module: str, file: Path, names: list[str]) -> Iterator[tuple[str, str]]:
+    """Digests of the data files that a module names."""
     folders = [file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"]
     folders += [] if file.is_relative_to(PACKAGE) else [Path.cwd()]
-    found = {name: {folder / name for folder in folders if (folder / name).is_file()} for name in DATA.findall(source)}
-    return {
-        f"{module}, {name}": digest(b"".join(path.read_bytes() for path in sorted(paths)))
-        for name, paths in found.items()
-        if paths
-    }
+    for name in names:
+        if paths := {folder / name for folder in folders if (folder / name).is_file()}:
+            yield f"{module}, {name}", digest(b"".join(path.read_bytes() for path in sorted(paths)))
 
 
 @cache

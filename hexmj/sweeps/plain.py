@@ -21,7 +21,7 @@ NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["
 def plain(value: Any) -> Any:
     """A setting as JSON can hold it: a frozen dataclass with the name of its class, an array as a list.
 
-    A file is its name and a digest of its content, wherever it lies.
+    A file is its name and a digest of its content, wherever it lies; so is a text with an ending that names one.
 
     Raises:
         InputError: it is none of the things that a setting can be.
@@ -31,6 +31,8 @@ def plain(value: Any) -> Any:
         return {"class": label(type(value))} | {one.name: plain(getattr(value, one.name)) for one in fields(value)}
     if isinstance(value, np.ndarray | np.generic) and value.dtype in (np.bool_, np.int64, np.float64):
         return value.tolist()
+    if type(value) is str and _is_file(value):
+        return f"{value}@{digest(content(Path(value)))}"
     if value is None or type(value) in (bool, int, float, str):
         return value
     if isinstance(value, list | tuple):
@@ -90,6 +92,13 @@ def content(path: Path) -> bytes:
                     texts.append(_read(included))
     files = {path.parent / folder / name for name in names for folder in folders}
     return b"".join([*texts, *(_read(file) for file in sorted(files) if file.is_file())])
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return "." in text and Path(text).is_file()
+    except (OSError, ValueError):  # too long for a name, or with a null character
+        return False
 
 
 def _read(path: Path) -> bytes:

@@ -26,6 +26,10 @@ Order = Literal["printed", "undelayed", "sequential"]
 Constants = tuple[int, tuple[float, ...], tuple[float, ...]]
 """The order of updates, weights and constants, as the kernel reads them."""
 
+AT_ONCE = 200_000_000
+"""Steps of a start in one call of the kernel, at most, as far as it can be divided: about two seconds, in which a
+program hears no Ctrl-C."""
+
 
 @dataclass(frozen=True)
 class Cruse1998:
@@ -131,8 +135,9 @@ class NetworkPlan:
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
         """See `protocol.FastLosses`; only the present state of a walk is kept."""
-        lost, size = np.empty(len(steps)), len(steps)
+        lost, size = np.empty(len(steps), dtype=int), len(steps)
         block = max(8 * kernel.LANES, -(-size // (4 * thread_count(self.threads))))
+        block = max(kernel.LANES, min(block, AT_ONCE // int(max(1, steps.max(initial=0)))))
 
         def work(begin: int, end: int) -> None:
             part = slice(begin, end)

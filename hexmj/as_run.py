@@ -1,0 +1,57 @@
+"""Sources of a user's modules as this program ran them, whatever became of the files since.
+
+They are noted as modules run, from the first import of this package on; those that ran before are read then.
+"""
+
+import hashlib
+import sys
+import sysconfig
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from hexmj.errors import InputError
+
+_NOT_ITS_USERS = (
+    *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")),
+    str(Path(__file__).parent),
+)
+
+_RUN: dict[str, list[bytes]] = {}
+"""File -> what ran of it, each version once."""
+
+
+def as_run(file: Path, stamp: str = "") -> bytes | None:
+    """The source of a file as it ran; None of one that did not.
+
+    Args:
+        file: of Python.
+        stamp: the first digits of the digest of the version that is meant.
+
+    Raises:
+        InputError: it ran in several versions, and none or more than one is meant.
+    """
+    if (versions := _RUN.get(str(file))) is None:
+        return None
+    meant = [one for one in versions if hashlib.sha256(one).hexdigest().startswith(stamp)]
+    if len(meant) != 1:
+        raise InputError(f"{file} was edited while this program used it; start it again")
+    return meant[0]
+
+
+def _note(file: Any) -> None:
+    if isinstance(file, str) and file.endswith(".py") and not file.startswith(_NOT_ITS_USERS):
+        with suppress(OSError):
+            source = Path(file).read_bytes()
+            if source not in (versions := _RUN.setdefault(file, [])):
+                versions.append(source)
+
+
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if event == "exec" and getattr(arguments[0], "co_name", "") == "<module>":
+        _note(arguments[0].co_filename)
+
+
+for _module in list(sys.modules.values()):
+    _note(getattr(_module, "__file__", None))
+sys.addaudithook(_hear)
