@@ -5,8 +5,14 @@ import os
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
 
 from hexmj.checks import whole
+from hexmj.errors import InputError
+
+GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
+"""Where Linux tells how much memory a process group may have."""
 
 
 def cores() -> int:
@@ -19,11 +25,27 @@ def cores() -> int:
 
 
 def memory() -> float:
-    """This machine's memory [bytes]; infinite where the operating system does not tell."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return math.inf
+    """Memory that this process may have [bytes], as far as the operating system tells: the machine's, or a limit's."""
+    known = [math.inf]
+    with suppress(AttributeError, ValueError, OSError):
+        known.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    with suppress(ValueError, OSError):  # of a container or a batch job; "max" is no limit
+        known.append(int(GROUP_LIMIT.read_text()))
+    with suppress(ImportError, ValueError, OSError):
+        from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
+
+        known += [one for one in getrlimit(RLIMIT_AS)[:1] if one != RLIM_INFINITY]
+    return float(min(known))
+
+
+def check_memory(what: str, needed: float) -> None:
+    """Refuse what takes more memory [bytes] than this process may have.
+
+    Raises:
+        InputError: it does.
+    """
+    if needed > (there := memory()):
+        raise InputError(f"{what} take {needed / 1e9:.3g} GB; expected at most the {there / 1e9:.3g} GB that are there")
 
 
 def thread_count(threads: int | None = None) -> int:

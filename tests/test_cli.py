@@ -126,6 +126,16 @@ def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding)
     assert ("\u2603" if encoding == "utf-8" else r"\u2603") in done.stdout.decode(encoding)
 
 
+def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):
+    def run_out(*_):
+        raise MemoryError("Unable to allocate 9 TiB")
+
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", run_out)
+    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, text) == (2, "")
+    assert "hexmj: the memory does not suffice (Unable to allocate 9 TiB); expected fewer starts" in error
+
+
 def test_physical_flss(run, tmp_path):
     words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--window", "start"]
     code, text, _ = run(*words, "--json", "--out", tmp_path)

@@ -310,6 +310,13 @@ def test_starts_out_of_reach_are_refused():
         settle(np.full((1, 6), -30.0), stride=Stride(pep_min=-30.0))
 
 
+def test_more_starts_than_the_memory_holds_are_refused(tmp_path, monkeypatch):
+    (limit := tmp_path / "memory.max").write_text("1000000000\n")
+    monkeypatch.setattr("hexmj.threads.GROUP_LIMIT", limit)
+    with pytest.raises(InputError, match="10000 starts that walk at once in physics take"):
+        settle(np.zeros((10_000, 6)))
+
+
 def test_targets_out_of_reach_are_counted():
     low = Conditions.of(standing_height=7.0, step_height=14.0)
     outcomes = physical_outcomes(settle(draw_starts(4, 0), low), LDVS, 0.5, 40.0)

@@ -80,6 +80,8 @@ def main() -> None:
         sys.exit(_complain(f"{error}{_kept(error, getattr(options, 'out', None))}", 1))
     except RenderingError as error:
         sys.exit(_complain(error, 1))
+    except MemoryError as error:
+        sys.exit(_complain(f"the memory does not suffice ({error or 'nothing is left'}); expected fewer starts", 2))
     except BrokenPipeError:  # whoever read the output has gone, as `head` does
         _drop_output()
         sys.exit(141)

@@ -15,7 +15,7 @@ from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, ch
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.threads import memory, thread_count
+from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk
 
@@ -70,7 +70,8 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     Raises:
         InputError: it does not, or it raised something.
     """
-    _check_memory(steps, len(plan.starts))
+    count = len(plan.starts)
+    check_memory(f"{steps} steps of {count} starts, kept whole,", KEPT * steps * count)
     end = plan.done + steps
     with said("a plan, advance"):
         walk = plan.advance(steps)
@@ -98,16 +99,6 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     if not ((walk.velocity >= 0.0) & (walk.velocity < 1.0)).all():
         raise InputError("a plan's velocity is below 0 or not below 1; expected V_r as it was commanded")
     return walk
-
-
-def _check_memory(steps: int, n_starts: int) -> None:
-    """Refuse steps that this machine's memory cannot hold."""
-    needed, there = KEPT * steps * n_starts, memory()
-    if needed > there:
-        raise InputError(
-            f"{steps} steps of {n_starts} starts, kept whole, take {needed / 1e9:.3g} GB; expected at most the"
-            f" {there / 1e9:.3g} GB of this machine"
-        )
 
 
 def place(walk: PlannedWalk, at: Sequence[int]) -> str:

@@ -17,11 +17,15 @@ from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import SINK
 from hexmj.physics.foot_path import standing_tips
 from hexmj.starts import checked_starts
+from hexmj.threads import check_memory
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0
 """How much of the depth at which steps are taken finely adhesion may press a foot in at rest; the rest is for walking,
 see `docs/exploded_walks.md`."""
+
+KEPT = 120_000
+"""Memory that a start takes while it walks, as measured of the stick insect [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +91,7 @@ def settle(
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
     height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
     x = checked_starts(starts, stride)
+    check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
     compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
     model, columns = compiled.model, compiled.columns
     tips = standing_tips(x, height, stride)
