@@ -88,6 +88,8 @@ def path_of(path: Path | str) -> Path:
     """
     if "\0" in str(typed("path", path, Path | str)):
         raise InputError(f"path = {str(path)!r:.80}; expected one without a null character")
+    if path == "":
+        raise InputError("path = ''; expected a name, or '.' for the current folder")
     return Path(path)
 
 

@@ -45,21 +45,25 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name of its own beside `path`, absolute, to write to: what is there in the end takes the place of `path`.
+    """A name of its own beside `path`, absolute, to write to: what is there in the end takes the place of `path`, or
+    of what that links to.
 
     Raises:
         InputError: it cannot be written; what stood there before still does.
     """
-    part = path.absolute().with_name(f"{PART}{uuid4().hex}{path.suffix}")
+    real = Path(os.path.realpath(path))
+    part = real.with_name(f"{PART}{uuid4().hex}{path.suffix}")
+    if real.exists() and not (real.is_file() or real.is_dir()):
+        raise InputError(f"{path} is a pipe or a device; expected a file, or nothing yet")
     WRITING.add(part)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with among_writers(path.parent):
+        with among_writers(real.parent):
             yield part
             with part.open("rb+") as file:
                 os.fsync(file.fileno())
                 WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
-            os.replace(part, path)
+            os.replace(part, real)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:

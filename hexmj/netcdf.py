@@ -17,11 +17,13 @@ def encode(data: "xr.Dataset") -> bytes:
         InputError: something that NetCDF cannot hold.
     """
     plain = data.drop_encoding()
-    for variable in plain.variables.values():
+    for name, variable in plain.variables.items():
+        if variable.dtype.kind in "mM":
+            raise InputError(f"NetCDF cannot hold this: {name} is {variable.dtype}; expected arrays, numbers and texts")
         variable.encoding["_FillValue"] = None
     try:
         return bytes(plain.to_netcdf(engine="h5netcdf"))
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, OverflowError, NotImplementedError) as error:
         raise InputError(f"NetCDF cannot hold this: {error}; expected arrays, numbers and texts") from None
 
 

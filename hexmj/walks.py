@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.checks import typed
 from hexmj.errors import InputError
-from hexmj.legs import FIG1, Geometry
+from hexmj.legs import FIG1, LEGS, Geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,8 @@ class Walk:
     def __post_init__(self) -> None:
         typed("geometry", self.geometry, Geometry)
         shape = np.shape(self.stance)
+        if len(shape) == 3 and shape[2] != len(LEGS):
+            raise InputError(f"a walk's stance is of {shape[2]} legs; expected {len(LEGS)}")
         for name in _arrays(self):
             values, kind = getattr(self, name), bool if name == "stance" else float
             typed(f"a walk's {name}", values, np.ndarray)

@@ -450,6 +450,23 @@ class MirroredInVain(Own):
     mirrored = True
 
 
+@dataclass(frozen=True)
+class OfOneMind(Own):
+    """Its plans forget how far they are as soon as another one begins."""
+
+    mind: list[int] = field(default_factory=list, compare=False)
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        self.mind[:] = [0]
+
+        def forgetful(walk, _):
+            self.mind[0] += 1
+            return {"x": walk.x[0] + 1e-6 * self.mind[0]}
+
+        return Own(forgetful).begin(starts, velocity, stride, acceleration, threads)
+
+
 def moved_by_all(plan, *_):
     """Whoever is told something, all move."""
     inner, told = plan.advance, []
@@ -490,7 +507,6 @@ def left_leg_ahead(walk: PlannedWalk, _: int) -> dict[str, Any]:
 BROKEN: list[tuple[str, Any, str]] = [
     ("settings", Melting(), "not frozen"),
     ("settings", Hiding(), "count.*is no setting"),
-    ("settings", Own(name=3), "name = 3; expected a text"),  # pyright: ignore[reportArgumentType]
     ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),
     ("begin", spoilt(one_step_on), "the plan is at step 1; expected one at time 0"),
     ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),
@@ -509,6 +525,7 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("reach", steps_changed(height=lambda walk: 30.0), "height is 30 mm in .*; expected -10 to 20 mm"),
     ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT)), "begun alike differ: x is"),
     ("begun again", spoilt(one_step_on_with_two_threads), "with 1 and 2 threads differ: x is"),
+    ("side by side", OfOneMind(), "a plan alone, and beside another of the same controller, differ: x is"),
     ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean()), "or among others differ: x"),
     ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)}), "in parts of .* differ: x is"),
     ("first losses", spoilt(losses_of_its_own), r"first_losses gives the steps \[1 1 .* expected those of the plan"),
@@ -552,14 +569,16 @@ def test_feet_that_slide_are_told():
 
 
 def test_the_first_law_that_is_broken_is_raised():
-    with pytest.raises(AssertionError, match=r"^settings: name = 3; expected a text$"):
-        check_controller(Own(name=3))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(AssertionError, match=r"^settings: the dataclass is not frozen; expected"):
+        check_controller(Melting())
 
 
 def test_what_is_no_controller_is_refused():
     for thing in (3, Own, hexmj.Symmetric()):
         with pytest.raises(hexmj.InputError, match="expected a controller, a frozen dataclass"):
             check_controller(thing)
+    with pytest.raises(hexmj.InputError, match="a controller's name = 3; expected a text"):
+        check_controller(Own(name=3))  # pyright: ignore[reportArgumentType]
 
 
 LIES = {

@@ -2,11 +2,12 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
@@ -15,6 +16,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -69,12 +71,12 @@ def odd_bits(seed: int, size: int = 4) -> xr.Dataset:
     )
 
 
-def counted(log: Path, number: int, wait: float = 0.0, fails: bool = False) -> xr.Dataset:
+def counted(log: str, number: int, wait: float = 0.0, fails: bool = False) -> xr.Dataset:
     """Writes into a log that it was computed."""
     time.sleep(wait)
     if fails:
         raise ValueError(f"cell {number} fails")
-    with (log / "calls").open("a") as file:
+    with Path(log, "calls").open("a") as file:
         file.write(f"{number}\n")
     return xr.Dataset({"number": float(number)})
 
@@ -90,8 +92,8 @@ def of_object(controller: object, n: int) -> xr.Dataset:
     return xr.Dataset({"steps": ("step", controller.steps(n))})  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def squares(rows: np.ndarray, log: Path) -> np.ndarray:
-    with (log / "calls").open("a") as file:
+def squares(rows: np.ndarray, log: str) -> np.ndarray:
+    with Path(log, "calls").open("a") as file:
         file.writelines(f"{row.tolist()}\n" for row in rows)
     return (rows**2).sum(axis=1) / 3
 
@@ -101,7 +103,7 @@ def odd_cells(n: int = 6) -> list[Cell]:
 
 
 def counted_cells(log: Path, n: int = 6, **settings: object) -> list[Cell]:
-    return [Cell(f"number {i}", counted, {"log": log, "number": i} | settings) for i in range(n)]
+    return [Cell(f"number {i}", counted, {"log": str(log), "number": i} | settings) for i in range(n)]
 
 
 def calls(log: Path) -> list[str]:
@@ -146,7 +148,9 @@ def test_settings_become_plain_json() -> None:
     assert json.loads(json.dumps(plain(settings))) == plain(settings)
 
 
-@pytest.mark.parametrize("value", [{1, 2}, object(), np.float32(1.0), np.array([object()]), {1: 2}, len, Wave, 1j])
+@pytest.mark.parametrize(
+    "value", [{1, 2}, object(), np.float32(1.0), np.array([object()]), {1: 2}, len, Wave, 1j, Path()]
+)
 def test_what_is_no_setting_is_refused_in_one_sentence(value: object) -> None:
     with pytest.raises(InputError, match="is no setting; expected") as raised:
         plain({"inner": (value,)})
@@ -190,9 +194,9 @@ def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
 
 
 def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
-    body, parts, shape = tmp_path / "body.xml", tmp_path / "parts.xml", tmp_path / "shapes" / "leg.stl"
+    body, parts, shape = tmp_path / "body.xml", tmp_path / "parts.mjcf", tmp_path / "shapes" / "leg.stl"
     shape.parent.mkdir()
-    body.write_text('<mujoco><compiler meshdir="shapes"/><include file="parts.xml"/></mujoco>')
+    body.write_text('<mujoco><compiler meshdir="shapes"/><include file="parts.mjcf"/></mujoco>')
     found = set()
     for text in ("<mujoco/>", "<mujoco><asset><mesh file='leg.stl'/></asset></mujoco>"):
         parts.write_text(text)
@@ -254,7 +258,9 @@ TOY = {
     "helper.py": "",
     "bare/helper.py": "",
     "bare/deep/other.py": "",
-    "mine.py": "from helper import *\nfrom bare import helper\nimport bare.deep.other\nHERE = 'here.json'\n" + MINE,
+    "fast.pyc": "",
+    "mine.py": "from helper import *\nfrom bare import helper\nimport bare.deep.other\n"
+    "if not True:\n    import fast\nHERE = 'here.json'\n" + MINE,
 }
 PRINT_STEM = """
 from hexmj.loaded import importable
@@ -292,9 +298,9 @@ def unedited(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: str) -> None:
     record = json.loads(unedited)
     within = {"toy", "toy.study", "toy.walk", "toy.louder", "toy.inner", "toy.inner.deep", "toy.inner.deeper"} | {
-        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper", "bare.helper", "bare.deep.other"),
+        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper", "bare.helper", "bare.deep.other", "fast"),
     }
-    assert {name for name in record["sources"] if name.startswith(("toy", "helper", "bare"))} == within
+    assert {name for name in record["sources"] if name.startswith(("toy", "helper", "bare", "fast"))} == within
     assert [name.rpartition("@")[2][12:] for name in record["sources"] if name.startswith("mine.py@")] == [
         "",
         ", here.json",
@@ -310,7 +316,7 @@ def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: 
     [
         *("toy/__init__.py", "toy/study.py", "toy/louder.py", "toy/inner/__init__.py", "toy/inner/deeper.py"),
         *("toy/own.toml", "toy/data/more.toml", "here.json", "mine.py", "helper.py"),
-        *("bare/helper.py", "bare/deep/other.py"),
+        *("bare/helper.py", "bare/deep/other.py", "fast.pyc"),
     ],
 )
 def test_an_edit_within_reach_is_another_name(toy: Path, unedited: str, name: str) -> None:
@@ -585,6 +591,57 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
     assert not list((tmp_path / "kept").iterdir())
 
 
+LEVELS = pd.MultiIndex.from_tuples([(1, 2)], names=["b", "c"])
+
+
+def odd(what: str) -> object:
+    return {
+        "dict": {},
+        "nothing": None,
+        "times": xr.Dataset({"a": ("x", np.arange(3).astype("m8[ns]"))}),
+        "levels": xr.Dataset(coords=xr.Coordinates.from_pandas_multiindex(LEVELS, "x")),
+    }[what]
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("dict", "what odd gives = {}; expected a Dataset"),
+        ("nothing", "what odd gives = None; expected a Dataset"),
+        ("times", "NetCDF cannot hold this: a is timedelta64[ns]; expected arrays, numbers and texts"),
+        ("levels", "NetCDF cannot hold this: "),
+    ],
+)
+def test_what_is_no_data_is_refused_in_one_sentence(tmp_path: Path, what: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        run([Cell("odd", odd, {"what": what})], tmp_path)
+    assert not list(tmp_path.glob("*.nc"))
+
+
+def shut() -> Executor:
+    (executor := ThreadPoolExecutor(1)).shutdown()
+    return executor
+
+
+@pytest.mark.parametrize(
+    ("ask", "sentence"),
+    [
+        (lambda: run([1]), "a cell = 1; expected a Cell"),  # pyright: ignore
+        (lambda: run(None), "cells = None; expected a Sequence"),  # pyright: ignore
+        (lambda: run(odd_cells(2), executor=shut()), "cannot schedule new futures after shutdown"),
+        (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
+        (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a Mapping"),  # pyright: ignore
+        (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
+        (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore
+        (lambda: over_axes({"a": 2}, 3 * [xr.Dataset()]), "the data of 3 cells along {'a': 2}; expected 2"),
+        (lambda: over_axes({}, []), "the data of 0 cells along {}; expected 1"),
+    ],
+)
+def test_sweeps_of_what_is_none_are_refused_in_one_sentence(ask: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        ask()
+
+
 def test_what_cannot_travel_is_refused_in_one_sentence(spawned: Executor) -> None:
     with pytest.raises(InputError, match="a cannot be sent to another process: "):
         run([Cell("a", lambda: xr.Dataset(), {})], executor=spawned)
@@ -649,7 +706,7 @@ def test_a_file_that_does_not_load_is_refused_in_one_sentence(tmp_path: Path, te
 
 
 def ledger(tmp_path: Path, folder: Path | None = None) -> KeptValues:
-    return KeptValues(Cell("squares", squares, {"log": tmp_path}), folder or tmp_path / "kept")
+    return KeptValues(Cell("squares", squares, {"log": str(tmp_path)}), folder or tmp_path / "kept")
 
 
 def test_a_ledger_computes_no_row_twice_and_gives_the_same_bits(tmp_path: Path) -> None:
@@ -687,7 +744,7 @@ def test_a_ledger_loses_at_most_a_line_that_is_not_whole(tmp_path: Path) -> None
 def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_path: Path) -> None:
     ledger(tmp_path)(np.ones((2, 2)))
     (path,) = (tmp_path / "kept").iterdir()
-    other = KeptValues(Cell("squares", squares, {"log": tmp_path, "more": 1}), tmp_path / "other")
+    other = KeptValues(Cell("squares", squares, {"log": str(tmp_path.parent)}), tmp_path / "other")
     record, lines = path.read_text().split("\n", 1)
     row = np.ones(2).tobytes()
     for line in (

@@ -65,6 +65,10 @@ def environment_step(action: Any) -> None:
     environment.step(action)
 
 
+def plan_recorded(part: slice = slice(None), stride: Any = None) -> Any:
+    return hexmj.record_plan(part_of(walk(), part), hexmj.Conditions(), stride or hexmj.Stride())
+
+
 def save(**attributes: Any) -> None:
     with TemporaryDirectory() as folder:
         hexmj.save_recording(hexmj.record(physical_walk()).assign_attrs(attributes), Path(folder) / "recording.nc")
@@ -212,6 +216,31 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.loss_time(replace(walk(), x="no")), "a walk's x = 'no'; expected a ndarray"),
     (lambda: hexmj.loss_time(replace(walk(), geometry=3)), "geometry = 3; expected a Geometry"),
     (lambda: hexmj.loss_time(part_of(walk(), slice(0))), "a walk of 0 steps; expected at least 1"),
+    (
+        lambda: replace(walk(), stance=np.ones((2, 1, 5), bool)),
+        "a walk's stance is of 5 legs; expected 6",
+    ),
+    (
+        lambda: plan_recorded(stride=hexmj.Stride(dt=0.2)),
+        "the plan's 50 times are not those of its first steps; expected multiples of 0.2",
+    ),
+    (lambda: plan_recorded(slice(0)), "the plan's 0 times are not those of its first steps; expected multiples of 0.1"),
+    (
+        lambda: plan_recorded(slice(1, None)),
+        "the plan's 49 times are not those of its first steps; expected multiples of 0.1",
+    ),
+    (lambda: hexmj.save_recording(plan_recorded(), "/dev/full"), "/dev/full is a pipe or a device; expected a file"),
+    (lambda: hexmj.render([plan_recorded()], "x\0.mp4"), "path = 'x\\x00.mp4'; expected one without a null"),
+    (lambda: compare(folder=""), "path = ''; expected a name, or '.' for the current folder"),
+    (lambda: hexmj.flss(replace(LDVS, name=["a"]), [0.5]), "name = ['a']; expected a text"),
+    (
+        lambda: hexmj.flss(replace(LDVS, name="a\nb"), [0.5]),
+        "a controller's name = 'a\\nb'; expected 1 to 200 printable",
+    ),
+    (
+        lambda: walk(velocity=0.999, stride=hexmj.Stride(dt=1.0), acceleration=hexmj.Acceleration(0.01, 0.05)),
+        "V = 0.999 is reached in steps of 0.01; expected V and a step together below 1",
+    ),
     (lambda: compare({"a\nb": LDVS}), "a controller's name = 'a\\nb'; expected 1 to 200 printable characters"),
     (lambda: compare({1: LDVS}), "a controller's name = 1; expected a text"),
     (lambda: compare(executor=3), "executor = 3; expected an Executor or None"),

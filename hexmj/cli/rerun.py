@@ -77,8 +77,12 @@ class _Repeated:
 
     @property
     def equal(self) -> bool:
-        """Every number was made again, and is equal to the last bit."""
-        return ABSENT not in self.files.values() and not any(one.differ or one.misfit for one in self.variables)
+        """Every number was made again, at least one, and is equal to the last bit."""
+        return (
+            ABSENT not in self.files.values()
+            and any(one.values for one in self.variables)
+            and not any(one.differ or one.misfit for one in self.variables)
+        )
 
     @property
     def sentence(self) -> str:

@@ -42,6 +42,11 @@ def begin(
     thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
+    if acceleration and not (v + acceleration.rate * stride.dt < 1.0).all():
+        raise InputError(
+            f"V = {v.max():g} is reached in steps of {acceleration.rate * stride.dt:g};"
+            " expected V and a step together below 1"
+        )
     with said(f"{controller.name}, begin"):
         plan = controller.begin(x.copy(), v, stride, acceleration, threads)
     check_plan(plan, x, stride)

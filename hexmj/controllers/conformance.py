@@ -152,8 +152,6 @@ def _settings(trial: Trial) -> None:
         raise InputError(
             "the dataclass is not frozen; expected @dataclass(frozen=True), so that settings stay as they are"
         )
-    if not (isinstance(controller.name, str) and controller.name):
-        raise InputError(f"name = {controller.name!r}; expected a text")
     settings_of(controller)
 
 
@@ -215,6 +213,14 @@ def _divided(trial: Trial) -> None:
     _same(trial.walk, trial.in_parts, f"{STEPS} steps at once and in parts of {DIVIDED}")
 
 
+def _side_by_side(trial: Trial) -> None:
+    other = replace(trial, starts=trial.starts[::-1], velocity=trial.velocity[::-1])
+    plans = [trial.begin(), other.begin()]
+    walks = zip(*([advanced(plan, steps) for plan in plans] for steps in DIVIDED), strict=True)
+    for alone, parts in zip((trial.walk, other.walk), walks, strict=True):
+        _same(alone, joined(parts), "a plan alone, and beside another of the same controller,")
+
+
 def _batch(trial: Trial) -> None:
     n = len(trial.starts)
     for which in ([0], [n - 2], [*range(n)[::-1]], np.arange(3 * n) % n):
@@ -260,6 +266,7 @@ LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "reach": (_reach, "tips lie where legs can reach"),
     "begun again": (_again, "plans begun alike are the same walk, with any threads"),
     "divided": (_divided, "divided anyhow it is the same walk"),
+    "side by side": (_side_by_side, "two plans that go on in turn do not feel each other"),
     "batch": (_batch, "a start walks alike alone, in another order and among others"),
     "first losses": (_fast_losses, "first_losses, where plans have it, are those of the plan"),
     "mirrored": (_mirrored, "mirrored starts give mirrored walks, where it claims that"),

@@ -1,5 +1,6 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -93,6 +94,7 @@ def _found(where: str, what: str, name: str) -> Controller:
 
 
 def _module(where: str, name: str) -> ModuleType:
+    here = os.getcwd()
     try:
         if not where.endswith(".py"):
             return import_module(where)
@@ -102,4 +104,6 @@ def _module(where: str, name: str) -> ModuleType:
         raise InputError(f"controller {name!r}: {error}") from None
     except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
+    finally:
+        os.chdir(here)  # which some files change
     raise InputError(f"controller {name!r}: {where} is no file; expected one that ends in .py")

@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from hexmj.checks import printable
 from hexmj.errors import InputError
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride
@@ -181,6 +182,7 @@ def check_controller_type(controller: object) -> None:
             f"controller = {controller!r:.200}; expected a controller, a frozen dataclass with a name and a method"
             " begin, as a preset or hexmj.load_controller gives one"
         )
+    printable("a controller's name", controller.name)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def claims_mirrored(controller: Controller) -> bool:

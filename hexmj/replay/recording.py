@@ -77,6 +77,11 @@ def record_plan(
     planned = one_start(typed("plan", plan, PlannedWalk), start)
     if plan.geometry != stride.geometry:
         raise InputError(f"the plan's lines are {plan.geometry}; expected those of the stride, {stride.geometry}")
+    steps = len(plan.time)
+    if not (steps and np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0)):
+        raise InputError(
+            f"the plan's {steps} times are not those of its first steps; expected multiples of {stride.dt}"
+        )
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((len(plan.time), ROOT_QPOS))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from inspect import signature
 from typing import Any
 
+from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.sweeps.code import code
 from hexmj.sweeps.plain import classes, digest, label, plain
@@ -29,8 +30,13 @@ class Cell:
     """Relative cost, for the progress bar."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         if taken := [name for name in EXECUTION if name in self.settings]:
             raise InputError(f"setting {taken[0]!r} of {self.name}; expected it to be left to the sweep")
+        try:
+            signature(self.function).bind_partial(**self.settings)
+        except TypeError as error:
+            raise InputError(f"settings of {self.name}: {error}; expected arguments of its function") from None
 
     def compute(self, *first: Any, **execution: Any) -> Any:
         """What the function gives, told how to compute it as far as it asks."""

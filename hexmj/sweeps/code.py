@@ -14,6 +14,7 @@ import sysconfig
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
@@ -51,7 +52,9 @@ class Code:
 
 @dataclass(frozen=True)
 class _Module:
-    source: str
+    digest: str
+    data: list[str]
+    """Names of data files."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -90,10 +93,10 @@ def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], li
         if CARRIERS & {name, top, name.rpartition(".")[0]}:
             continue
         inner = [(f"{name}.{attribute}", "")] if attribute and _file(f"{name}.{attribute}") else []
-        if file and (top in followed or not any(file.is_relative_to(one) for one in _INSTALLED)):
+        if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
-            sources[module_label(name)] = digest(module.source.encode())
-            read.append((name, file, DATA.findall(module.source)))
+            sources[module_label(name)] = module.digest
+            read.append((name, file, module.data))
             ours = top == PACKAGE.name
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
@@ -119,28 +122,33 @@ def _above(name: str) -> list[_Wanted]:
 
 @cache
 def _file(module: str) -> Path | None:
-    """The source of a module, found without running anything; None of what has no Python source."""
+    """The file of a module, found without running anything; None of what has none."""
     top, *inner = module.split(".")
     if top in sys.stdlib_module_names:
         return None
     if (file := getattr(sys.modules.get(module), "__file__", None)) is not None:
-        return Path(file) if file.endswith(".py") else None
+        return Path(file)
     spec = find_spec(top) if top not in sys.modules else sys.modules[top].__spec__
     if spec is None or not inner:
-        return Path(spec.origin) if spec and spec.origin and spec.origin.endswith(".py") else None
+        return Path(spec.origin) if spec and spec.has_location and spec.origin else None
     for folder in spec.submodule_search_locations or ():
         stem = Path(folder, *inner)
-        for file in (stem.with_name(stem.name + ".py"), stem / "__init__.py"):
+        for file in (*(stem.with_name(stem.name + ending) for ending in all_suffixes()), stem / "__init__.py"):
             if file.is_file():
                 return file
     return None
+
+
+def _is_installed(file: Path) -> bool:
+    return any(file.is_relative_to(one) for one in _INSTALLED)
 
 
 @cache
 def _read(name: str, file: Path) -> _Module:
     if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
         raise InputError(f"{file} was edited since this program began; start it again")
-    source = (as_run(file, _stamp(name)) or file.read_bytes()).decode()
+    content = as_run(file, _stamp(name)) or file.read_bytes()
+    source = content.decode() if file.suffix == ".py" else ""  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
     nodes = list(ast.walk(ast.parse(source)))
     guarded = [
@@ -152,7 +160,7 @@ def _read(name: str, file: Path) -> _Module:
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(source, package == name, imports, bound)
+    return _Module(digest(content), DATA.findall(source), package == name, imports, bound)
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:

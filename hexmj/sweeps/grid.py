@@ -1,5 +1,6 @@
 """Cells computed one after another or on any executor, kept as they finish, and put together along named axes."""
 
+import math
 import os
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,6 +76,7 @@ def finish(
     folder = None if folder is None else path_of(folder)
     executor = typed("executor", how.get("executor"), Executor | None)
     progress, threads = typed("progress", how.get("progress"), Progress | None), how.get("threads")
+    cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
     records = [cell.record() if folder else "" for cell in cells]
     paths = [
         folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
@@ -107,7 +109,7 @@ def finish(
     futures: dict[Future[xr.Dataset], int] = {}
     try:
         for i, path, parcel in waiting:
-            futures[executor.submit(_sent, parcel, path, records[i], threads or 1)] = i
+            futures[_submitted(executor, parcel, path, records[i], threads or 1)] = i
         for future in as_completed(futures):
             yield finished(futures[future], future.result())
     except BrokenExecutor:
@@ -130,6 +132,8 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     """
     import xarray as xr
 
+    if (count := math.prod(sizes.values())) != len(data):
+        raise InputError(f"the data of {len(data)} cells along {dict(sizes)}; expected {count}")
     rows = list(data)
     for name, size in reversed(list(sizes.items())):
         rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
@@ -139,11 +143,12 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
 
 def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.Dataset":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
-    if path is None:
-        return cell.compute(**execution)
-    if path.exists():
+    import xarray as xr
+
+    if path and path.exists():
         return read(path, record)
-    return write(path, record, cell.compute(**execution))
+    data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
+    return write(path, record, data) if path else data
 
 
 def _parcel(cell: Cell) -> bytes:
@@ -151,6 +156,15 @@ def _parcel(cell: Cell) -> bytes:
         return pickle.dumps(cell)
     except Exception as error:
         raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None
+
+
+def _submitted(executor: Executor, *parcel: Any) -> "Future[xr.Dataset]":
+    try:
+        return executor.submit(_sent, *parcel)
+    except BrokenExecutor:
+        raise
+    except RuntimeError as error:  # it was shut down
+        raise InputError(f"executor = {executor!r:.80}: {error}") from None
 
 
 def _sent(parcel: bytes, path: Path | None, record: str, threads: int) -> "xr.Dataset":

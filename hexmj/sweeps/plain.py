@@ -39,11 +39,11 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, Path):
+    if isinstance(value, Path) and not value.is_dir():
         return f"{value.name}@{digest(content(value))}" if value.is_file() else str(value)
     raise InputError(
-        f"{value!r:.80} is no setting; expected a number, text, a path, a frozen dataclass, or a tuple, dict or array"
-        " (float64, int64, bool) of these"
+        f"{value!r:.80} is no setting; expected a number, text, path of a file, frozen dataclass, or a tuple, dict or"
+        " array (float64, int64, bool) of these"
     )
 
 
@@ -83,12 +83,12 @@ def content(path: Path) -> bytes:
     """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there."""
     texts, names, folders = [_read(path)], list[str](), {""}
     for text in texts:
-        for kind, value in NAMED.findall(text.decode(errors="replace")) if path.suffix == ".xml" else ():
+        for kind, value in NAMED.findall(text.decode(errors="replace")) if b"<mujoco" in text else ():
             if kind != "file":
                 folders.add(value)
             elif value not in names:
                 names.append(value)
-                if (included := path.parent / value).suffix == ".xml" and included.is_file():
+                if (included := path.parent / value).is_file():
                     texts.append(_read(included))
     files = {path.parent / folder / name for name in names for folder in folders}
     return b"".join([*texts, *(_read(file) for file in sorted(files) if file.is_file())])

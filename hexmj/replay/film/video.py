@@ -12,7 +12,7 @@ from hexmj.bodies.description import Body
 from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.checks import given, typed
+from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
@@ -55,7 +55,7 @@ def render(
             film that cannot be written.
         RenderingError: nothing can be rendered here; says what brings it.
     """
-    film, path = given("film", film, Film), Path(typed("path", path, str | Path))
+    film, path = given("film", film, Film), path_of(path)
     recordings = typed("recordings", recordings, tuple[xr.Dataset, ...])
     if len(recordings) not in (1, 2):
         raise InputError(f"{len(recordings)} recordings were given; expected one, or two for side by side")

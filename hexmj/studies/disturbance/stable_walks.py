@@ -18,7 +18,7 @@ from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import StableStarts, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan, check_steerable
 from hexmj.studies.disturbance.strategies import Postures, collect_postures
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Acceleration, Stride, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,7 +95,7 @@ class StableWalks:
         ahead.advance(int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
         end = float(back.max() + window)
-        steps = np.array(int(end / self.stride.dt))
+        steps = steps_within(end, self.stride)
         first = planned_losses(self._plan(disturbed, recovery, threads), steps, threads)
         lost = np.where(first > 0, first * self.stride.dt, np.inf)
         times = {"time": time, "back": back, "planned_loss": lost}

@@ -16,6 +16,7 @@ from hexmj.physics.settling import settle
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.stability_map.mechanisms import fall_direction, mechanisms, static_plan
+from hexmj.sweeps.plain import content
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def fates(
     """
     import xarray as xr
 
-    stands = standing_starts(n_starts, seed, conditions, stride, threads)
+    stands = standing_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
     if not stands.size:
         value = conditions.flat()[over]
         raise InputError(f"{over} = {value:g}; none of {n_starts} starts stands on six feet there")
@@ -76,17 +77,20 @@ def fates(
 
 @lru_cache(maxsize=1)
 def standing_starts(
-    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
+    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None, mjcf: bytes
 ) -> np.ndarray:
-    """Which of the seed's starts come to rest on six feet, indices; kept for the other velocities."""
+    """Which of the seed's starts come to rest on six feet, indices, for the body's MJCF as it is; kept for the other
+    velocities."""
     return np.flatnonzero(_stands(draw_starts(n_starts, seed, stride), conditions, stride, threads))
 
 
 def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> np.ndarray:
-    """Which starts come to rest on six feet, (start,)."""
+    """Which starts come to rest on six feet, (start,); one that diverges is an error."""
     try:
         settle(starts, conditions, stride, threads)
-    except SimulationError:
+    except SimulationError as error:
+        if error.state:
+            raise
         if len(starts) == 1:
             return np.array([False])
         halves = np.array_split(starts, 2)
