@@ -6,6 +6,7 @@ NumPy's scalars are taken for the Python numbers that they are; True and False a
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import fields
 from functools import cache
 from numbers import Integral, Real
 from pathlib import Path
@@ -130,7 +131,8 @@ def check_types(thing: Any) -> None:
 
 @cache
 def _annotations(of: type) -> dict[str, Any]:
-    return get_type_hints(of)
+    hints = get_type_hints(of)
+    return {one.name: hints[one.name] for one in fields(of)}
 
 
 def _fitted(value: Any, wanted: Any) -> Any:
@@ -141,9 +143,9 @@ def _fitted(value: Any, wanted: Any) -> Any:
             with suppress(TypeError):
                 return _fitted(value, one)
         raise TypeError
-    if origin is tuple:
+    if origin in (tuple, Sequence):
         if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
-            kinds = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
+            kinds = inner[:1] * len(value) if _is_of_any_length(wanted) else inner
             if len(kinds) == len(value):
                 return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))
     elif wanted in (int, float):
@@ -152,13 +154,17 @@ def _fitted(value: Any, wanted: Any) -> Any:
     elif origin is Literal:
         if isinstance(value, str | int) and value in inner:
             return value
-    elif origin is Sequence or getattr(wanted, "_is_protocol", False) or wanted is Any:
+    elif getattr(wanted, "_is_protocol", False) or wanted is Any:
         return value  # looked at where it is used
     elif isinstance(value, origin or wanted):
         return value
     elif wanted is bool and isinstance(value, np.bool_):
         return bool(value)
     raise TypeError
+
+
+def _is_of_any_length(wanted: Any) -> bool:
+    return get_origin(wanted) is Sequence or get_args(wanted)[-1] is Ellipsis
 
 
 def _expected(wanted: Any) -> str:
@@ -169,8 +175,10 @@ def _expected(wanted: Any) -> str:
 
 def _kind(wanted: Any) -> str:
     origin, inner = get_origin(wanted), get_args(wanted)
-    if origin is tuple:
-        count = "some" if inner[-1] is Ellipsis else len(inner)
+    if origin is Literal:
+        return f"one of {', '.join(map(str, inner))}"
+    if origin in (tuple, Sequence):
+        count = "some" if _is_of_any_length(wanted) else len(inner)
         return f"{count} values, each {_kind(inner[0])}"
     if origin in (Union, UnionType):
         return " or ".join(map(_kind, inner))

@@ -64,7 +64,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if not fullname.startswith(f"{__name__}."):
+        if not (fullname.startswith(f"{__name__}.") and "@" in fullname):
             return None
         loader = _Source()
         return spec_from_file_location(fullname, loader.get_filename(fullname), loader=loader)

@@ -11,6 +11,9 @@ from pathlib import Path
 from hexmj.checks import whole
 from hexmj.errors import InputError
 
+MOST_THREADS = 1000
+"""Far more than any machine has cores."""
+
 GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
 """Where Linux tells how much memory a process group may have."""
 
@@ -54,7 +57,7 @@ def thread_count(threads: int | None = None) -> int:
     Raises:
         InputError: no whole number of at least 1.
     """
-    return cores() if threads is None else whole("threads", threads, 1, more=", or nothing for one per core")
+    return cores() if threads is None else whole("threads", threads, 1, MOST_THREADS, ", or nothing for one per core")
 
 
 def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads: int | None = None) -> None:

@@ -27,6 +27,7 @@ from hexmj.errors import InputError
 from hexmj.legs import FIG1
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
+from hexmj.physics.settling import settle
 from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
@@ -348,6 +349,12 @@ SECOND = STICK_INSECT.legs[1]
 def test_descriptions_without_sense_are_refused(changes: dict[str, Any], message: str):
     with pytest.raises(InputError, match=message):
         replace(STICK_INSECT, **changes)
+
+
+@pytest.mark.parametrize("changes", [{"standing_height": 12.0}, {"lines": replace(FIG1, origins=(29.0, 4.0, -20.0))}])
+def test_a_home_that_is_not_as_described_is_refused(changes: dict[str, Any]):
+    with pytest.raises(InputError, match=r"at 'home' foot 'L[12]_foot' is at .*; expected it on the origin of"):
+        settle(draw_starts(1, 0), Conditions(body=replace(STICK_INSECT, **changes)))
 
 
 @pytest.mark.parametrize(

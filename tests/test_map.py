@@ -1,6 +1,7 @@
 """Dynamic stability maps: cells are the package's own measures, differences are paired, what is done is not redone."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hexmj import LDVS, Conditions, InputError, ReadsLegs, compare
+from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.intervals import paired_difference
 from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
@@ -87,6 +89,21 @@ def test_starts_that_cannot_stand_are_left_out_everywhere():
     assert animal.static.sel(value=-9.4).item() > animal.kinematic.sel(value=-9.4).item()
     with pytest.raises(InputError, match="load = 10; none of 8 starts stands on six feet there"):
         conduct(StabilityMap(LDVS, "load", [10.0], **few))
+
+
+def test_the_body_as_it_is_now_decides_which_starts_stand(tmp_path):
+    """In one process, whether another one lay in the file before."""
+    (mjcf := tmp_path / "beetle.xml").write_text(own := STICK_INSECT.text())
+    low = own.replace('name="abdomen" pos="-8 0 -2"', 'name="abdomen" pos="-8 0 -9"')
+    assert low != own
+    body = replace(STICK_INSECT, name="beetle", mjcf=mjcf)
+    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "window": 5.0, "conditions": Conditions(body=body)}
+    assert conduct(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
+    mjcf.write_text(low)
+    with pytest.raises(InputError, match="none of 8 starts stands on six feet"):
+        conduct(StabilityMap(LDVS, "vp", [80.0], **few))
+    mjcf.write_text(own)
+    assert conduct(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
 
 
 def test_the_froude_number_is_one_where_weight_only_just_holds_the_arc():

@@ -220,6 +220,8 @@ def test_mirrored_starts_give_mirrored_outcomes():
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
     with pytest.raises(SimulationError, match="start 0 did not settle in 1 ms"):
         settle(draw_starts(2, 0), Conditions.of(settling_time=1.0))
+    with pytest.raises(SimulationError, match="its feet carry less than half of its weight"):
+        settle(draw_starts(24, 0), Conditions.of(settling_time=0.01, longest_substep=0.3125))
 
 
 def test_an_insect_that_diverges_as_it_settles_is_an_error(monkeypatch):

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 from hexmj import netcdf
+from hexmj.cli.rerun import _Repeated
 from hexmj.cli.words import deciding, files
 from hexmj.files import sealed, write_whole
 from hexmj.paper.protocol import QUICK
@@ -215,6 +216,23 @@ def test_a_result_that_cannot_be_read_gets_a_sentence(run, flss):
     code, _, error = run("rerun", flss)
     assert code == 2
     assert "flss.nc cannot be read as NetCDF" in error
+
+
+def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("sub").mkdir()
+    Path("sub/mine.py").write_text("import os\nos.chdir(os.path.dirname(os.path.abspath(__file__)))\n" + MINE)
+    words = ["flss", "--model", "sub/mine.py:Drags", "--velocities", 0.5, "--starts", 5, "--window", 10]
+    assert run(*words, "--out", "out")[0] == 0
+    assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"sub/mine.py"}
+    assert Path.cwd() == tmp_path
+    assert run("rerun", "out")[0] == 0
+
+
+def test_where_nothing_could_be_compared_nothing_is_equal():
+    nothing = _Repeated(Path("manifest.json"), ["flss"], {"flss.nc": "not compared, not there then"}, {})
+    assert not nothing.equal
+    assert "equal" not in nothing.sentence
 
 
 def test_words_that_decide_nothing_are_left_out(tmp_path, monkeypatch):

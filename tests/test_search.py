@@ -1,7 +1,7 @@
 """The search: laws of the paper's evolutionary algorithm, known minima, resuming, and what a damaged file does."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -227,6 +227,65 @@ def test_the_fields_of_a_controller_are_searched():
         assert found.history.parameter.values.tolist() == ["good", "idle"]
         assert found.cost == 0.0 < expected[0]
         assert abs(found.vector[0] - 3.0) < 2.0
+
+
+@dataclass(frozen=True)
+class Picky(Pace):
+    """Refuses nearly all that is not usual."""
+
+    least: int = 2
+
+    def __post_init__(self):
+        if not self.least <= self.good < 2.01:
+            raise ValueError(f"good = {self.good} is out of the range that I allow")
+
+
+def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
+    problem = Problem(FieldsForm(Picky()), 0.4, 0.4, window=5.0)
+    found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
+    good = found.history.candidate.sel(parameter="good")
+    refused = (good < 2) | (good >= 2.01)
+    assert len(found.refused) == found.history.attrs["refused"] == refused.sum() > 0
+    assert found.refused[0].startswith("ValueError: good = ")
+    with pytest.raises(InputError, match="4 of 4 candidates were refused, the best one by: ValueError: good = "):
+        search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
+
+
+@pytest.mark.parametrize(
+    ("form", "sentence"),
+    [
+        (lambda: FieldsForm(Pace(good=math.nan)), "the form's box is"),
+        (lambda: FieldsForm(Pace(good=math.inf)), "the form's box is"),
+        (lambda: FieldsForm(Pace(good=1e308)), "the form's box is"),
+        (lambda: Askew(box_is=([0.0, 0.0], [1.0])), "box of the form = .*; expected numbers"),
+        (lambda: Askew(box_is=([1.0, 1.0], [0.0, 1.0])), "the form's box is"),
+        (lambda: Askew(begin=np.zeros(3)), "a search begins at .*; expected 2 finite numbers"),
+        (lambda: Askew(binary=np.zeros(3, dtype=bool)), "the form's binary = .*; expected True or False for 2"),
+        (lambda: Askew(binary=[False, False]), "binary of the form = .*; expected a ndarray"),
+    ],
+)
+def test_forms_that_make_no_sense_are_refused(form, sentence):
+    with pytest.raises(InputError, match=sentence):
+        search(Problem(form(), 0.4, 0.4, window=5.0), Effort(starts=2, budget=10))
+
+
+@dataclass(frozen=True)
+class Askew:
+    """A form of a user's own in which something does not fit."""
+
+    names: tuple[str, ...] = ("good", "idle")
+    binary: Any = field(default_factory=lambda: np.zeros(2, dtype=bool))
+    begin: Any = None
+    box_is: Any = ([0.0, 0.0], [1.0, 1.0])
+
+    def box(self, reach):
+        return self.box_is
+
+    def controller(self, vector):
+        return Pace(*vector.tolist())
+
+    def vector(self, controller):
+        return np.array([controller.good, controller.idle])
 
 
 def test_what_has_no_such_parameters_is_refused():

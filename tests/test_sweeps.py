@@ -569,6 +569,19 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_file(tmp_path: Path, monkeypa
     assert contents(tmp_path / "kept") == before
 
 
+def edits(path: str, text: str) -> xr.Dataset:
+    Path(path).write_text(text)
+    return xr.Dataset({"a": 1.0})
+
+
+def test_a_file_that_is_edited_while_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
+    (data := tmp_path / "gains.toml").write_text("before")
+    with pytest.raises(InputError, match="edits: a file that it depends on was edited while it was computed"):
+        run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
+    assert not list(tmp_path.rglob("*.nc"))
+    assert len(run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1
+
+
 def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MINE)
     cell = Cell("a", of_object, {"controller": importable(tmp_path / "mine.py").Tripod(), "n": 2})

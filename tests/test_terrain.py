@@ -193,7 +193,7 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
             {"grounds": ("rough",), "heights": (9.0,)},
             "ground_height = 9.0; expected 0.1 to 8 mm where rough",
         ),
-        ({"grounds": ("flat",)}, "'flat' is none of step, gap, hurdle, rough"),
+        ({"grounds": ("flat",)}, "expected some values, each one of step, gap, hurdle, rough"),
         ({"grasps": (-1.0,)}, "grasp = -1.0; expected 0 to 100"),
         ({"velocities": (0.0,)}, "velocities = .*; expected V > 0"),
         ({"n_starts": 0}, "starts = 0; expected a whole number"),

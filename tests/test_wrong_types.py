@@ -107,7 +107,10 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: walk(starts=MASKED), "starts = masked_array( data=[[--, --, --, "),
     (lambda: walk(starts=[[1.0], [1.0, 2.0]]), "starts = [[1.0], [1.0, 2.0]]; expected numbers"),
     (lambda: walk(starts=[[{}] * 6]), "starts = [[{}, {}, {}, {}, {}, {}]]; expected numbers"),
-    (lambda: walk(threads=1.5), "threads = 1.5; expected a whole number of at least 1, or nothing for one per core"),
+    (
+        lambda: walk(threads=1.5),
+        "threads = 1.5; expected a whole number of at least 1 and at most 1000, or nothing for",
+    ),
     (lambda: walk(threads=True), "threads = True; expected a whole number of at least 1"),
     (lambda: walk(threads="two"), "threads = 'two'; expected a whole number of at least 1"),
     (lambda: walk(controller="ldvs"), "controller = 'ldvs'; expected a controller"),

@@ -1,6 +1,7 @@
 """The command line: typed options in, one call to the package, tables and files out."""
 
 import os
+import shlex
 import sys
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
@@ -124,7 +125,8 @@ def _kept(error: SimulationError, out: Path | None) -> str:
 
     try:
         path = save_state(error, out)
-        return f"; its last good state is in {path}; python -m hexmj.physics.divergence {path} replays it"
+        again = shlex.join(["python", "-m", "hexmj.physics.divergence", str(path)])
+        return f"; its last good state is in {path}; {again} replays it"
     except InputError as problem:
         return f"; its last good state is lost: {problem}"
 

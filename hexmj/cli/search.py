@@ -95,6 +95,7 @@ class Search(WalkingCommand):
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
+            told |= {"refused": found.refused}
             told |= {"verdict": _judged(verdict), "settings": settings, "files": files}
             vector = dict(zip(problem.form.names, found.vector.tolist(), strict=True))
             print_json({"found": vector} | told)
@@ -205,6 +206,7 @@ class Search(WalkingCommand):
         parameters = new_table("parameter", "found", *vectors)
         for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
             parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
+        refused = f"; {len(found.refused)} were refused, the first by {found.refused[0]}" if found.refused else ""
         windows = verdict.window.values.tolist()
         judged = new_table("model", *(f"window {window}" for window in windows))
         for name in verdict.controller.values.tolist():
@@ -216,7 +218,7 @@ class Search(WalkingCommand):
             f"{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
             judged,
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
-            f" least cost {found.cost:.4g}",
+            f" least cost {found.cost:.4g}{refused}",
             self.conditions_line(self.physical),
             *map(str, files),
         )

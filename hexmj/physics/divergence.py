@@ -6,6 +6,7 @@
 import io
 import json
 import sys
+from argparse import ArgumentParser
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -110,4 +111,6 @@ def main(path: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    parser = ArgumentParser("python -m hexmj.physics.divergence", description=main.__doc__)
+    parser.add_argument("path", help="a state that a simulation left, .npz")
+    main(parser.parse_args().path)

@@ -85,7 +85,8 @@ def settle(
         threads: one per core unless given.
 
     Raises:
-        InputError: a start that the legs cannot reach, or more adhesion than the contacts can hold.
+        InputError: a start that the legs cannot reach, a home that is not as described, or more adhesion than the
+            contacts can hold.
         SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
     """
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
@@ -93,6 +94,7 @@ def settle(
     x = checked_starts(starts, stride)
     check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
     compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
+    compiled.check_home()
     model, columns = compiled.model, compiled.columns
     tips = standing_tips(x, height, stride)
     joints, reachable = compiled.inverse(tips)
@@ -117,6 +119,7 @@ def settle(
     for name, failed in {
         "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
         "a foot is off the ground": (touch <= 0).any(axis=1),
+        "its feet carry less than half of its weight": touch.sum(axis=1) < 0.5 * compiled.weight,
         "the trunk is on the ground": (trunk > 0).any(axis=1),
     }.items():
         if failed.any():

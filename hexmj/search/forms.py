@@ -75,7 +75,8 @@ class FieldsForm:
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """0 to `reach` times the usual value, or to `reach` itself where that is 0."""
-        ends = reach * np.where(self.begin == 0, 1.0, self.begin)
+        with np.errstate(over="ignore"):  # of usual values that are refused as such
+            ends = reach * np.where(self.begin == 0, 1.0, self.begin)
         return np.minimum(0.0, ends), np.maximum(0.0, ends)
 
     def controller(self, vector: np.ndarray) -> Controller:

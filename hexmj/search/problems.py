@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 FARTHEST = 1e6
 """Greatest reach of a first population."""
 
+MOST = 1e30
+"""Greatest magnitude of a parameter with which a search begins."""
+
 REFUSED = 1.0
 """Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
 
@@ -76,13 +79,31 @@ class Problem:
         """Where a search begins, see `Form.box`; at `begin`, if one is given."""
         if not 0 < typed("domain", reach, float) <= FARTHEST:
             raise InputError(f"domain = {reach}; expected above 0 and at most {FARTHEST:g}")
-        form = self.form
-        return Domain(*form.box(reach), form.binary, form.vector(begin) if begin else form.begin)
+        form, size = self.form, len(self.form.names)
+        box = numbers("box of the form", form.box(reach))
+        where = form.vector(begin) if begin else form.begin
+        where = None if where is None else numbers("begin of the form", where)
+        if box.shape != (2, size) or not ((np.abs(box) <= MOST) & (box[0] < box[1])).all():
+            raise InputError(f"the form's box is {box}; expected a least and a greatest value of its {size} parameters")
+        if where is not None and (where.shape != (size,) or not (np.abs(where) <= MOST).all()):
+            raise InputError(f"a search begins at {where}; expected {size} finite numbers")
+        typed("binary of the form", form.binary, np.ndarray)
+        if form.binary.shape != (size,) or form.binary.dtype != bool:
+            raise InputError(f"the form's binary = {form.binary!r:.80}; expected True or False for {size} parameters")
+        return Domain(box[0], box[1], form.binary, where)
 
     def controller(self, vector: np.ndarray) -> Controller:
         """A candidate, from (parameter,)."""
         planning = self.form.controller(vector)
         return ReadsLegs(planning) if self.feedback else planning
+
+    def refusal(self, vector: np.ndarray) -> str:
+        """Why its controller refuses a candidate, (parameter,); nothing where it does not."""
+        try:
+            self.controller(vector)
+        except (InputError, ValueError) as error:
+            return f"{type(error).__name__}: {error}"
+        return ""
 
     def settings(self) -> dict[str, Any]:
         """The problem as plain data."""

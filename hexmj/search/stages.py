@@ -96,6 +96,8 @@ class Found:
     """Every candidate and cost, see `History.dataset`."""
     replayed: int
     """Different candidates whose cost an earlier run had kept."""
+    refused: list[str]
+    """Why the controller refused candidates, which cost 1 each."""
 
 
 def search(
@@ -117,7 +119,8 @@ def search(
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError: settings that make no sense, a file that is damaged or cannot be written, or a folder in use.
+        InputError: settings that make no sense, a file that is damaged or cannot be written, a folder in use, or a
+            best candidate that its controller refuses, as where it refuses all.
         SimulationError: a physical walk that failed; the evaluations before it are kept.
     """
     typed("problem", problem, Problem)
@@ -156,7 +159,12 @@ def _search(
     asked = history.dataset(problem.form.names)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     replayed = min(sum(one.known for one in kept.values()), asked.sizes["evaluation"])
-    return Found(best, cost, asked.assign_attrs(settings=settings), replayed)
+    refused = list(filter(None, map(problem.refusal, asked.candidate.values)))
+    if why := problem.refusal(best):
+        raise InputError(
+            f"{len(refused)} of {asked.sizes['evaluation']} candidates were refused, the best one by: {why}"
+        )
+    return Found(best, cost, asked.assign_attrs(settings=settings, refused=len(refused)), replayed, refused)
 
 
 def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
+from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -35,6 +36,7 @@ class SameStarts:
 
     def __post_init__(self) -> None:
         check_controller_type(self.controller)
+        check_types(self)
         check_draw(self.n_starts, self.seed)
         given, usual = self.conditions.flat(), Conditions().flat()
         for name, several in self.lists.items():

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
-from importlib.util import find_spec, resolve_name
+from importlib.util import decode_source, find_spec, resolve_name
 from pathlib import Path
 
 from hexmj.as_run import as_run
@@ -36,6 +36,7 @@ _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
 
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
+_STANDARD = sysconfig.get_path("stdlib")
 _AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
 """When the sources were changed last, as of this program's beginning."""
 
@@ -114,18 +115,27 @@ def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequen
     return passed_on if module.package and passed_on else module.imports
 
 
+def _package(name: str) -> str:
+    """The package that a module lies in; a script's, where it runs as a module of one."""
+    return (getattr(sys.modules[name], "__package__", None) or "") if name == "__main__" else name.rpartition(".")[0]
+
+
 def _above(name: str) -> list[_Wanted]:
     """The package that a module lies in, which runs before it."""
-    above = name.rpartition(".")[0]
+    above = _package(name)
     return [(above, "")] if above and _file(above) else []
 
 
 @cache
 def _file(module: str) -> Path | None:
-    """The file of a module, found without running anything; None of what has none."""
+    """The file of a module, found without running anything; None of what has none, and of the standard library's."""
+    file = _found(module)
+    of_python = file and file.is_relative_to(_STANDARD) and not _is_installed(file)
+    return None if of_python else file
+
+
+def _found(module: str) -> Path | None:
     top, *inner = module.split(".")
-    if top in sys.stdlib_module_names:
-        return None
     if (file := getattr(sys.modules.get(module), "__file__", None)) is not None:
         return Path(file)
     spec = find_spec(top) if top not in sys.modules else sys.modules[top].__spec__
@@ -148,9 +158,12 @@ def _read(name: str, file: Path) -> _Module:
     if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
         raise InputError(f"{file} was edited since this program began; start it again")
     content = as_run(file, _stamp(name)) or file.read_bytes()
-    source = content.decode() if file.suffix == ".py" else ""  # of a compiled module nothing is followed
-    package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    nodes = list(ast.walk(ast.parse(source)))
+    python = content if file.suffix == ".py" else b""  # of a compiled module nothing is followed
+    package = name if file.name == "__init__.py" else _package(name)
+    try:
+        source, nodes = decode_source(python), list(ast.walk(ast.parse(python)))
+    except (SyntaxError, ValueError) as error:
+        raise InputError(f"{file} cannot be read as Python: {error}") from None
     guarded = [
         one
         for one in nodes
@@ -169,7 +182,10 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
         for alias in one.names:
             yield alias.asname or alias.name, (alias.name, "")
     elif isinstance(one, ast.ImportFrom):
-        origin = resolve_name("." * one.level + (one.module or ""), package)
+        try:
+            origin = resolve_name("." * one.level + (one.module or ""), package)
+        except ImportError:  # nor can it run
+            return
         for alias in one.names:
             yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
 

@@ -148,7 +148,11 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     if path and path.exists():
         return read(path, record)
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
-    return write(path, record, data) if path else data
+    if path is None:
+        return data
+    if cell.record() != record:
+        raise InputError(f"{cell.name}: a file that it depends on was edited while it was computed; start again")
+    return write(path, record, data)
 
 
 def _parcel(cell: Cell) -> bytes:

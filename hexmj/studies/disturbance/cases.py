@@ -35,7 +35,7 @@ class Case:
     @property
     def disturbance(self) -> str:
         """Its name: undisturbed, halt, leg, push 20."""
-        return self.kind if self.kind != "push" else f"push {self.impulse:g}" if self.impulse else "undisturbed"
+        return self.kind if self.kind != "push" else f"push {self.impulse:.15g}" if self.impulse else "undisturbed"
 
 
 def every_case(

@@ -6,7 +6,7 @@ walk so far that the hindmost foot could be one stride beyond the longest obstac
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, check_distinct
@@ -67,9 +67,6 @@ class Terrain(SameStarts):
             raise InputError(f"velocities = {v.tolist()}; expected V > 0, or no obstacle is ever reached")
         for name in ("grounds", "heights", "lengths", "grasps"):
             check_distinct(name, getattr(self, name))
-        valid = get_args(ObstacleKind)
-        if wrong := [one for one in self.grounds if one not in valid]:
-            raise InputError(f"grounds = {list(self.grounds)}; {wrong[0]!r} is none of {', '.join(valid)}")
         for name, grounds in SIZED.items():
             if not grounds & {*self.grounds} and [*getattr(self, name)] != [*getattr(Terrain, name)]:
                 raise InputError(f"{name} = {getattr(self, name)}; only {', '.join(sorted(grounds))} have them")
@@ -88,7 +85,7 @@ class Terrain(SameStarts):
         named = {"flat": self.conditions}
         for ground in self.grounds:
             name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
-            named |= {f"{ground} {size:g} mm": self.conditions.but(ground=ground, **{name: size}) for size in sizes}
+            named |= {f"{ground} {size:.15g} mm": self.conditions.but(ground=ground, **{name: size}) for size in sizes}
         return named
 
     @property
