@@ -31,14 +31,18 @@ def importable(path: str | Path) -> ModuleType:
     """
     path = Path(path).absolute()
     try:
-        name = f"{__name__}.{quote_from_bytes(os.fsencode(path), safe='').replace('.', '%2E')}@{_digest(path)}"
-        return import_module(name)
+        return import_module(module_name(path, _digest(path)))
     except OSError as error:
         raise InputError(f"{path} cannot be loaded: {error.strerror or error}") from None
     except InputError:
         raise
     except Exception as error:
         raise InputError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
+
+
+def module_name(path: Path, stamp: str) -> str:
+    """Of the module that a file, by its absolute path, becomes in the version with this digest."""
+    return f"{__name__}.{quote_from_bytes(os.fsencode(path), safe='').replace('.', '%2E')}@{stamp}"
 
 
 def _digest(path: Path) -> str:

@@ -127,7 +127,7 @@ def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding)
 
 
 def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):
-    def run_out(*_):
+    def run_out(*_, **__):
         raise MemoryError("Unable to allocate 9 TiB")
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", run_out)

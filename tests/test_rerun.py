@@ -229,6 +229,19 @@ def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_pa
     assert run("rerun", "out")[0] == 0
 
 
+def test_a_file_that_was_edited_while_the_command_ran_counts_as_it_ran(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    edits = "from pathlib import Path\nPath('mine.py').write_text('')\n"
+    for name, text in (("mine.py", MINE), ("edits.py", MINE.replace("def begin", "def begin", 1) + edits)):
+        Path(name).write_text(text)
+    told = digest(Path("mine.py").read_bytes())
+    words = ["compare", "--models", "mine.py:Drags", "edits.py:Drags", "--no-video", "--velocities", 0.5, "--starts", 5]
+    code, _, error = run(*words, "--window", 10, "--out", "out")
+    manifest = json.loads(Path("out/manifest.json").read_text())
+    assert code == 0, error
+    assert manifest["own"]["mine.py"] == told
+
+
 def test_where_nothing_could_be_compared_nothing_is_equal():
     nothing = _Repeated(Path("manifest.json"), ["flss"], {"flss.nc": "not compared, not there then"}, {})
     assert not nothing.equal

@@ -13,12 +13,12 @@ import numpy as np
 
 from hexmj.cli import words
 from hexmj.errors import InputError
-from hexmj.files import WRITTEN, opened, read_text
+from hexmj.files import WRITTEN, read_text
 from hexmj.literal import literal
-from hexmj.loaded import importable
+from hexmj.loaded import importable, module_name
 from hexmj.results import json_text, save_text
 from hexmj.sweeps.code import code
-from hexmj.sweeps.plain import digest
+from hexmj.sweeps.plain import digest, digest_of
 
 FORMAT = 2
 """Of the file; 1 had settings and versions only."""
@@ -73,7 +73,7 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         InputError: the code was edited meanwhile, or a file cannot be written or read.
     """
     typed = words.command()
-    own = {str(file): _digest(file) for file in words.files(typed)}
+    own = {str(file): one for file, one in words.own().items()}
     made = code(frozenset({type(command).__module__, *_modules(typed)}))
     told = Manifest(
         command=typed,
@@ -135,7 +135,7 @@ def manifests(result: Path) -> dict[Path, Manifest]:
 def changed_files(then: Manifest, folder: Path) -> list[str]:
     """Files of a result that are there, but not as they were written."""
     there = {name: one for name, one in then.files.items() if (folder / name).is_file()}
-    return [name for name, one in there.items() if _digest(folder / name) != one]
+    return [name for name, one in there.items() if digest_of(folder / name) != one]
 
 
 def differences(then: Manifest, now: Manifest) -> dict[str, list[str]]:
@@ -170,7 +170,10 @@ def _modules(typed: Sequence[str]) -> Iterator[str]:
     from hexmj.controllers.named import ENTRY_POINTS
 
     points = {point.name: point.module for point in entry_points(group=ENTRY_POINTS)}
-    yield from (importable(file).__name__ for file in words.files(typed) if file.suffix == ".py")
+    for file, stamp in words.own().items():
+        if file.suffix == ".py":
+            name = module_name(file.absolute(), stamp)
+            yield name if name in sys.modules else importable(file).__name__
     for name in words.named(typed):
         module = points.get(name) or name.rpartition(":")[0]
         if (getattr(sys.modules.get(module), "__file__", None) or "").endswith(".py"):
@@ -192,11 +195,6 @@ def _processor() -> list[str]:
 def _written(path: Path) -> str:
     """Of a file as this process wrote it."""
     return WRITTEN[path.absolute()][: len(digest(b""))]
-
-
-def _digest(path: Path) -> str:
-    with opened(path) as file:
-        return digest(file.read())
 
 
 def _fits(value: Any, kind: Any) -> bool:

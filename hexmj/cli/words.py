@@ -1,19 +1,22 @@
 """The words behind `hexmj`: which can be read, which decide what comes of a command, and what files they name."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from os.path import isfile
 from pathlib import Path
+from types import MappingProxyType
 
 from hexmj.errors import LONGEST, InputError
 from hexmj.files import read_toml
 from hexmj.literal import literal
+from hexmj.sweeps.plain import digest_of
 
 INDIFFERENT = {"--out": 1, "--threads": 1, "--processes": 1, "--json": 0}
 """Options on which no number depends -> how many words follow them."""
 
 _TYPED: ContextVar[Sequence[str]] = ContextVar("typed", default=())
+_OWN: ContextVar[Mapping[Path, str]] = ContextVar("own", default=MappingProxyType({}))
 
 
 def checked(words: list[str]) -> list[str]:
@@ -35,12 +38,18 @@ def checked(words: list[str]) -> list[str]:
 
 @contextmanager
 def typed(words: Sequence[str]) -> Iterator[None]:
-    """While the block runs, a command is at work that was asked for by these words."""
-    before = _TYPED.set(words)
+    """While the block runs, a command is at work that was asked for by these words, with files as they are now."""
+    before = _TYPED.set(words), _OWN.set({file: digest_of(file) for file in files(words)})
     try:
         yield
     finally:
-        _TYPED.reset(before)
+        _TYPED.reset(before[0])
+        _OWN.reset(before[1])
+
+
+def own() -> dict[Path, str]:
+    """The files that the words of the command at work name -> digest, as it began."""
+    return dict(_OWN.get())
 
 
 def command() -> list[str]:

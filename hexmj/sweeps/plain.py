@@ -106,6 +106,15 @@ def _read(path: Path) -> bytes:
         return file.read()
 
 
+def digest_of(path: Path) -> str:
+    """Of a file as it is now.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return digest(_read(path))
+
+
 def digest(content: bytes) -> str:
     """Of some bytes: the first 12 digits of their SHA-256."""
     return hashlib.sha256(content).hexdigest()[:12]
