@@ -8,7 +8,7 @@ from hexmj.cli.command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.progress import progress_bar
 from hexmj.threads import check_memory
-from hexmj.timing import observation_time
+from hexmj.timing import observation_time, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,7 @@ def recorded(
     stride, acceleration = command.walks.stride, command.accelerating.procedure
     starts = draw_start(start, command.walks.seed, stride)
     time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
-    check_memory(f"recordings of {time:g} time units", KEPT * time / stride.dt)
+    check_memory(f"recordings of {time:g} time units", KEPT * int(steps_within(time, stride)))
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     if not physical:
         return record_plan(walk(starts, controller, velocity, time, **how), command.conditions, stride, title=title)
