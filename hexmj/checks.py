@@ -156,7 +156,7 @@ def _fitted(value: Any, wanted: Any) -> Any:
             return value
     elif getattr(wanted, "_is_protocol", False) or wanted is Any:
         return value  # looked at where it is used
-    elif isinstance(value, origin or wanted):
+    elif isinstance(value, origin or wanted) and not (origin is Callable and isinstance(value, type)):
         return value
     elif wanted is bool and isinstance(value, np.bool_):
         return bool(value)

@@ -247,6 +247,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: compare({"a\nb": LDVS}), "a controller's name = 'a\\nb'; expected 1 to 200 printable characters"),
     (lambda: compare({1: LDVS}), "a controller's name = 1; expected a text"),
     (lambda: compare(executor=3), "executor = 3; expected an Executor or None"),
+    (lambda: compare(progress=object), "progress = <class 'object'>; expected a function or None"),
     (lambda: compare(progress=3), "progress = 3; expected a function or None"),
     (
         lambda: hexmj.walk(np.zeros((10**5, 6)), LDVS, 0.3, 1e5),
