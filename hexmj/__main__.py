@@ -1,10 +1,14 @@
 """The command `hexmj`, also as `python -m hexmj`: it can be stopped from its first moment on."""
 
+import os
 import signal
 import sys
+from typing import Any
 
-STOPS = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
-"""What stops the command as Ctrl-C does."""
+STOPS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+"""What stops the command."""
+
+_HEARD: list[int] = []
 
 
 def main() -> None:
@@ -12,13 +16,21 @@ def main() -> None:
     try:
         for one in STOPS:
             if signal.getsignal(one) != signal.SIG_IGN:  # as `nohup` has it
-                signal.signal(one, signal.default_int_handler)
+                signal.signal(one, _stop)
         from hexmj.cli.main import main as command
 
         command()
-    except KeyboardInterrupt:
-        print("hexmj: stopped", file=sys.stderr)
-        sys.exit(130)
+    except (KeyboardInterrupt, ImportError):
+        if not _HEARD:
+            raise
+        print("hexmj: stopped", file=sys.stderr, flush=True)
+        os._exit(130)  # half-imported modules may not survive the interpreter's own end
+
+
+def _stop(number: int, frame: Any) -> None:
+    """As Ctrl-C does; some modules make an ImportError of it while they are imported."""
+    _HEARD.append(number)
+    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

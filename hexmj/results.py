@@ -56,7 +56,7 @@ def save_dataset(data: "xr.Dataset", path: Path) -> Path:
         key: literal(value)
         if type(value) is str
         else value
-        if type(value) in (int, float)
+        if type(value) is float or (type(value) is int and abs(value) < 2**63)
         else json.dumps(value, default=str)
         for key, value in data.attrs.items()
     }

@@ -265,6 +265,11 @@ def test_texts_that_no_person_would_write(tmp_path, text, said):
         load_controller(str(path))
 
 
+def test_a_seed_of_any_size_is_written(tmp_path):
+    path = save_dataset(xr.Dataset(attrs={"seed": 2**70, "other": -(2**63) + 1}), tmp_path / "a.nc")
+    assert xr.load_dataset(path).attrs == {"seed": str(2**70), "other": -(2**63) + 1}
+
+
 def test_a_text_with_a_byte_order_mark_is_one(tmp_path):
     (path := tmp_path / "weights.toml").write_bytes(b"\xef\xbb\xbf" + weights_toml(LDVS.weights).encode())
     assert load_controller(str(path)) == replace(LDVS, name="weights")

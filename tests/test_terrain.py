@@ -1,6 +1,7 @@
 """Real obstacles: what lies ahead is solid, is not felt before it is reached, and every start is counted once."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,18 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 from film_reader import read_film
-from hexmj import LDVS, Conditions, InputError, ReadsLegs, Stride, draw_starts, physical_walk, render
+from hexmj import (
+    LDVS,
+    PRESETS,
+    STICK_INSECT,
+    Conditions,
+    InputError,
+    ReadsLegs,
+    Stride,
+    draw_starts,
+    physical_walk,
+    render,
+)
 from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
@@ -231,3 +243,11 @@ def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
             render([recording.assign_attrs(ground=ground)], tmp_path / "film.mp4", film)
             shown.append(read_film(tmp_path / "film.mp4")[0].astype(int))
     assert np.abs(shown[0] - shown[1]).mean() > 2.0
+
+
+@pytest.mark.parametrize("ground", ["step", "gap"])
+def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground):
+    body = replace(STICK_INSECT, lengths=replace(STICK_INSECT.lengths, ground_reach=60.0))
+    ahead = Conditions.of(ground=ground, ground_length=1.0, ground_at=46.0, ground_height=2.0)
+    with pytest.raises(InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected a window in which no"):
+        physical_walk(draw_starts(1, 3), PRESETS["own-0.3"], 0.3, 700.0, conditions=replace(ahead, body=body))

@@ -58,6 +58,23 @@ def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.nda
     return np.where((x > ground.ground_at) & (x < end), height, 0.0)
 
 
+def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.ndarray:
+    """Whether spheres are beyond the ends of what lies ahead, where the ground is another than it is told.
+
+    Args:
+        ground: what lies ahead; bumps end on the plane, as anybody can see.
+        lengths: of the body that walks there.
+        feet: the spheres' centres in the world, (..., 3) [mm].
+
+    Returns:
+        (...,)
+    """
+    length = ground.ground_length if ground.ground == "gap" else 0.0
+    ends = {"step": ground.ground_at + lengths.ground_reach, "gap": ground.ground_at + length + lengths.ground_reach}
+    aside = np.inf if ground.ground in ("flat", "rough") else lengths.ground_half_width
+    return (feet[..., 0] > ends.get(ground.ground, np.inf)) | (np.abs(feet[..., 1]) > aside)
+
+
 def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
     """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
 

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.controllers.protocol import Sensed
-from hexmj.errors import SimulationError
+from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import FineSteps, Shown
@@ -90,6 +91,7 @@ class Insects:
 
         Raises:
             SimulationError: a simulation that diverged, or a walk that exploded.
+            InputError: a walk that leads beyond the ground.
         """
         before: dict[str, np.ndarray] = {}
         done: list[Orders] = []
@@ -109,10 +111,25 @@ class Insects:
             start = int(done[0].ids[odd.row])
             state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
             raise self._error(Diverged(start, odd.what, state, odd.substep), done[0])
+        self._check_ground(whole["sensors"], valid, done[0].ids)
         missed = _joined([orders.missed for orders in done]).sum(axis=2)
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
         plan = joined([orders.plan for orders in done])
         return Chunk(plan, done[0].first, done[0].ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
+
+    def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
+        """Refuse walks, (n, substep, column) until they fall, that lead beyond the ground that was laid."""
+        conditions, body = self.settled.conditions, self.settled.conditions.body
+        feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
+        beyond = beyond_the_ground(conditions.ground, body.lengths, feet).any(axis=2)
+        beyond &= np.arange(sensors.shape[1]) < valid[:, None]
+        if beyond.any():
+            row, substep = np.argwhere(beyond)[0]
+            x, y, _ = feet[row, substep].mean(axis=0).round().tolist()
+            raise InputError(
+                f"start {ids[row]} walks off the {conditions.ground.ground} at x = {x:g} mm, y = {y:g} mm;"
+                " expected a window in which no start leaves it"
+            )
 
     def _show(self, orders: Orders) -> Shown:
         """What is shown over the orders' substeps."""
