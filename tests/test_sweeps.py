@@ -346,6 +346,12 @@ def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch
         sources._read.__wrapped__(name, file)
 
 
+PRINT_MAIN = """
+from hexmj.sweeps import Cell
+from toy.study import cell
+print(Cell("toy", cell, {"controller": Tripod()}).record())
+"""
+
 USED = """
 import sys
 from pathlib import Path
@@ -380,6 +386,34 @@ def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(toy: Path) -> 
     assert unedited.returncode == edited.returncode == 0, edited.stderr
     assert json.loads(unedited.stdout) == json.loads(edited.stdout)
     assert "used.py was edited while this program used it; start it again" in again.stderr
+
+
+@pytest.mark.parametrize("content", [b"# -*- coding: latin-1 -*-\n# \xdf", b"\xef\xbb\xbf# with a mark"])
+def test_a_source_counts_in_any_encoding_that_python_reads(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "mine.py").write_bytes(content + b"\nimport numpy")
+    assert "numpy" in code(frozenset({importable(tmp_path / "mine.py").__name__})).versions
+
+
+def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
+    (toy / "mine.py").write_text("import profile\n" + TOY["mine.py"])
+    found = []
+    for text in ("GAIN = 1", "GAIN = 2"):
+        (toy / "profile.py").write_text(text)
+        found.append(json.loads(toy_record(toy))["sources"])
+    assert found[0].pop("profile") != found[1].pop("profile")
+    assert found[0] == found[1]
+
+
+def test_a_script_that_runs_as_a_module_counts_what_it_imports(toy: Path) -> None:
+    (toy / "toy" / "run.py").write_text("from . import louder\n" + MINE + "\n" + PRINT_MAIN)
+    command = [sys.executable, "-m", "toy.run"]
+    done = subprocess.run(command, cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
+    assert {"run.py", "toy", "toy.louder"} <= set(json.loads(done.stdout)["sources"]), done.stderr
+
+
+def test_what_a_file_tries_in_vain_does_not_stop_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("try:\n    from . import foo\nexcept ImportError:\n    foo = 3")
+    assert importable(tmp_path / "mine.py").foo == 3
 
 
 def test_data_files_count_as_they_are_now(tmp_path: Path) -> None:
