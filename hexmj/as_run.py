@@ -4,6 +4,7 @@ They are noted as modules run, from the first import of this package on; those t
 """
 
 import hashlib
+import os
 import sys
 import sysconfig
 from contextlib import suppress
@@ -12,9 +13,12 @@ from typing import Any
 
 from hexmj.errors import InputError
 
-_NOT_ITS_USERS = (
-    *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")),
-    str(Path(__file__).parent),
+_NOT_ITS_USERS = tuple(
+    f"{folder}{os.sep}"
+    for folder in (
+        *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")),
+        Path(__file__).parent,
+    )
 )
 
 _RUN: dict[str, list[bytes]] = {}

@@ -150,7 +150,10 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))
     elif wanted in (int, float):
         if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool):
-            return int(value) if isinstance(value, Integral) else float(value)
+            with suppress(OverflowError):  # a whole number beyond all floats stays what it is
+                number: Any = value
+                return wanted(number) + 0  # and -0.0 is 0.0
+            return value
     elif origin is Literal:
         if isinstance(value, str | int) and value in inner:
             return value

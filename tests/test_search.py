@@ -251,6 +251,21 @@ def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
 
+@dataclass(frozen=True)
+class Far(Pace):
+    """Stands still, far beside its lines."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        y = (4.0 + abs(self.good)) * np.array(stride.geometry.y)
+        return stepwise(lambda v: Step(starts, np.ones(6, dtype=bool), y=y), starts, velocity, stride, acceleration)
+
+
+def test_what_no_leg_reaches_is_never_found():
+    problem = Problem(FieldsForm(Far()), 0.3, 0.3, window=5.0, conditions=hexmj.Conditions())
+    with pytest.raises(InputError, match="out of reach"):
+        search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
+
+
 @pytest.mark.parametrize(
     ("form", "sentence"),
     [

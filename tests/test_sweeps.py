@@ -20,6 +20,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.progress import Progress
@@ -27,6 +28,7 @@ from hexmj.sweeps import Cell, KeptValues, conduct, finish, over_axes, run
 from hexmj.sweeps import code as sources
 from hexmj.sweeps.code import code
 from hexmj.sweeps.plain import plain
+from hexmj.timing import Stride
 
 PATHS = ".", *(str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}
@@ -198,7 +200,7 @@ def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
     shape.parent.mkdir()
     body.write_text('<mujoco><compiler meshdir="shapes"/><include file="parts.mjcf"/></mujoco>')
     found = set()
-    for text in ("<mujoco/>", "<mujoco><asset><mesh file='leg.stl'/></asset></mujoco>"):
+    for text in ("<parts/>", "<parts><asset><mesh file='leg.stl'/></asset></parts>"):
         parts.write_text(text)
         for content in (b"a", b"b"):
             shape.write_bytes(content)
@@ -218,6 +220,11 @@ def test_every_setting_is_in_the_name() -> None:
     ]
     assert len({cell.stem(cell.record()) for cell in cells}) == len(cells)
     assert Cell("a", odd_bits, {"seed": 0}, work=9.0).record() == cells[0].record()
+
+
+def test_a_whole_number_and_the_same_float_are_one_setting() -> None:
+    for one, other in ((Conditions.of(vp=80, load=0), Conditions.of(load=-0.0)), (Stride(aep0=10), Stride())):
+        assert json.dumps(plain(one)) == json.dumps(plain(other))
 
 
 def test_a_cell_refuses_what_no_name_can_tell() -> None:
@@ -392,6 +399,29 @@ def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(toy: Path) -> 
 def test_a_source_counts_in_any_encoding_that_python_reads(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "mine.py").write_bytes(content + b"\nimport numpy")
     assert "numpy" in code(frozenset({importable(tmp_path / "mine.py").__name__})).versions
+
+
+LATE = """
+from pathlib import Path
+from hexmj.sweeps import Cell, run
+import late_cells
+late_cells.record()
+Path("helper.py").write_text("GAIN = 7.0")
+run([Cell("late", late_cells.cell, {})], Path("kept"))
+"""
+
+
+def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "helper.py").write_text("GAIN = 1.0")
+    (tmp_path / "late_cells.py").write_text(
+        "import xarray as xr\nfrom hexmj.sweeps import Cell\n"
+        "def cell():\n    import helper\n    return xr.Dataset({'a': helper.GAIN})\n"
+        "def record(): return Cell('late', cell, {}).record()"
+    )
+    command = [sys.executable, "-c", LATE]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert "helper.py was edited while this program used it; start it again" in done.stderr
+    assert not list(tmp_path.rglob("*.nc"))
 
 
 def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
@@ -610,7 +640,7 @@ def edits(path: str, text: str) -> xr.Dataset:
 
 def test_a_file_that_is_edited_while_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
-    with pytest.raises(InputError, match="edits: a file that it depends on was edited while it was computed"):
+    with pytest.raises(InputError, match="edits: path of settings was edited while the cell was computed; start again"):
         run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
     assert not list(tmp_path.rglob("*.nc"))
     assert len(run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1

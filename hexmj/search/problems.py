@@ -171,6 +171,15 @@ class Sample:
         with ThreadPoolExecutor(thread_count(threads)) as pool:
             return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
 
+    def check_reach(self, vector: np.ndarray, threads: int | None = None) -> None:
+        """Refuse a candidate, (parameter,), whose tips no leg reaches in physics.
+
+        Raises:
+            OutOfReach: it is one.
+        """
+        if self.problem.conditions:
+            self._losses(self.problem.controller(vector), [self.problem.window], threads)
+
     def verdict(self, controllers: Mapping[str, Controller], threads: int | None = None) -> "xr.Dataset":
         """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts."""
         import xarray as xr

@@ -18,7 +18,7 @@ from hexmj.progress import Progress
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
-from hexmj.search.problems import Problem, Sample
+from hexmj.search.problems import REFUSED, Problem, Sample
 from hexmj.starts import check_draw
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps.plain import plain
@@ -164,6 +164,8 @@ def _search(
         raise InputError(
             f"{len(refused)} of {asked.sizes['evaluation']} candidates were refused, the best one by: {why}"
         )
+    if cost >= REFUSED:
+        [*samples.values()][-1].check_reach(best, threads)
     return Found(best, cost, asked.assign_attrs(settings=settings, refused=len(refused)), replayed, refused)
 
 

@@ -59,3 +59,12 @@ class Cell:
     def stem(self, record: str) -> str:
         """The name of its file without the ending."""
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
+
+
+def difference(one: str, other: str) -> str:
+    """The first thing in which two records differ, by the names that lead to it."""
+    names, a, b = list[str](), json.loads(one), json.loads(other)
+    while isinstance(a, dict) and isinstance(b, dict):
+        names.append(next(name for name in sorted({*a, *b}) if a.get(name) != b.get(name)))
+        a, b = a.get(names[-1]), b.get(names[-1])
+    return " of ".join(reversed(names))

@@ -35,6 +35,9 @@ DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
 
+INSTALLED = {"site-packages", "dist-packages"}
+"""Folders of installed packages, this Python's own or another's."""
+
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _STANDARD = sysconfig.get_path("stdlib")
 _AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
@@ -72,7 +75,9 @@ def code(modules: frozenset[str]) -> Code:
     sources, versions, read = _needed(modules)
     data: dict[str, str] = {}
     for name, file, names in read:
-        as_run(file, _stamp(name))
+        content = as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
+        if content and digest(content) != sources[module_label(name)]:
+            raise InputError(f"{file} was edited while this program used it; start it again")
         data |= _data(module_label(name), file, names)
     return Code(dict(sorted((sources | data).items())), versions)
 
@@ -150,7 +155,7 @@ def _found(module: str) -> Path | None:
 
 
 def _is_installed(file: Path) -> bool:
-    return any(file.is_relative_to(one) for one in _INSTALLED)
+    return any(file.is_relative_to(one) for one in _INSTALLED) or not INSTALLED.isdisjoint(file.parts)
 
 
 @cache

@@ -83,7 +83,7 @@ def content(path: Path) -> bytes:
     """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there."""
     texts, names, folders = [_read(path)], list[str](), {""}
     for text in texts:
-        for kind, value in NAMED.findall(text.decode(errors="replace")) if b"<mujoco" in text else ():
+        for kind, value in NAMED.findall(text.decode(errors="replace")):
             if kind != "file":
                 folders.add(value)
             elif value not in names:
