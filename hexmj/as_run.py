@@ -5,6 +5,7 @@ They are noted as modules run, from the first import of this package on; those t
 
 import hashlib
 import os
+import re
 import sys
 import sysconfig
 from contextlib import suppress
@@ -21,8 +22,14 @@ _NOT_ITS_USERS = tuple(
     )
 )
 
+DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
+"""Names of data files in a source."""
+
 _RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
+
+_READ: dict[Path, bytes] = {}
+"""Data file -> what it held when the first module that names it ran, which may have read it then."""
 
 
 def as_run(file: Path, stamp: str = "") -> bytes | None:
@@ -43,12 +50,31 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
     return meant[0]
 
 
+def data_names(source: bytes) -> list[str]:
+    """The data files that a source names."""
+    return DATA.findall(source.decode(errors="replace"))
+
+
+def data_folders(file: Path) -> list[Path]:
+    """Where the data files of a module of the user's own lie."""
+    return [file.parent, Path.cwd()]
+
+
+def data(path: Path) -> bytes:
+    """What a data file holds, and what it held when a module that names it ran, if that was something else."""
+    now = path.read_bytes()
+    return now if (then := _READ.get(path, now)) == now else now + then
+
+
 def _note(file: Any) -> None:
     if isinstance(file, str) and file.endswith(".py") and not file.startswith(_NOT_ITS_USERS):
         with suppress(OSError):
             source = Path(file).read_bytes()
             if source not in (versions := _RUN.setdefault(file, [])):
                 versions.append(source)
+            for path in (folder / name for name in data_names(source) for folder in data_folders(Path(file))):
+                if path not in _READ and path.is_file():
+                    _READ[path] = path.read_bytes()
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:

@@ -53,10 +53,10 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     real = Path(os.path.realpath(path))
     part = real.with_name(f"{PART}{uuid4().hex}{path.suffix}")
-    if real.exists() and not (real.is_file() or real.is_dir()):
-        raise InputError(f"{path} is a pipe or a device; expected a file, or nothing yet")
     WRITING.add(part)
     try:
+        if real.exists() and not (real.is_file() or real.is_dir()):
+            raise InputError(f"{path} is a pipe or a device; expected a file, or nothing yet")
         path.parent.mkdir(parents=True, exist_ok=True)
         with among_writers(real.parent):
             yield part

@@ -357,6 +357,19 @@ def test_a_home_that_is_not_as_described_is_refused(changes: dict[str, Any]):
         settle(draw_starts(1, 0), Conditions(body=replace(STICK_INSECT, **changes)))
 
 
+def test_a_centre_of_mass_elsewhere_is_said_and_stays_there(tmp_path: Path):
+    """Light legs do not move it either."""
+    (mjcf := tmp_path / "heavy.xml").write_text(STICK_INSECT.text().replace('mass="0.216133"', 'mass="0.432266"'))
+    body = replace(STICK_INSECT, name="heavy", mjcf=mjcf, mass=1.216133)
+    for masses in ({}, {"leg_mass": 0.5}):
+        with pytest.raises(InputError, match=r"centre of mass lies -5\.10\d* mm ahead of O; expected it at O"):
+            settle(draw_starts(1, 0), conditions(body, **masses))
+        data = at_home(compile_body(conditions(body, centre_of_mass=-5.1, **masses)))
+        mujoco.mj_forward(data.model, data)
+        assert data.subtree_com[data.model.body(body.root).id][0] - data.qpos[0] == pytest.approx(-5.1, abs=1e-6)
+    settle(draw_starts(1, 0), conditions(body, centre_of_mass=-5.1))
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -424,7 +424,7 @@ NONSENSE = [
     (["walk", "--ground", "step"], "--ground without --physical"),
     (
         ["walk", "--initial-velocity", "0.2"],
-        "--initial-velocity = 0.2 without --acceleration; expected both or neither",
+        "--initial-velocity = 0.2 without --acceleration; expected it with that only",
     ),
     (["flss", "--physical", "--load", "-1"], "load = -1.0; expected 0 to 10"),
     (["flss", "--order", "x"], "valid names: printed, undelayed, sequential"),

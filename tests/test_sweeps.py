@@ -208,6 +208,19 @@ def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
     assert len(found) == 3
 
 
+def test_an_mjcf_in_folders_is_looked_for_beside_each_file(tmp_path: Path) -> None:
+    (tmp_path / "sub" / "m").mkdir(parents=True)
+    (tmp_path / "main.xml").write_text('<mujoco><include file="sub/legs.xml"/></mujoco>')
+    (tmp_path / "sub" / "legs.xml").write_text('<legs><include file="more.xml"/><model file="att.xml"/></legs>')
+    (tmp_path / "sub" / "att.xml").write_text('<mujoco><compiler meshdir="m"/><mesh file="b.obj"/></mujoco>')
+    found = {plain(tmp_path / "main.xml")}
+    for name in ("more.xml", "att.xml", "m/b.obj"):
+        with (tmp_path / "sub" / name).open("a") as file:
+            file.write(" ")
+        found.add(plain(tmp_path / "main.xml"))
+    assert len(found) == 4
+
+
 def test_every_setting_is_in_the_name() -> None:
     cells = [
         Cell("a", odd_bits, {"seed": 0}),
@@ -422,6 +435,41 @@ def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: P
     done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
     assert "helper.py was edited while this program used it; start it again" in done.stderr
     assert not list(tmp_path.rglob("*.nc"))
+
+
+READ = """
+from pathlib import Path
+from hexmj.sweeps import Cell
+import reads
+if __name__ == "__main__":
+    Path("gains.toml").write_text("g = 9.0")
+    print(Cell("reads", reads.cell, {}).record())
+"""
+
+
+def test_a_data_file_counts_as_it_was_when_its_module_ran_too(tmp_path: Path) -> None:
+    """The module may have read it then, or may read it now; in a new program both are the same."""
+    (tmp_path / "reads.py").write_text("GAINS = open('gains.toml').read()\ndef cell(): ...")
+    sources_of = []
+    for text in ("g = 1.0", "g = 9.0"):
+        (tmp_path / "gains.toml").write_text(text)
+        command = [sys.executable, "-c", READ]
+        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=True)
+        sources_of.append(json.loads(done.stdout)["sources"])
+    assert sources_of[0]["reads, gains.toml"] != sources_of[1]["reads, gains.toml"]
+
+
+def edited_rows(rows: np.ndarray, data: str) -> np.ndarray:
+    Path(data).write_text("after")
+    return rows.sum(axis=1)
+
+
+def test_evaluations_during_which_a_file_is_edited_are_not_kept(tmp_path: Path) -> None:
+    (data := tmp_path / "gains.toml").write_text("before")
+    values = KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept")
+    with pytest.raises(InputError, match="rows: data of settings was edited while it was in use; start again"):
+        values(np.eye(2))
+    assert KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept").known == 0
 
 
 def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
@@ -640,7 +688,7 @@ def edits(path: str, text: str) -> xr.Dataset:
 
 def test_a_file_that_is_edited_while_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
-    with pytest.raises(InputError, match="edits: path of settings was edited while the cell was computed; start again"):
+    with pytest.raises(InputError, match="edits: path of settings was edited while it was in use; start again"):
         run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
     assert not list(tmp_path.rglob("*.nc"))
     assert len(run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1

@@ -25,7 +25,7 @@ from hexmj import (
     physical_walk,
     render,
 )
-from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.grounds import beyond_the_ground, ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.physics.settling import settle
@@ -251,3 +251,24 @@ def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground):
     ahead = Conditions.of(ground=ground, ground_length=1.0, ground_at=46.0, ground_height=2.0)
     with pytest.raises(InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected a window in which no"):
         physical_walk(draw_starts(1, 3), PRESETS["own-0.3"], 0.3, 700.0, conditions=replace(ahead, body=body))
+
+
+@pytest.mark.parametrize(
+    ("ground", "within", "beyond"),
+    [
+        ("flat", [(1e4, 1e4)], []),
+        ("rough", [(1e4, 1e4)], []),
+        (
+            "hurdle",
+            [(112.0, 171.0), (499.0, 300.0), (2000.0, 300.0), (501.0, 199.0)],
+            [(501.0, 201.0), (501.0, -201.0)],
+        ),
+        ("step", [(499.0, 300.0), (1499.0, 199.0)], [(501.0, 201.0), (1501.0, 0.0)]),
+        ("gap", [(0.0, 199.0), (-999.0, 0.0), (1500.0, 0.0)], [(0.0, 201.0), (-1001.0, 0.0), (1511.0, 0.0)]),
+    ],
+)
+def test_the_ground_ends_where_its_pieces_do(ground, within, beyond):
+    ahead = Conditions.of(ground=ground, ground_at=500.0, ground_length=10.0, ground_height=2.0).ground
+    for places, ends in ((within, False), (beyond, True)):
+        for x, y in places:
+            assert beyond_the_ground(ahead, STICK_INSECT.lengths, np.array([x, y, 0.0])) == ends, (x, y)

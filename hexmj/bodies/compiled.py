@@ -16,9 +16,6 @@ from hexmj.bodies.reading import posed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 
-HOME_TOLERANCE = 1e-3
-"""How far a foot may be from where the description has it at home, in lengths of the shortest leg."""
-
 
 @dataclass(frozen=True)
 class Columns:
@@ -96,23 +93,6 @@ class CompiledBody:
             The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether it can, (..., leg).
         """
         return self.kinematics.inverse(tips)
-
-    def check_home(self) -> None:
-        """Refuse a posture home in which the feet are not where the description has them.
-
-        Raises:
-            InputError: they are not.
-        """
-        body = self.body
-        tips = self.forward(self.home[self.columns.qpos].reshape(6, -1))
-        expected = np.stack([body.lines.origin, body.lines.y, 6 * [-body.standing_height]], axis=-1)
-        off = np.abs(tips - expected).max(axis=1)
-        if off.max() > HOME_TOLERANCE * body.lengths.shortest_leg:
-            leg = int(np.argmax(off))
-            raise InputError(
-                f"body {body.name!r}: at {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()} mm;"
-                f" expected it on the origin of its line, a standing height below the root, {expected[leg].tolist()}"
-            )
 
     def forward(self, joints: ArrayLike) -> np.ndarray:
         """Tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""

@@ -69,10 +69,13 @@ def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.
     Returns:
         (...,)
     """
-    length = ground.ground_length if ground.ground == "gap" else 0.0
-    ends = {"step": ground.ground_at + lengths.ground_reach, "gap": ground.ground_at + length + lengths.ground_reach}
-    aside = np.inf if ground.ground in ("flat", "rough") else lengths.ground_half_width
-    return (feet[..., 0] > ends.get(ground.ground, np.inf)) | (np.abs(feet[..., 1]) > aside)
+    x, y, near, far = feet[..., 0], feet[..., 1], ground.ground_at, lengths.ground_reach
+    past = {"hurdle": near + ground.ground_length, "gap": near + ground.ground_length + far, "step": near + far}
+    if ground.ground not in past:
+        return np.zeros(x.shape, dtype=bool)
+    begin, end = -far if ground.ground == "gap" else near, past[ground.ground]
+    aside = (np.abs(y) > lengths.ground_half_width) & (x > begin) & (x < end)
+    return aside | ((x > end) & (ground.ground != "hurdle")) | ((x < begin) & (ground.ground == "gap"))
 
 
 def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import mujoco
+import numpy as np
 
 from hexmj.bodies.additions import complete
 from hexmj.bodies.checks import check_described
@@ -16,6 +17,9 @@ from hexmj.conditions import Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.sweeps.plain import content
+
+HOME_TOLERANCE = 1e-3
+"""How far feet and centre of mass may be from where they shall be at home, in lengths of the shortest leg."""
 
 
 def compile_body(conditions: Conditions, timestep: float | None = None, *, looks: bool = True) -> CompiledBody:
@@ -59,6 +63,40 @@ def _plain_model(body: Body, files: bytes) -> mujoco.MjModel:
         raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {_sentence(error)}") from None
     check_described(model, body)
     return model
+
+
+def check_home(compiled: CompiledBody) -> None:
+    """Refuse a body that is not as described in posture home: its feet, and its centre of mass, which is at O unless
+    `Masses.centre_of_mass` says where.
+
+    Raises:
+        InputError: it is not.
+    """
+    body, masses = compiled.body, compiled.conditions.masses
+    allowed = HOME_TOLERANCE * body.lengths.shortest_leg
+    tips = compiled.forward(compiled.home[compiled.columns.qpos].reshape(6, -1))
+    expected = np.stack([body.lines.origin, body.lines.y, 6 * [-body.standing_height]], axis=-1)
+    off = np.abs(tips - expected).max(axis=1)
+    if off.max() > allowed:
+        leg = int(np.argmax(off))
+        raise InputError(
+            f"body {body.name!r}: at {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()} mm;"
+            f" expected it on the origin of its line, a standing height below the root, {expected[leg].tolist()}"
+        )
+    own = _centre_of_mass(plain_model(body), body)
+    if masses.centre_of_mass == 0.0 and abs(own) > allowed:
+        raise InputError(
+            f"body {body.name!r}: at {body.home!r} its centre of mass lies {own:.4g} mm ahead of O; expected it at O,"
+            f" or centre_of_mass = {own:.4g} among the conditions, to leave it there"
+        )
+
+
+def _centre_of_mass(model: mujoco.MjModel, body: Body) -> float:
+    """How far ahead of O it lies in posture home [mm]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(body.home).id)
+    mujoco.mj_forward(model, data)
+    return float((data.subtree_com[model.body(body.root).id] - data.qpos[:3])[0])
 
 
 def gravity(body: Body) -> float:
@@ -121,8 +159,6 @@ def _redistribute(model: mujoco.MjModel, body: Body, masses: Masses) -> None:
         model.body_inertia[bodies] *= factor
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(body.home).id)
-    mujoco.mj_forward(model, data)
-    offset = masses.centre_of_mass - (data.subtree_com[model.body(body.root).id] - data.qpos[:3])[0]
+    offset = masses.centre_of_mass - _centre_of_mass(model, body)
     model.body_ipos[trunk, 0] += offset * model.body_mass.sum() / model.body_mass[trunk].sum()
     mujoco.mj_setConst(model, data)

@@ -7,7 +7,7 @@ from typing import Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Accelerating, Controlled, Walks, changed
-from hexmj.conditions import Conditions
+from hexmj.conditions import OBEYED, Conditions
 from hexmj.errors import InputError
 
 TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
@@ -43,8 +43,9 @@ class WalkingCommand:
         line += f"; order {self.controlled.order}" if self.controlled.order else ""
         line += "; feedback" if self.controlled.feedback else ""
         if physical:
-            values, usual = self.conditions.flat(), Conditions().flat()
-            shown = (key for key in values if (key in TOLD or values[key] != usual[key]) and key not in varied)
+            values, usual, ground = self.conditions.flat(), Conditions().flat(), OBEYED[self.conditions.ground.ground]
+            told = {*TOLD, *ground, *(key for key in values if values[key] != usual[key])} - {*varied}
+            shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
         return line
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,8 +55,9 @@ class Compare(StudyCommand):
         """See `StudyCommand.outputs`."""
         from hexmj.measures.figures import comparison_figure
 
+        figure = partial(comparison_figure, told=self.conditions_line().replace("_", " "))
         others = "recording.nc", "gait.mp4"
-        return Outputs("comparing", "comparison.nc", {"comparison.png": comparison_figure}, others=others)
+        return Outputs("comparing", "comparison.nc", {"comparison.png": figure}, others=others)
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The video, unless it is left out or cannot be made."""

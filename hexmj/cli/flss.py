@@ -69,7 +69,8 @@ class Flss(WalkingCommand):
     def _write(self, table: "xr.Dataset", controller: Controller, out: Path) -> list[Path]:
         from hexmj.measures.figures import flss_figure
 
-        title = f"{controller.name}, {self.kind} FLSS, {self.n_starts} starts, window {self.walks.window}"
+        conditions = self.conditions_line(self.physical).replace("_", " ")
+        title = f"{controller.name}, {self.kind} FLSS, {self.n_starts} starts\n{conditions}"
         files = [
             save_dataset(table, out / "flss.nc"),
             save_figure(flss_figure(table, title), out / "flss.png"),

@@ -2,6 +2,7 @@
 
 import json
 import platform
+import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -35,6 +36,9 @@ KINDS = {
     "files": "changed since they were written",
 }
 """What may differ -> what it is called."""
+
+STAMP = re.compile("@[0-9a-f]{12}")
+"""Of a loaded file, in the names of its module and of the data files that it names."""
 
 SHOWN = 8
 """Most names of a kind in a sentence."""
@@ -145,7 +149,7 @@ def differences(then: Manifest, now: Manifest) -> dict[str, list[str]]:
             f"{name} {then.versions.get(name, 'unknown')}, now {now.versions.get(name, 'unknown')}"
             for name in _unlike(then.versions, now.versions)
         ],
-        "code": list(dict.fromkeys(name.partition("@")[0] for name in _unlike(then.code, now.code))),
+        "code": list(dict.fromkeys(STAMP.sub("", name) for name in _unlike(then.code, now.code))),
         "own": _unlike(then.own, now.own),
         "processor": [
             *(f"{one} then, not now" for one in then.processor if one not in now.processor),

@@ -80,7 +80,7 @@ class Accelerating:
             return Acceleration(self.acceleration, start)
         if self.initial_velocity is not None:
             raise InputError(
-                f"--initial-velocity = {self.initial_velocity:g} without --acceleration; expected both or neither"
+                f"--initial-velocity = {self.initial_velocity:g} without --acceleration; expected it with that only"
             )
         return None
 

@@ -77,7 +77,7 @@ def named(words: Sequence[str]) -> Iterator[str]:
         yield name
         if name.endswith(".toml") and isfile(name):
             with suppress(InputError):
-                yield from named([str(read_toml(Path(name)).get("controller", ""))])
+                yield str(read_toml(Path(name)).get("controller", ""))
 
 
 def files(words: Sequence[str]) -> list[Path]:

@@ -42,6 +42,8 @@ def load_controller(name: str) -> Controller:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return _found(point.module, point.attr, name)
     path = Path(name)
+    if path.suffix == ".py" and isfile(path):
+        return _found(name, "", name)
     if not isfile(path):
         raise InputError(
             f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
@@ -78,7 +80,8 @@ def _found(where: str, what: str, name: str) -> Controller:
     module = _module(where, name)
     if what not in vars(module) and not hasattr(module, "__getattr__"):
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
-        raise InputError(f"controller {name!r}: no {what} there; controllers there: {', '.join(classes) or 'none'}")
+        missing = f"no {what} there" if what else f"a file; expected {name}:NAME"
+        raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(classes) or 'none'}")
     try:
         found = getattr(module, what)
         found = found() if isinstance(found, type) else found

@@ -1,5 +1,6 @@
 """FLSS against velocity as figures, and what other figures share with them."""
 
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,33 +13,35 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURE_COLOURS = {"kinematic": "#1b6ca8", "measured": "#e08e1b", "physical": "#b3261e"}
+BESIDE = 0.03
+"""Width in V_r / V_p over which the points of one velocity stand beside each other."""
+
 CONTROLLER_LINES = ("-", "--", ":", "-.")
 CONTROLLER_MARKERS = ("o", "s", "^", "D")
 
 
-def comparison_figure(result: "xr.Dataset") -> "Figure":
-    """FLSS against velocity, every measure and controller with its 95 % intervals, from `compare.compare`."""
+def comparison_figure(result: "xr.Dataset", told: str = "") -> "Figure":
+    """FLSS against velocity, every measure and controller with its 95 % intervals, from `compare.compare`.
+
+    Args:
+        result: of all starts.
+        told: stands in the title: window, conditions.
+    """
     figure, axes = _flss_axes(7.2, 4.6)
-    shift = 0.004
     styles: list[Any] = list(zip(CONTROLLER_LINES, CONTROLLER_MARKERS, strict=True)) * result.sizes["controller"]
+    beside = iter(np.linspace(-0.5, 0.5, len(MEASURE_COLOURS) * result.sizes["controller"]) * BESIDE)
     for (line, marker), name in zip(styles, result.controller.values, strict=False):
         one = result.sel(controller=name)
-        for offset, (measure, colour) in zip((-shift, 0.0, shift), MEASURE_COLOURS.items(), strict=True):
+        for measure, colour in MEASURE_COLOURS.items():
             low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
             axes.errorbar(
-                one.velocity + offset, middle, [middle - low, high - middle],
+                one.velocity + next(beside), middle, [middle - low, high - middle],
                 color=colour, linestyle=line, marker=marker, markersize=4, capsize=2.5, linewidth=1.6,
                 label=f"{in_figure(name)}, {measure}",
             )  # fmt: skip
     axes.legend(frameon=False, fontsize=9)
-    conditions = result.attrs["conditions"]
-    axes.set_title(
-        "Loss of static stability on paper (kinematic), under the feet (measured), and falls (physical)\n"
-        f"{result.sizes['start']} starts, window {result.attrs['window']}, $V_p$ = {conditions['vp']:g} mm/s,"
-        f" step height {conditions['step_height']:g} mm, standing height {conditions['standing_height']:g} mm,"
-        f" friction {conditions['friction']:g}",
-        fontsize=9,
-    )
+    title = "Loss of static stability on paper (kinematic), under the feet (measured), and falls (physical)"
+    axes.set_title(_in_lines(f"{title}\n{result.sizes['start']} starts; {told}", 104), fontsize=8.5)
     return figure
 
 
@@ -47,8 +50,13 @@ def flss_figure(table: "xr.Dataset", title: str) -> "Figure":
     figure, axes = _flss_axes(6.4, 4.2)
     error = [table.flss - table.low, table.high - table.flss]
     axes.errorbar(table.velocity, table.flss, error, marker="o", markersize=4, capsize=2.5, color="#1b6ca8")
-    axes.set_title(in_figure(title), fontsize=10)
+    axes.set_title(_in_lines(title, 96), fontsize=8.5)
     return figure
+
+
+def _in_lines(title: str, width: int) -> str:
+    """A title, its lines of at most so many characters."""
+    return "\n".join(in_figure(line) for long in title.split("\n") for line in wrap(long, width))
 
 
 def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:

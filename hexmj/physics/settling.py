@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.loading import check_home, compile_body
 from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
@@ -94,7 +94,7 @@ def settle(
     x = checked_starts(starts, stride)
     check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
     compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
-    compiled.check_home()
+    check_home(compiled)
     model, columns = compiled.model, compiled.columns
     tips = standing_tips(x, height, stride)
     joints, reachable = compiled.inverse(tips)
@@ -137,6 +137,6 @@ def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
     allowed = RESTING * SINK * compiled.conditions.path.standing_height
     if deepest > allowed:
         raise InputError(
-            f"grasp = {grasp:g}: it presses feet {deepest:.3g} mm into the ground at rest; expected at most"
-            f" {allowed:.3g} mm, so about {grasp * allowed / deepest:.2g} times the insect's weight"
+            f"grasp = {grasp:g}; expected at most about {grasp * allowed / deepest:.2g}: it presses feet"
+            f" {deepest:.3g} mm into the ground at rest, more than {allowed:.3g} mm"
         )

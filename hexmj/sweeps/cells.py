@@ -61,7 +61,20 @@ class Cell:
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
 
 
-def difference(one: str, other: str) -> str:
+def check_unedited(cell: Cell, record: str) -> None:
+    """Refuse what a cell has given if something that it depends on was edited since its record was made.
+
+    Raises:
+        InputError: it was.
+    """
+    if (now := cell.record()) != record:
+        raise InputError(
+            f"{cell.name}: {_difference(record, now)} was edited while it was in use; start again, and let fields"
+            " name files that are read, not written"
+        )
+
+
+def _difference(one: str, other: str) -> str:
     """The first thing in which two records differ, by the names that lead to it."""
     names, a, b = list[str](), json.loads(one), json.loads(other)
     while isinstance(a, dict) and isinstance(b, dict):

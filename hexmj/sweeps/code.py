@@ -8,17 +8,16 @@ are now, if they lie beside it, in the package's `assets` or, for a user's own, 
 """
 
 import ast
-import re
 import sys
 import sysconfig
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
-from importlib.util import decode_source, find_spec, resolve_name
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
-from hexmj.as_run import as_run
+from hexmj import as_run
 from hexmj.errors import InputError
 from hexmj.sweeps.plain import digest, module_label
 
@@ -29,8 +28,6 @@ CARRIERS = {
     *("hexmj.as_run", "hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
-
-DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -75,7 +72,7 @@ def code(modules: frozenset[str]) -> Code:
     sources, versions, read = _needed(modules)
     data: dict[str, str] = {}
     for name, file, names in read:
-        content = as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
+        content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if content and digest(content) != sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         data |= _data(module_label(name), file, names)
@@ -162,11 +159,11 @@ def _is_installed(file: Path) -> bool:
 def _read(name: str, file: Path) -> _Module:
     if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
         raise InputError(f"{file} was edited since this program began; start it again")
-    content = as_run(file, _stamp(name)) or file.read_bytes()
+    content = as_run.as_run(file, _stamp(name)) or file.read_bytes()
     python = content if file.suffix == ".py" else b""  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
-        source, nodes = decode_source(python), list(ast.walk(ast.parse(python)))
+        nodes = list(ast.walk(ast.parse(python)))
     except (SyntaxError, ValueError) as error:
         raise InputError(f"{file} cannot be read as Python: {error}") from None
     guarded = [
@@ -178,7 +175,7 @@ def _read(name: str, file: Path) -> _Module:
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), DATA.findall(source), package == name, imports, bound)
+    return _Module(digest(content), as_run.data_names(python), package == name, imports, bound)
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
@@ -202,11 +199,11 @@ def _stamp(module: str) -> str:
 
 def _data(module: str, file: Path, names: list[str]) -> Iterator[tuple[str, str]]:
     """Digests of the data files that a module names."""
-    folders = [file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"]
-    folders += [] if file.is_relative_to(PACKAGE) else [Path.cwd()]
+    ours = [file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"]
+    folders = ours if file.is_relative_to(PACKAGE) else as_run.data_folders(file)
     for name in names:
         if paths := {folder / name for folder in folders if (folder / name).is_file()}:
-            yield f"{module}, {name}", digest(b"".join(path.read_bytes() for path in sorted(paths)))
+            yield f"{module}, {name}", digest(b"".join(as_run.data(path) for path in sorted(paths)))
 
 
 @cache

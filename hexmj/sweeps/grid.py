@@ -13,7 +13,7 @@ from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import prepare
 from hexmj.progress import Progress
-from hexmj.sweeps.cells import Cell, difference
+from hexmj.sweeps.cells import Cell, check_unedited
 from hexmj.sweeps.files import read, write
 
 if TYPE_CHECKING:
@@ -150,11 +150,7 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     if path is None:
         return data
-    if (now := cell.record()) != record:
-        raise InputError(
-            f"{cell.name}: {difference(record, now)} was edited while the cell was computed; start again, and let"
-            " fields name files that are read, not written"
-        )
+    check_unedited(cell, record)
     return write(path, record, data)
 
 

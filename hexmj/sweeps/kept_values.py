@@ -10,7 +10,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.files import opened
-from hexmj.sweeps.cells import Cell
+from hexmj.sweeps.cells import Cell, check_unedited
 
 
 class KeptValues:
@@ -36,7 +36,7 @@ class KeptValues:
         self._values: dict[bytes, float] = {}
         self._path, self._seed = None, 0
         if folder:
-            record = cell.record()
+            self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
             self._path = folder / f"{cell.stem(record)}.jsonl"
             self._begin(self._path, record)
@@ -52,6 +52,7 @@ class KeptValues:
             picked = rows[list(new.values())]
             values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
+                check_unedited(self._cell, self._record)
                 _add(self._path, "".join(map(self._line, new, values.tolist())))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])

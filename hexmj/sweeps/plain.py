@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from functools import cached_property
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -80,18 +81,22 @@ def classes(value: Any) -> Iterator[type]:
 
 
 def content(path: Path) -> bytes:
-    """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there."""
-    texts, names, folders = [_read(path)], list[str](), {""}
-    for text in texts:
-        for kind, value in NAMED.findall(text.decode(errors="replace")):
-            if kind != "file":
-                folders.add(value)
-            elif value not in names:
-                names.append(value)
-                if (included := path.parent / value).is_file():
-                    texts.append(_read(included))
-    files = {path.parent / folder / name for name in names for folder in folders}
-    return b"".join([*texts, *(_read(file) for file in sorted(files) if file.is_file())])
+    """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there.
+
+    They are looked for beside every file that names one and in every folder that is named, with or without their own.
+    """
+    found, new = dict[Path, bytes](), {path}
+    while new:
+        found |= {one: _read(one) for one in new}
+        named = [
+            one for text in found.values() if b"\0" not in text for one in NAMED.findall(text.decode(errors="replace"))
+        ]
+        names = {name for kind, value in named if kind == "file" for name in (value, Path(value).name)}
+        folders = {
+            one.parent / folder for one in found for folder in ("", *(value for kind, value in named if kind != "file"))
+        }
+        new = {folder / name for folder in folders for name in names if isfile(folder / name)} - found.keys()
+    return b"".join(found[one] for one in sorted(found))
 
 
 def _is_file(text: str) -> bool:

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import ReadingPlan
 from hexmj.errors import InputError, check_distinct
@@ -58,8 +59,7 @@ class StabilityMap(SameStarts):
     """V_r (when accelerating, its final value), each 0 <= V < 1."""
 
     def __post_init__(self) -> None:
-        if self.over not in CONDITIONS:
-            raise InputError(f"over = {self.over!r}; valid names: {', '.join(get_args(Over))}")
+        typed("over", self.over, Over)
         super().__post_init__()
         check_distinct("values", self.chosen)
         _ = self.varied, self.observed
