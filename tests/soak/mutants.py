@@ -101,7 +101,11 @@ GROUPS = {
     ),
     "stepping": (
         Module("physics/fine_steps.py", ("tests/test_strikes.py",), "not (sink_in or nobody_else or depth_is)"),
-        Module("physics/backend.py", ("tests/test_physics.py", "tests/test_strikes.py"), f"{WALKS} or insect"),
+        Module(
+            "physics/backend.py",
+            ("tests/test_physics.py", "tests/test_strikes.py", "tests/test_exploded_walks.py"),
+            f"{WALKS} or insect or replay",
+        ),
     ),
     "measurement": (
         Module("physics/outcomes.py", (MEASURING, "tests/test_physical_laws.py", "tests/test_physics.py"), MEASURES),
