@@ -1,6 +1,7 @@
 """What can go wrong, each with one clear sentence."""
 
 from collections.abc import Mapping, Sequence
+from traceback import extract_tb
 from typing import Any
 
 LONGEST = 1000
@@ -33,6 +34,11 @@ class SimulationError(RuntimeError):
 
 class RenderingError(RuntimeError):
     """No video can be rendered on this machine; names the package that brings it."""
+
+
+def is_of_numbas_cache(error: BaseException) -> bool:
+    """Whether an error comes from where numba keeps and finds compiled code."""
+    return any(frame.filename.endswith("caching.py") for frame in extract_tb(error.__traceback__))
 
 
 def check_distinct(name: str, values: Sequence[object]) -> None:

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,18 @@ def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding)
         [sys.executable, "-m", "hexmj", *words], capture_output=True, env=environment, cwd=tmp_path, check=True
     )
     assert ("\u2603" if encoding == "utf-8" else r"\u2603") in done.stdout.decode(encoding)
+
+
+def test_compiled_code_that_is_torn_is_a_sentence(tmp_path):
+    words = [sys.executable, "-m", "hexmj", "flss", "--starts", "3", "--window", "5"]
+    environment = {"PYTHONPATH": str(Path(hexmj.__file__).parents[1]), "NUMBA_CACHE_DIR": str(tmp_path)}
+    run = partial(subprocess.run, words, capture_output=True, text=True, env=os.environ | environment)
+    assert run().returncode == 0
+    for path in tmp_path.rglob("*.nbi"):
+        path.write_bytes(path.read_bytes()[:60])
+    done = run()
+    assert done.returncode == 2
+    assert done.stderr.startswith("hexmj: numba cannot find or keep compiled code; delete its files")
 
 
 def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):

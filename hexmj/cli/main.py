@@ -17,9 +17,14 @@ from tyro.conf import FlagCreatePairsOff, subcommand
 
 from hexmj.cli import answers
 from hexmj.cli.words import checked, typed
-from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
+
+NUMBA = (
+    "numba cannot find or keep compiled code; delete its files (*.nbi, *.nbc, beside the modules or in"
+    " NUMBA_CACHE_DIR), or set NUMBA_CACHE_DIR to a folder that can be written to"
+)
 
 ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice."
 
@@ -89,6 +94,10 @@ def main() -> None:
     except OSError as error:
         _drop_output()
         sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
+    except Exception as error:
+        if not is_of_numbas_cache(error):
+            raise
+        sys.exit(_complain(f"{NUMBA} ({type(error).__name__}: {error})", 2))
 
 
 def options_of(words: list[str]) -> Any:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.checks import typed
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
-from hexmj.errors import InputError
+from hexmj.errors import InputError, is_of_numbas_cache
 from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import check_memory, thread_count
@@ -130,6 +130,8 @@ def said(what: str) -> Iterator[None]:
     except InputError:
         raise
     except (Exception, SystemExit) as error:
+        if is_of_numbas_cache(error):
+            raise
         place = traceback.extract_tb(error.__traceback__)[-1]
         said = " ".join(str(error).split())
         raise InputError(
