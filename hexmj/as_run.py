@@ -9,6 +9,7 @@ import re
 import sys
 import sysconfig
 from contextlib import suppress
+from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,9 @@ _NOT_ITS_USERS = tuple(
 
 DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
 """Names of data files in a source."""
+
+COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
+"""Ends of the names of modules without a source."""
 
 _RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
@@ -67,7 +71,7 @@ def data(path: Path) -> bytes:
 
 
 def _note(file: Any) -> None:
-    if isinstance(file, str) and file.endswith(".py") and not file.startswith(_NOT_ITS_USERS):
+    if isinstance(file, str) and not file.endswith(COMPILED) and not file.startswith(_NOT_ITS_USERS):
         with suppress(OSError):
             source = Path(file).read_bytes()
             if source not in (versions := _RUN.setdefault(file, [])):

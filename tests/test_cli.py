@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ import hexmj
 from film_reader import read_film
 from hexmj.cli.main import COMMANDS
 from hexmj.errors import SimulationError
+from hexmj.loaded import importable
 
 PNG = b"\x89PNG"
 
@@ -127,16 +127,14 @@ def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding)
     assert ("\u2603" if encoding == "utf-8" else r"\u2603") in done.stdout.decode(encoding)
 
 
-def test_compiled_code_that_is_torn_is_a_sentence(tmp_path):
-    words = [sys.executable, "-m", "hexmj", "flss", "--starts", "3", "--window", "5"]
-    environment = {"PYTHONPATH": str(Path(hexmj.__file__).parents[1]), "NUMBA_CACHE_DIR": str(tmp_path)}
-    run = partial(subprocess.run, words, capture_output=True, text=True, env=os.environ | environment)
-    assert run().returncode == 0
-    for path in tmp_path.rglob("*.nbi"):
-        path.write_bytes(path.read_bytes()[:60])
-    done = run()
-    assert done.returncode == 2
-    assert done.stderr.startswith("hexmj: numba cannot find or keep compiled code; delete its files")
+def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):
+    """As the module of numba raises it that keeps and finds code."""
+    (tmp_path / "caching.py").write_text("def load(*_, **__): raise EOFError('Ran out of input')")
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", importable(tmp_path / "caching.py").load)
+    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, text) == (2, "")
+    assert "hexmj: numba cannot find or keep compiled code; delete its files" in error
+    assert "(EOFError: Ran out of input)" in error
 
 
 def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):

@@ -218,10 +218,13 @@ def test_a_result_that_cannot_be_read_gets_a_sentence(run, flss):
     assert "flss.nc cannot be read as NetCDF" in error
 
 
-def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("where", ["from dataclasses", "        x = starts.copy()"])
+def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_path, monkeypatch, where):
+    """As it is imported, or as it begins a plan."""
     monkeypatch.chdir(tmp_path)
     Path("sub").mkdir()
-    Path("sub/mine.py").write_text("import os\nos.chdir(os.path.dirname(os.path.abspath(__file__)))\n" + MINE)
+    away = f"{where[: len(where) - len(where.lstrip())]}os.chdir(os.path.dirname(os.path.abspath(__file__)))\n"
+    Path("sub/mine.py").write_text("import os\n" + MINE.replace(where, away + where, 1))
     words = ["flss", "--model", "sub/mine.py:Drags", "--velocities", 0.5, "--starts", 5, "--window", 10]
     assert run(*words, "--out", "out")[0] == 0
     assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"sub/mine.py"}

@@ -1,5 +1,6 @@
 """Laws of sweeps: a name tells what a cell depends on, its bits are the same anywhere, and nothing kept is lost."""
 
+import importlib
 import json
 import os
 import re
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import InitVar, dataclass, field
@@ -487,6 +489,21 @@ def test_a_script_that_runs_as_a_module_counts_what_it_imports(toy: Path) -> Non
     command = [sys.executable, "-m", "toy.run"]
     done = subprocess.run(command, cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
     assert {"run.py", "toy", "toy.louder"} <= set(json.loads(done.stdout)["sources"]), done.stderr
+
+
+def test_a_script_of_any_name_counts_what_it_imports(toy: Path) -> None:
+    (toy / "script").write_text("import helper\n" + MINE + "\n" + PRINT_MAIN)
+    done = subprocess.run([sys.executable, "script"], cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
+    assert {"script", "helper"} <= set(json.loads(done.stdout)["sources"]), done.stderr
+
+
+def test_a_source_in_an_archive_is_refused_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with zipfile.ZipFile(tmp_path / "lib.zip", "w") as archive:
+        archive.writestr("zipped_controller.py", MINE)
+    monkeypatch.syspath_prepend(tmp_path / "lib.zip")
+    importlib.import_module("zipped_controller")
+    with pytest.raises(InputError, match=r"zipped_controller\.py cannot be read: Not a directory; expected sources as"):
+        code(frozenset({"zipped_controller"}))
 
 
 def test_what_a_file_tries_in_vain_does_not_stop_it(tmp_path: Path) -> None:

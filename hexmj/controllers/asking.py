@@ -3,6 +3,7 @@
 What a user's code raises becomes one sentence that says where.
 """
 
+import os
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -124,7 +125,8 @@ def tell(plan: ReadingPlan, sensed: Sensed) -> None:
 
 @contextmanager
 def said(what: str) -> Iterator[None]:
-    """Say in one sentence what a user's code raises, and where."""
+    """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back."""
+    here = os.getcwd()
     try:
         yield
     except InputError:
@@ -137,3 +139,6 @@ def said(what: str) -> Iterator[None]:
         raise InputError(
             f"{what}: {type(error).__name__} in {place.filename}, line {place.lineno}: {said:.300}"
         ) from error
+    finally:
+        if os.getcwd() != here:
+            os.chdir(here)

@@ -157,10 +157,13 @@ def _is_installed(file: Path) -> bool:
 
 @cache
 def _read(name: str, file: Path) -> _Module:
-    if _AT_FIRST.get(file, file.stat().st_mtime_ns) != file.stat().st_mtime_ns:
+    try:
+        changed, content = file.stat().st_mtime_ns, as_run.as_run(file, _stamp(name)) or file.read_bytes()
+    except OSError as error:  # as of one in an archive
+        raise InputError(f"{file} cannot be read: {error.strerror}; expected sources as files") from None
+    if _AT_FIRST.get(file, changed) != changed:
         raise InputError(f"{file} was edited since this program began; start it again")
-    content = as_run.as_run(file, _stamp(name)) or file.read_bytes()
-    python = content if file.suffix == ".py" else b""  # of a compiled module nothing is followed
+    python = b"" if file.name.endswith(as_run.COMPILED) else content  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
         nodes = list(ast.walk(ast.parse(python)))
