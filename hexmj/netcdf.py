@@ -9,6 +9,9 @@ from hexmj.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+READ_OTHERWISE = {"scale_factor", "add_offset", "missing_value", "_FillValue"}
+"""Attributes by which readers of NetCDF change numbers."""
+
 
 def encode(data: "xr.Dataset") -> bytes:
     """A dataset as it stands in its file, before the seal; the bits of all numbers stay.
@@ -18,8 +21,11 @@ def encode(data: "xr.Dataset") -> bytes:
     """
     plain = data.drop_encoding()
     for name, variable in plain.variables.items():
-        if variable.dtype.kind in "mM":
+        texts = variable.dtype != object or all(isinstance(one, str) for one in variable.values.flat)
+        if variable.dtype.kind in "mM" or not texts:
             raise InputError(f"NetCDF cannot hold this: {name} is {variable.dtype}; expected arrays, numbers and texts")
+        if odd := READ_OTHERWISE & {*variable.attrs}:
+            raise InputError(f"NetCDF would give other numbers: {name} has the attribute {min(odd)}; expected none")
         variable.encoding["_FillValue"] = None
     try:
         return bytes(plain.to_netcdf(engine="h5netcdf"))

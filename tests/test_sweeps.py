@@ -741,6 +741,9 @@ def odd(what: str) -> object:
         "dict": {},
         "nothing": None,
         "times": xr.Dataset({"a": ("x", np.arange(3).astype("m8[ns]"))}),
+        "holes": xr.Dataset({"a": ("x", np.array(["a", None], dtype=object))}),
+        "scaled": xr.Dataset({"a": ("x", [1.0], {"scale_factor": 0.5})}),
+        "filled": xr.Dataset({"a": ("x", [1.0], {"_FillValue": 1.0})}),
         "levels": xr.Dataset(coords=xr.Coordinates.from_pandas_multiindex(LEVELS, "x")),
     }[what]
 
@@ -751,6 +754,9 @@ def odd(what: str) -> object:
         ("dict", "what odd gives = {}; expected a Dataset"),
         ("nothing", "what odd gives = None; expected a Dataset"),
         ("times", "NetCDF cannot hold this: a is timedelta64[ns]; expected arrays, numbers and texts"),
+        ("holes", "NetCDF cannot hold this: a is object; expected arrays, numbers and texts"),
+        ("scaled", "NetCDF would give other numbers: a has the attribute scale_factor; expected none"),
+        ("filled", "NetCDF would give other numbers: a has the attribute _FillValue; expected none"),
         ("levels", "NetCDF cannot hold this: "),
     ],
 )
@@ -774,6 +780,7 @@ def shut() -> Executor:
         (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
         (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a Mapping"),  # pyright: ignore
         (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
+        (lambda: Cell("odd", odd, {}, work=-1), "work = -1.0 of odd; expected a finite number above 0"),
         (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore
         (lambda: over_axes({"a": 2}, 3 * [xr.Dataset()]), "the data of 3 cells along {'a': 2}; expected 2"),
         (lambda: over_axes({}, []), "the data of 0 cells along {}; expected 1"),

@@ -1,6 +1,7 @@
 """A cell: a pure function of plain settings, named by them and by the code that computes it."""
 
 import json
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ class Cell:
 
     def __post_init__(self) -> None:
         check_types(self)
+        if not 0 < self.work < math.inf:
+            raise InputError(f"work = {self.work} of {self.name}; expected a finite number above 0")
         if taken := [name for name in EXECUTION if name in self.settings]:
             raise InputError(f"setting {taken[0]!r} of {self.name}; expected it to be left to the sweep")
         try:
