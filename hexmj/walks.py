@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -37,11 +38,12 @@ class Walk:
         shape = np.shape(self.stance)
         if len(shape) == 3 and shape[2] != len(LEGS):
             raise InputError(f"a walk's stance is of {shape[2]} legs; expected {len(LEGS)}")
-        for name in _arrays(self):
+        expected_of = {"time": shape[:1], "velocity": shape[:2]}
+        for name in _arrays(type(self)):
             values, kind = getattr(self, name), bool if name == "stance" else float
-            typed(f"a walk's {name}", values, np.ndarray)
-            expected = {"time": shape[:1], "velocity": shape[:2]}.get(name, shape)
-            if len(shape) != 3 or values.shape != expected or values.dtype != kind or np.ma.is_masked(values):
+            expected = expected_of.get(name, shape)
+            odd = type(values) is not np.ndarray and np.ma.is_masked(typed(f"a walk's {name}", values, np.ndarray))
+            if len(shape) != 3 or values.shape != expected or values.dtype != kind or odd:
                 raise InputError(
                     f"a walk's {name} is {values.dtype} of the shape {values.shape}; expected {np.dtype(kind)} of the"
                     f" shape {expected}: its steps, starts and legs"
@@ -75,7 +77,7 @@ def joined(walks: Sequence[AnyWalk]) -> AnyWalk:
     if len(walks) == 1:
         return walks[0]
     return replace(
-        walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in _arrays(walks[0])}
+        walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in _arrays(type(walks[0]))}
     )
 
 
@@ -93,14 +95,15 @@ def one_start(walk: AnyWalk, start: int) -> AnyWalk:
 
 def of_starts(walk: AnyWalk, which: Any) -> AnyWalk:
     """The walks of some starts."""
-    return replace(walk, **{name: getattr(walk, name)[:, which] for name in _arrays(walk) if name != "time"})
+    return replace(walk, **{name: getattr(walk, name)[:, which] for name in _arrays(type(walk)) if name != "time"})
 
 
 def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
     """Some steps of a walk."""
-    return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(walk)})
+    return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(type(walk))})
 
 
-def _arrays(walk: Walk) -> list[str]:
+@cache
+def _arrays(kind: type[Walk]) -> list[str]:
     """Names of what a walk holds of every step."""
-    return [one.name for one in fields(walk) if one.name != "geometry"]
+    return [one.name for one in fields(kind) if one.name != "geometry"]

@@ -178,7 +178,7 @@ REFUSED = {
     "not at time 0": (advanced_plan, "the plan is at step 3; expected one at time 0"),
     "too few steps": (
         lambda s: Short(s.starts),
-        r"asked for 4 steps, and its time is float64 of the shape \(3,\); expected",
+        r"asked for 4 steps, and gave \(3, 2, 6\); expected \(4, 2, 6\)",
     ),
 }
 
