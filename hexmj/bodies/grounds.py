@@ -59,7 +59,7 @@ def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.nda
 
 
 def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.ndarray:
-    """Whether spheres are beyond the ends of what lies ahead, where the ground is another than it is told.
+    """Whether spheres are beyond the ends of the pieces that were laid, where the ground is another than it is told.
 
     Args:
         ground: what lies ahead; bumps end on the plane, as anybody can see.

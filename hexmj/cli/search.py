@@ -95,7 +95,7 @@ class Search(WalkingCommand):
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
-            told |= {"refused": found.refused}
+            told |= {"refused": len(found.refused)}
             told |= {"verdict": _judged(verdict), "settings": settings, "files": files}
             vector = dict(zip(problem.form.names, found.vector.tolist(), strict=True))
             print_json({"found": vector} | told)

@@ -80,7 +80,7 @@ def _found(where: str, what: str, name: str) -> Controller:
     module = _module(where, name)
     if what not in vars(module) and not hasattr(module, "__getattr__"):
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
-        missing = f"no {what} there" if what else f"a file; expected {name}:NAME"
+        missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
         raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(classes) or 'none'}")
     try:
         found = getattr(module, what)

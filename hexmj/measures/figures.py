@@ -24,7 +24,7 @@ def comparison_figure(result: "xr.Dataset", told: str = "") -> "Figure":
     """FLSS against velocity, every measure and controller with its 95 % intervals, from `compare.compare`.
 
     Args:
-        result: of all starts.
+        result: of all starts, FLSS over (controller, velocity).
         told: stands in the title: window, conditions.
     """
     figure, axes = _flss_axes(7.2, 4.6)
