@@ -15,7 +15,7 @@ TABLE = Path(__file__).with_name("ideal.toml")
 
 @dataclass(frozen=True)
 class FoundSet:
-    """One set of the HWS form, with what found it."""
+    """One set of the HWS form, or for a range of the LDVS form, with what found it."""
 
     window: str
     """Observation time under which it was searched, 'walk' or 'start'."""
@@ -57,9 +57,11 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
     velocities = entry["velocities"]
     if not (len(velocities) in (1, 2) and all(0 < v < 1 for v in velocities) and velocities == sorted(velocities)):
         raise InputError(f"{where}: velocities = {velocities}; expected one, or the ends of a range, in ]0, 1[")
-    names = {f.name for f in fields(Symmetric)} - {"p34_i"}
+    form, without = ("HWS", {"p34_i"}) if len(velocities) == 1 else ("LDVS", set())
+    names = {f.name for f in fields(Symmetric)} - without
     if unknown := set(entry["symmetric"]) - names:
-        raise InputError(f"{where}: {min(unknown)} is no parameter of the HWS form; valid: {', '.join(sorted(names))}")
+        valid = ", ".join(sorted(names))
+        raise InputError(f"{where}: {min(unknown)} is no parameter of the {form} form; valid: {valid}")
     weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
     controller = Cruse1998(weights, name=f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}")
     return FoundSet(entry["window"], velocities[0], velocities[-1], controller, entry["command"])

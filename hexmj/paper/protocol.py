@@ -9,12 +9,16 @@ from typing import Any
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
 from hexmj.paper.found_sets import found_set
 from hexmj.paper.measurements import footfalls, limit_regimes, losses
+from hexmj.paper.obstacles import Answer, losses_after
 from hexmj.starts import SAMPLE
 from hexmj.sweeps import Cell
 from hexmj.timing import WINDOWS, Acceleration, Stride
 
 WIDE = (0.1, 0.7)
 """The range on which the paper could not fit a hard-wired system."""
+
+RANGES = {"wide": WIDE, "hws again": (0.1, 0.45), "ldvs again": (0.1, 0.5)}
+"""Problem 2: sets of the table of found sets -> the range W of their search; 'again' are the paper's two problems."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,10 @@ class Protocol:
     """Velocities of Figs. 5 and 6, 0.1 to 0.95."""
     footfall_velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
     """Velocities of the footfall diagrams."""
+    obstacle_velocities: tuple[float, ...] = (0.3, 0.5, 0.7)
+    """Velocities at which Section 6's obstacles are met."""
+    obstacle_starts: int = 400
+    """Starts that meet each of them."""
     seed: int = 1998
     """Of all starts; another than those of the searches that found the ideal sets."""
     stride: Stride = field(default_factory=Stride)
@@ -51,6 +59,7 @@ QUICK = Protocol(
     velocities=(0.1, 0.2, 0.3, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9),
     gait_starts=10,
     gait_velocities=(0.1, 0.25, 0.4, 0.6, 0.8, 0.95),
+    obstacle_starts=20,
 )
 """A tenth of the starts, about half of the velocities."""
 
@@ -60,7 +69,7 @@ class Losses:
     """Which starts lose static stability under both windows: Figs. 2-4."""
 
     preset: str
-    """A preset, or 'ideal' (Problem 1) or 'wide' (Problem 2 on [0.1, 0.7]) of the table of found sets."""
+    """See `network`."""
     accelerated: bool = False
     """Walk with Eq. 11."""
     late: bool = False
@@ -74,7 +83,7 @@ class Losses:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         return {
-            "sets": tuple(_set(self.preset, window, velocity) for window in WINDOWS),
+            "sets": tuple(network(self.preset, window, velocity) for window in WINDOWS),
             "n_starts": protocol.samples * protocol.sample,
             "seed": protocol.seed,
             "stride": protocol.stride,
@@ -98,7 +107,7 @@ class Gaits:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         return {
-            "controller": PRESETS[self.preset],
+            "controller": network(self.preset, "walk", velocity),
             "n_starts": protocol.gait_starts,
             "seed": protocol.seed,
             "stride": protocol.gait_stride if self.accelerated else protocol.stride,
@@ -120,10 +129,34 @@ class Footfall:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         constants = {"stride": protocol.stride, "acceleration": protocol.acceleration}
-        return {"controller": PRESETS[self.preset], "seed": protocol.seed} | constants
+        return {"controller": network(self.preset, "walk", velocity), "seed": protocol.seed} | constants
 
 
-Measurement = Losses | Gaits | Footfall
+@dataclass(frozen=True)
+class Obstacles:
+    """Which starts lose static stability after an obstacle in mid-stride (Section 6), of one preset."""
+
+    preset: str
+    answer: Answer
+    function = staticmethod(losses_after)
+
+    def velocities(self, protocol: Protocol) -> tuple[float, ...]:
+        """Where it is measured."""
+        return protocol.obstacle_velocities
+
+    def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
+        """All that its outcomes depend on."""
+        return {
+            "controller": network(self.preset, "walk", velocity),
+            "answer": self.answer,
+            "n_starts": protocol.obstacle_starts,
+            "seed": protocol.seed,
+            "stride": protocol.stride,
+            "acceleration": protocol.acceleration if self.answer == "slow down" else None,
+        }
+
+
+Measurement = Losses | Gaits | Footfall | Obstacles
 
 MEASUREMENTS: dict[str, Measurement] = {
     "uncoordinated": Losses("uncoordinated"),
@@ -131,8 +164,13 @@ MEASUREMENTS: dict[str, Measurement] = {
     "ldvs": Losses("ldvs"),
     "ideal": Losses("ideal"),
     "wide": Losses("wide"),
+    "hws again": Losses("hws again"),
+    "ldvs again": Losses("ldvs again"),
+    "own": Losses("own"),
     "hws late": Losses("hws", late=True),
     "ldvs late": Losses("ldvs", late=True),
+    "ideal late": Losses("ideal", late=True),
+    "own late": Losses("own", late=True),
     "hws accelerated": Losses("hws", accelerated=True),
     "ldvs accelerated": Losses("ldvs", accelerated=True),
     "hws regimes": Gaits("hws", accelerated=False),
@@ -141,12 +179,17 @@ MEASUREMENTS: dict[str, Measurement] = {
     "ldvs gaits": Gaits("ldvs"),
     "hws footfall": Footfall("hws"),
     "ldvs footfall": Footfall("ldvs"),
+    "ldvs halted": Obstacles("ldvs", "none"),
+    "ldvs halted, positions": Obstacles("ldvs", "positions"),
+    "ldvs halted, postures": Obstacles("ldvs", "postures"),
+    "ldvs halted, slows down": Obstacles("ldvs", "slow down"),
 }
 """All that is simulated, by name."""
 
 SECONDS = {
     "hws accelerated": 25.0, "ldvs accelerated": 25.0, "hws gaits": 80.0, "ldvs gaits": 80.0,
-    "hws late": 5.0, "ldvs late": 5.0, "hws regimes": 7.0, "ldvs regimes": 7.0,
+    "hws late": 5.0, "ldvs late": 5.0, "hws regimes": 7.0, "ldvs regimes": 7.0, "ideal late": 5.0, "own late": 3.0,
+    "ldvs halted, positions": 4.0, "ldvs halted, postures": 4.0, "ldvs halted, slows down": 12.0,
 }  # fmt: skip
 """That the long ones take on two cores, for the progress bar; the others take about one."""
 
@@ -162,7 +205,20 @@ def cells(name: str, protocol: Protocol) -> list[Cell]:
     ]
 
 
-def _set(name: str, window: str, velocity: float) -> Cruse1998 | None:
+def network(name: str, window: str, velocity: float) -> Cruse1998 | None:
+    """The network of a measurement at a velocity, of all measurements.
+
+    Args:
+        name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window, or 'own', the preset
+            of our own for this velocity alone.
+        window: one of `WINDOWS`.
+        velocity: V_r.
+
+    Returns:
+        None where no such set is known.
+    """
     if name == "ideal":
         return found_set(window, velocity)
-    return found_set(window, *WIDE) if name == "wide" else PRESETS[name]
+    if name == "own":
+        return PRESETS.get(f"own-{velocity:g}")
+    return found_set(window, *RANGES[name]) if name in RANGES else PRESETS[name]

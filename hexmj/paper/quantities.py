@@ -54,6 +54,8 @@ class Lost:
     curve: str
     minus: str | None = None
     times: float = 1.0
+    at: float | None = None
+    """Velocity of the other curve, the same unless given."""
     windowed = True
 
     @property
@@ -61,7 +63,8 @@ class Lost:
         """For a rule's sentence."""
         if self.minus is None:
             return f"FLSS({self.curve})"
-        return f"FLSS({self.curve}) - {f'{self.times:g} ' if self.times != 1 else ''}FLSS({self.minus})"
+        other = self.minus if self.at is None else f"{self.minus} at V = {self.at:g}"
+        return f"FLSS({self.curve}) - {f'{self.times:g} ' if self.times != 1 else ''}FLSS({other})"
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -72,7 +75,10 @@ class Lost:
         """Where all of its sets are known."""
         curves = [measured[name].lost.sel(window=window) for name in self.needs]
         for v in curves[0].velocity.values.tolist():
-            lost, *less = (one.sel(velocity=v).values for one in curves)
+            other = v if self.at is None else self.at
+            if other not in curves[-1].velocity:
+                continue
+            lost, *less = (one.sel(velocity=at).values for one, at in zip(curves, (v, other), strict=False))
             if all((one != NO_SET).all() for one in (lost, *less)):
                 yield Point(v, "", lost - self.times * less[0] if less else lost.astype(bool))
 

@@ -1,8 +1,9 @@
-"""How a claim of the paper is judged: a quantity, velocities, and a band that its 95 % intervals must reach."""
+"""How a claim of the paper is judged: a quantity, velocities, and a band, a count or a trend."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,9 @@ from hexmj.paper.quantities import Measured, Point, Quantity
 
 Estimate = tuple[float, float, float]
 """A value and its 95 % interval."""
+
+LEVEL = 0.05
+"""Probability below which two counts are not of one frequency."""
 
 END = 0.05
 """A range of velocities is covered if its ends are met this closely."""
@@ -35,6 +39,8 @@ class Band:
     velocities: tuple[float, float]
     least: float = -np.inf
     most: float = np.inf
+    averaged: bool = False
+    """Judge the mean over the range, J_N of Eq. 10 with velocities on a grid, and not each velocity."""
 
     @property
     def words(self) -> str:
@@ -47,17 +53,52 @@ class Band:
             band = f"does not lie below {self.least:g}"
         else:
             band = f"reaches into [{self.least:g}, {self.most:g}]"
-        return f"at {_range(self.velocities)} the 95 % interval of {self.quantity.words} {band}"
+        at = f"averaged over {_range(self.velocities)}," if self.averaged else f"at {_range(self.velocities)}"
+        return f"{at} the 95 % interval of {self.quantity.words} {band}"
 
     def answer(self, measured: Measured, window: str) -> Answer | None:
         """None where a set has not been searched yet."""
         points = _within(self.quantity.points(measured, window), self.velocities)
         if points is None:
             return None
+        if self.averaged:
+            points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", _mean(points))]
         estimates = [(point.estimate, _where(point)) for point in points]
         strain = [max(value - self.most, self.least - value) for (value, _, _), _ in estimates]
         agrees = all(low <= self.most and high >= self.least for (_, low, high), _ in estimates)
         return _worst(estimates, strain, agrees)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Agrees if, at every velocity of a range, a count here and in the paper's own sample may be of one frequency.
+
+    Fisher's exact test, two-sided, at 5 %: it holds for rare events and small samples too.
+    """
+
+    quantity: Quantity
+    velocities: tuple[float, float]
+    count: int
+    """How often the paper saw it ..."""
+    of: int
+    """... in so many starts."""
+
+    @property
+    def words(self) -> str:
+        """The rule as a sentence."""
+        return (
+            f"at {_range(self.velocities)} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
+            f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
+        )
+
+    def answer(self, measured: Measured, window: str) -> Answer | None:
+        """None where a set has not been searched yet."""
+        points = _within(self.quantity.points(measured, window), self.velocities)
+        if points is None:
+            return None
+        p = [fisher(int(one.values.sum()), len(one.values), self.count, self.of) for one in points]
+        estimates = [(point.estimate, _where(point)) for point in points]
+        return _worst(estimates, [-one for one in p], min(p) >= LEVEL)
 
 
 @dataclass(frozen=True)
@@ -91,7 +132,16 @@ class Trend:
         return _worst(steps, [-self.sign * value for (value, _, _), _ in steps], agrees)
 
 
-Rule = Band | Trend
+Rule = Band | Seen | Trend
+
+
+def fisher(count: int, size: int, other: int, of: int) -> float:
+    """p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without a start."""
+    if size == 0 or of == 0:
+        return 0.0
+    both = count + other
+    ways = {n: comb(size, n) * comb(of, both - n) for n in range(max(0, both - of), min(size, both) + 1)}
+    return sum(one for one in ways.values() if one <= ways[count]) / sum(ways.values())
 
 
 def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], agrees: bool) -> Answer:
@@ -114,6 +164,11 @@ def _difference(one: Point, other: Point) -> Estimate:
     """Change of the mean and its 95 % interval, as of independent samples."""
     (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
     return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))
+
+
+def _mean(points: Sequence[Point]) -> np.ndarray:
+    """Of each start over the velocities, (start,)."""
+    return np.mean([point.values for point in points], axis=0)
 
 
 def _range(velocities: tuple[float, float]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hexmj.paper.claims import Claim
+from hexmj.paper.claims import IN_PHYSICS, Claim
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
 from hexmj.timing import WINDOWS
@@ -12,6 +12,8 @@ from hexmj.timing import WINDOWS
 NOT_SEARCHED = "not yet searched"
 SAME = "same"
 """Stands under the second window where no window is involved."""
+KINDS = ("held out", "calibrated")
+"""Whether a constant was inferred from the number that a claim is about, see `claims.INFERRED_FROM`."""
 
 
 @dataclass(frozen=True)
@@ -39,18 +41,24 @@ class Row:
         return {0: "neither", 1: agreeing[0] if agreeing else "", len(WINDOWS): "both"}[len(agreeing)]
 
     @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        return KINDS[bool(self.claim.calibrates)]
+
+    @property
     def cells(self) -> tuple[str, ...]:
-        """Section, the paper's words and value, our answers under 'walk' and 'start', which fits, why."""
+        """Section, the paper's words and value, its kind, our answers under 'walk' and 'start', which fits, why."""
         ours = [
             f"{verdict}: {_number(answer)}" if answer else verdict
             for verdict, answer in zip(self.verdicts.values(), self.answers.values(), strict=True)
         ]
         why = self.claim.why if "differs" in self.verdicts.values() else ""
         ours += [SAME] * (len(WINDOWS) - len(ours))
-        return self.claim.section, self.claim.words, self.claim.value, *ours, self.fits, why
+        kind = f"{self.kind}: {'; '.join(self.claim.calibrates)}" if self.claim.calibrates else self.kind
+        return self.claim.section, self.claim.words, self.claim.value, kind, *ours, self.fits, why
 
 
-HEADS = ("section", "the paper", "its value", *(f"ours, {window}" for window in WINDOWS), "fits", "why")
+HEADS = ("section", "the paper", "its value", "kind", *(f"ours, {window}" for window in WINDOWS), "fits", "why")
 
 
 def judge(claim: Claim, measured: Measured) -> Row:
@@ -60,13 +68,13 @@ def judge(claim: Claim, measured: Measured) -> Row:
 
 
 def summary(rows: Sequence[Row]) -> list[str]:
-    """Sentences that count the verdicts."""
+    """Sentences that count the verdicts, those of calibrated claims apart."""
     lines = []
     for windows, of in ((WINDOWS, "claims on FLSS and sets"), (("",), "claims on gaits")):
         for window in windows:
-            verdicts = [row.verdicts[window] for row in rows if window in row.verdicts]
-            counts = ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", NOT_SEARCHED) if v in verdicts)
-            lines.append(f"{of}{f', window {window}' if window else ''}: {counts or 'none judged yet'}")
+            judged = [row for row in rows if window in row.verdicts]
+            counts = [f"{kind} {_counts([r.verdicts[window] for r in judged if r.kind == kind])}" for kind in KINDS]
+            lines.append(f"{of}{f', window {window}' if window else ''}: {'; '.join(counts)}")
     fits = [row.fits for row in rows if row.fits]
     counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *WINDOWS, "neither"))
     return [*lines, f"which window the paper's numbers fit: {counts}"]
@@ -81,6 +89,8 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     lines += [_line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
     lines += ["", "## Rules and commands", "", _line(("the paper", "agrees if", "command")), _line(["---"] * 3)]
     lines += [_line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
+    lines += ["", "## Judged in physics", "", "What a plan knows nothing of; the README has the answers.", ""]
+    lines += [f"- {name} (Section 6): {told}; `{command}`" for name, (command, told) in IN_PHYSICS.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -90,6 +100,7 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
     for row in rows:
         claim = row.claim
         told = {"key": claim.key, "section": claim.section, "paper": claim.words, "value": claim.value}
+        told |= {"kind": row.kind, "calibrates": list(claim.calibrates)}
         ours = {
             window or "any": {"verdict": row.verdicts[window]} | (asdict(answer) if answer else {})
             for window, answer in row.answers.items()
@@ -97,6 +108,11 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
         how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": claim.command}
         claims.append(told | {"ours": ours} | how)
     return {"claims": claims, "summary": summary(rows), "protocol": settings}
+
+
+def _counts(verdicts: Sequence[str]) -> str:
+    told = [f"{verdicts.count(one)} {one}" for one in ("agrees", "differs", NOT_SEARCHED) if one in verdicts]
+    return ", ".join(told) or "none judged"
 
 
 def _number(answer: Answer) -> str:
