@@ -319,9 +319,9 @@ CLAIMS = (
         POSTURES,
     ),
     Claim(
-        "obstacle-superior", "6", "a superior level that slows down helps in complex cases (V from 0.5 on), LDVS",
+        "obstacle-superior", "6", "a superior level, which slows down, helps to avoid the loss, LDVS",
         "at most half",
-        Band(Lost("ldvs halted, slows down", "ldvs halted", 0.5), (0.5, 0.7), most=0.0),
+        Band(Lost("ldvs halted, slows down", "ldvs halted", 0.5), (0.3, 0.7), most=0.0),
     ),
 )  # fmt: skip
 
