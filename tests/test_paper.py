@@ -16,7 +16,7 @@ from hexmj.paper.claims import CLAIMS, INFERRED_FROM, Claim
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.late_losses import lost_after
 from hexmj.paper.obstacles import losses_after
-from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, RANGES, Protocol, cells, network
+from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, RANGES, Protocol, cells
 from hexmj.paper.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
 from hexmj.paper.reproduce import measure, reproduce
 from hexmj.paper.rules import Answer, Band, Rule, Seen, Trend, fisher
@@ -176,8 +176,8 @@ def test_measured_losses_are_those_of_flss(tmp_path):
 
 
 def test_our_own_sets_are_judged_at_the_velocity_they_were_found_for():
-    assert network("own", "walk", 0.3) == network("own", "start", 0.3) == PRESETS["own-0.3"]
-    assert network("own", "walk", 0.35) is None
+    assert FULL.network("own", "walk", 0.3) == FULL.network("own", "start", 0.3) == PRESETS["own-0.3"]
+    assert FULL.network("own", "walk", 0.35) is None
 
 
 def test_obstacles_are_met_by_the_same_stable_starts():

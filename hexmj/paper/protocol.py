@@ -50,6 +50,24 @@ class Protocol:
     acceleration: Acceleration = field(default_factory=Acceleration)
     """Eq. 11, for the accelerated walks and all gaits."""
 
+    def network(self, name: str, window: str, velocity: float) -> Cruse1998 | None:
+        """The controller of any measurement at a velocity.
+
+        Args:
+            name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window, or 'own', the
+                preset of our own for this velocity alone.
+            window: one of `WINDOWS`.
+            velocity: V_r.
+
+        Returns:
+            None where no such set is known.
+        """
+        if name == "ideal":
+            return found_set(window, velocity)
+        if name == "own":
+            return PRESETS.get(f"own-{velocity:g}")
+        return found_set(window, *RANGES[name]) if name in RANGES else PRESETS[name]
+
 
 FULL = Protocol()
 """The paper's: seven times 1000 starts, gaits from 100."""
@@ -70,7 +88,7 @@ class Losses:
     """Which starts lose static stability under both windows: Figs. 2-4."""
 
     preset: str
-    """See `network`."""
+    """See `Protocol.network`."""
     accelerated: bool = False
     """Walk with Eq. 11."""
     late: bool = False
@@ -84,7 +102,7 @@ class Losses:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         return {
-            "sets": tuple(network(self.preset, window, velocity) for window in WINDOWS),
+            "sets": tuple(protocol.network(self.preset, window, velocity) for window in WINDOWS),
             "n_starts": protocol.samples * protocol.sample,
             "seed": protocol.seed,
             "stride": protocol.stride,
@@ -108,7 +126,7 @@ class Gaits:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         return {
-            "controller": network(self.preset, "walk", velocity),
+            "controller": protocol.network(self.preset, "walk", velocity),
             "n_starts": protocol.gait_starts,
             "seed": protocol.seed,
             "stride": protocol.gait_stride if self.accelerated else protocol.stride,
@@ -130,7 +148,7 @@ class Footfall:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         constants = {"stride": protocol.stride, "acceleration": protocol.acceleration}
-        return {"controller": network(self.preset, "walk", velocity), "seed": protocol.seed} | constants
+        return {"controller": protocol.network(self.preset, "walk", velocity), "seed": protocol.seed} | constants
 
 
 @dataclass(frozen=True)
@@ -148,7 +166,7 @@ class Obstacles:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on."""
         return {
-            "controller": network(self.preset, "walk", velocity),
+            "controller": protocol.network(self.preset, "walk", velocity),
             "answer": self.answer,
             "n_starts": protocol.obstacle_starts,
             "seed": protocol.seed,
@@ -204,22 +222,3 @@ def cells(name: str, protocol: Protocol) -> list[Cell]:
         Cell(f"{name} {v:g}", measurement.function, {"velocity": v} | measurement.settings(v, protocol), work)
         for v in velocities
     ]
-
-
-def network(name: str, window: str, velocity: float) -> Cruse1998 | None:
-    """The network of a measurement at a velocity, of all measurements.
-
-    Args:
-        name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window, or 'own', the preset
-            of our own for this velocity alone.
-        window: one of `WINDOWS`.
-        velocity: V_r.
-
-    Returns:
-        None where no such set is known.
-    """
-    if name == "ideal":
-        return found_set(window, velocity)
-    if name == "own":
-        return PRESETS.get(f"own-{velocity:g}")
-    return found_set(window, *RANGES[name]) if name in RANGES else PRESETS[name]
