@@ -101,17 +101,17 @@ BETTER = "the same algorithm finds better sets than the printed: at V = 0.4 0.30
 SPOILED = "it is as good as the ideal from V = 0.3 to 0.45 (start: at 0.4), and 0.04 to 0.12 above it at both ends"
 
 EARLY = "so it is up to V = 0.25 in walk; the sets of start are made for its 40 time units, and fall soon after"
-AGAIN = "the same algorithm finds a better one of the same form: for HWS in walk 0.16, not 0.21, averaged over V"
+AGAIN = "the same algorithm finds a better one of the same form, for HWS in walk by 0.04, averaged over V"
 KEEPS = ""
 RISES = ""
 FOUND_FAST = "own-0.7, with 29 free weights, has 0.67 in walk where HWS has 0.95"
 POSITIONS = (
-    "where all legs stand, positions help at V = 0.5 (0.04, without 0.32), not at 0.3 or 0.7; with the states of the legs"
-    " they do, see the next row"
+    "where all legs stand, positions help at V = 0.5 (0.04, without 0.32), not at 0.3 or 0.7; with the states of the"
+    " legs they do, see the next row"
 )
 POSTURES = (
-    "none is lost at V = 0.5 and 0.7; at 0.3 this seed's postures are of a regime that coexists there, and those of seeds"
-    " 0 to 3 lose none of 200"
+    "none is lost at V = 0.5 and 0.7; at 0.3 this seed's postures are of a regime that coexists there; those of seeds 0"
+    " to 3 lose none of 200"
 )
 
 NONE, ALL = (0, 100), (100, 100)
