@@ -39,9 +39,9 @@ def clock(turns: int = 20_000_000) -> float:
 
 def operations() -> tuple[int, int]:
     """Arithmetic operations of the compiled kernel for each start and step (0 without AVX), and how many at a time."""
-    block, p, k = np.zeros(kernel.ROWS * kernel.LANES), (0.0,) * 72, (1.0,) * 18
+    block, p, k, rules = np.zeros(kernel.ROWS * kernel.LANES), (0.0,) * 72, (1.0,) * 18, ((),) * 6
     step = kernel._step_printed
-    step(block, p, k)
+    step(block, p, k, rules)
     code = step.inspect_asm(step.signatures[0])
     lines = [line for line in code.splitlines() if re.match(rf"\s+{ARITHMETIC}\s", line)]
     counts = Counter(register for line in lines for register in WIDTHS if register in line)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import hexmj
-from hexmj.controllers.cruse1998.presets import weights_toml
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS
 from hexmj.legs import MIRROR
 
@@ -67,7 +67,7 @@ def main() -> None:
         print(f"{one.name}: FLSS {result.flss:.5f} ({result.low:.5f}-{result.high:.5f}) at V = {V}")
     path = Path("results/examples/receding_pep.toml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(weights_toml(giving_way.weights), encoding="utf-8")
+    path.write_text(network_toml(giving_way), encoding="utf-8")
     print(path)
 
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from math import inf
 
 from hexmj.controllers.cruse1998 import Order, Weights
+from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.legs import N1, N2, N3, N4
 from hexmj.timing import Acceleration, Stride
 
 LEGS = range(6)
+PRINTED = Reading()
 
 
 @dataclass
@@ -25,25 +27,32 @@ class State:
     pep_shift: list[float]
     aep_shift: list[float]
     v: float
+    v_final: float
 
 
 def begin(start: list[float], velocity: float, stride: Stride, acceleration: Acceleration | None) -> State:
     v = acceleration.start if acceleration else velocity
-    return State(list(start), [1] * 6, [1] * 6, [stride.aep0] * 6, [0.0] * 6, [0.0] * 6, v)
+    return State(list(start), [1] * 6, [1] * 6, [stride.aep0] * 6, [0.0] * 6, [0.0] * 6, v, velocity)
 
 
-def mechanism_1(d: int, e: int, state: State, p: Weights) -> float:
-    return (state.s[e] - 1) * p.p1[d, e]
+def mechanism_1(d: int, state: State, p: Weights, reading: Reading) -> float:
+    """Of all legs in N^1; of equally strong ones the last counts."""
+    shifts = [(state.s[e] - 1) * p.p1[d, e] for e in N1[d]]
+    return sum(shifts) if reading.rear == "sum" else max(reversed(shifts), key=abs)
 
 
 def mechanism_2(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
     return (stride.aep0 - stride.pep_min) * p.p2[d, e] if state.s[e] == 1 and state.s_old[e] == 0 else 0.0
 
 
-def mechanism_3(d: int, e: int, state: State, p: Weights) -> float:
-    neutral = p.p31[d, e] + p.p34[d, e] * state.v
+def mechanism_3(d: int, e: int, state: State, p: Weights, reading: Reading) -> float:
+    neutral = p.p31[d, e] + p.p34[d, e] * (state.v if reading.neutral == "present" else state.v_final)
     weight = p.p32[d, e] if state.x[e] <= neutral else p.p33[d, e]
-    return min(weight * state.s[e] * (neutral - state.x[e]), 4.0)
+    lasting = reading.contralateral if abs(d - e) == 3 else reading.ipsilateral
+    shift = weight * (1 if lasting == "lasting" else state.s[e]) * (neutral - state.x[e])
+    if reading.cap == "sum":
+        return shift
+    return min(shift, 4.0) if reading.cap == "above" else max(min(shift, 4.0), -4.0)
 
 
 def mechanism_4(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
@@ -52,15 +61,16 @@ def mechanism_4(d: int, e: int, state: State, p: Weights, stride: Stride) -> flo
     return (stride.pep_min - state.aep[d]) * p.p4[d, e] if crossed else 0.0
 
 
-def influences(d: int, state: State, p: Weights, stride: Stride) -> tuple[float, float]:
+def influences(d: int, state: State, p: Weights, stride: Stride, reading: Reading) -> tuple[float, float]:
     """The shifts of PEP and AEP of leg d, from the states of its neighbours."""
-    pep = 0.0
-    for e in N1[d]:
-        pep += mechanism_1(d, e, state, p)
+    pep = mechanism_1(d, state, p, reading)
     for e in N2[d]:
         pep += mechanism_2(d, e, state, p, stride)
-    for e in N3[d]:
-        pep += mechanism_3(d, e, state, p)
+    third = [mechanism_3(d, e, state, p, reading) for e in N3[d]]
+    for shift in third:
+        pep += shift
+    if reading.cap == "sum":
+        pep -= max(sum(third) - 4.0, 0.0)
     return pep, sum(mechanism_4(d, e, state, p, stride) for e in N4[d])
 
 
@@ -77,13 +87,13 @@ def move(d: int, state: State, pep_shift: float, aep_shift: float, stride: Strid
         state.s[d] = 0
 
 
-def step(state: State, p: Weights, order: Order, stride: Stride) -> None:
+def step(state: State, p: Weights, order: Order, stride: Stride, reading: Reading) -> None:
     """One step of all six legs in the order of updates that is asked for."""
     if order == "sequential":
         for d in LEGS:
-            move(d, state, *influences(d, state, p, stride), stride)
+            move(d, state, *influences(d, state, p, stride, reading), stride)
         return
-    following = [influences(d, state, p, stride) for d in LEGS]
+    following = [influences(d, state, p, stride, reading) for d in LEGS]
     used = following if order == "undelayed" else list(zip(state.pep_shift, state.aep_shift, strict=True))
     for d in LEGS:
         move(d, state, *used[d], stride)
@@ -98,13 +108,14 @@ def walk(
     stride: Stride,
     order: Order = "printed",
     acceleration: Acceleration | None = None,
+    reading: Reading = PRINTED,
 ) -> tuple[list[list[float]], list[list[int]], list[float]]:
     """Tips and states after each step, (step, leg), and V_r during it, (step,)."""
     state = begin(start, velocity, stride, acceleration)
     tips, states, velocities = [], [], []
     for n in range(1, steps + 1):
         velocities.append(state.v)
-        step(state, p, order, stride)
+        step(state, p, order, stride, reading)
         tips.append(list(state.x))
         states.append(list(state.s))
         if acceleration:  # Eq. 11
@@ -126,7 +137,7 @@ def first_loss(start: list[float], p: Weights, velocity: float, steps: int, stri
     """Time of the first loss of static stability at constant velocity, inf where there is none."""
     state = begin(start, velocity, stride, None)
     for n in range(1, steps + 1):
-        step(state, p, "printed", stride)
+        step(state, p, "printed", stride, PRINTED)
         if not stable(state.x, state.s, stride):
             return n * stride.dt
     return inf

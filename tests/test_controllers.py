@@ -16,7 +16,7 @@ import hexmj
 from hexmj.controllers import Sensed, Step, named, stepwise
 from hexmj.controllers.asking import advanced
 from hexmj.controllers.conformance import FIRST, check_controller, findings
-from hexmj.controllers.cruse1998.presets import weights_toml
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.losses import first_losses, planned_losses
 from hexmj.controllers.protocol import Controller, ReadingPlan, settings_of
 from hexmj.legs import CENTRED
@@ -301,7 +301,7 @@ def mine(tmp_path, monkeypatch):
 
 def test_controllers_by_name(mine, tmp_path, monkeypatch):
     assert hexmj.load_controller("ldvs") is LDVS
-    (tmp_path / "set.toml").write_text(weights_toml(hexmj.HWS.weights))
+    (tmp_path / "set.toml").write_text(network_toml(hexmj.HWS))
     assert hexmj.load_controller("set.toml") == replace(hexmj.HWS, name="set")
     for where in (mine.name, str(mine), "mine_of_a_user"):
         assert settings_of(hexmj.load_controller(f"{where}:Still")) == {"name": "still", "height": 0.0}

@@ -16,7 +16,7 @@ import xarray as xr
 from hexmj import netcdf
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.cruse1998.presets import weights_toml
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError, SimulationError
 from hexmj.files import MARK, opened, read_sealed, sealed, unsealed
@@ -271,7 +271,7 @@ def test_a_seed_of_any_size_is_written(tmp_path):
 
 
 def test_a_text_with_a_byte_order_mark_is_one(tmp_path):
-    (path := tmp_path / "weights.toml").write_bytes(b"\xef\xbb\xbf" + weights_toml(LDVS.weights).encode())
+    (path := tmp_path / "weights.toml").write_bytes(b"\xef\xbb\xbf" + network_toml(LDVS).encode())
     assert load_controller(str(path)) == replace(LDVS, name="weights")
 
 

@@ -13,6 +13,7 @@ import plain_network as plain
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Weights, kernel
 from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
+from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.legs import CENTRED, FIG1, MIRROR, Geometry
@@ -23,6 +24,16 @@ from hexmj.timing import Acceleration, Stride
 STRIDE = Stride()
 NEAR = Geometry(origins=(7.0, 2.0, -4.0), lateral=(10.0, 25.0, 16.0))
 """Legs so near each other that tips pass those ahead of them, and any one may be the foremost."""
+
+RULES = [
+    ("printed", Reading()),
+    ("undelayed", Reading()),
+    ("sequential", Reading()),
+    ("printed", Reading(ipsilateral="lasting")),
+    ("undelayed", Reading("lasting", "lasting", "sum", "strongest", "final")),
+    ("sequential", Reading(contralateral="lasting", cap="both", rear="strongest", neutral="final")),
+]
+"""Every choice once at least, alone or with others; each combination is compiled by itself."""
 
 
 def random_weights(rng: np.random.Generator) -> Weights:
@@ -43,22 +54,22 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
     seed=st.integers(0, 2**32 - 1),
     size=st.sampled_from([1, 2, LANES - 1, LANES, LANES + 3]),
     threads=st.sampled_from([1, 2, 3]),
-    order=st.sampled_from(["printed", "undelayed", "sequential"]),
+    rules=st.sampled_from(RULES),
     geometry=st.sampled_from([FIG1, CENTRED, NEAR]),
     velocity=st.floats(0.0, 0.99),
     rate=st.one_of(st.none(), st.floats(1e-5, 0.02)),
 )
-def test_equals_plain_network_to_the_last_bit(seed, size, threads, order, geometry, velocity, rate):
+def test_equals_plain_network_to_the_last_bit(seed, size, threads, rules, geometry, velocity, rate):
     rng = np.random.default_rng(seed)
-    p, starts = random_weights(rng), random_starts(rng, size)
-    controller, stride = Cruse1998(p, order), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
+    p, starts, (order, reading) = random_weights(rng), random_starts(rng, size), rules
+    controller, stride = Cruse1998(p, order, reading=reading), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
     acceleration = Acceleration(rate, start=velocity / 2) if rate else None
     steps = 250
     options = {"stride": stride, "acceleration": acceleration, "threads": threads}
     fast = walk(starts, controller, velocity, steps * stride.dt, **options)
     lost = first_loss(starts, controller, velocity, steps * stride.dt, **options)
     for i in rng.choice(size, min(size, 3), replace=False):
-        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, stride, order, acceleration)
+        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, stride, order, acceleration, reading)
         assert np.array_equal(fast.x[:, i], x)
         assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
         assert np.array_equal(fast.velocity[:, i], v)
@@ -96,6 +107,15 @@ def test_losses_that_are_not_seen_do_not_count(unseen):
     unstable = walk_margin(walk(starts, UNCOORDINATED, 0.5, 0.1 * (unseen + seen)))[unseen:] <= 0.0
     assert np.array_equal(lost, np.where(unstable.any(axis=0), unseen + 1 + np.argmax(unstable, axis=0), 0))
     assert (lost > 0).any()
+
+
+def test_one_may_look_again_and_again():
+    starts, period = random_starts(np.random.default_rng(12), LANES + 7), 50
+    plan = UNCOORDINATED.begin(starts, np.full(len(starts), 0.5), STRIDE)
+    lost = [plan.first_losses_after(period - 1, 1) for _ in range(6)][-1]
+    looked = walk_margin(walk(starts, UNCOORDINATED, 0.5, 0.1 * 6 * period))[period - 1 :: period] <= 0.0
+    assert np.array_equal(lost, np.where(looked.any(axis=0), period * (1 + np.argmax(looked, axis=0)), 0))
+    assert (lost > period).any()
 
 
 @pytest.mark.parametrize("controller", [HWS, LDVS])

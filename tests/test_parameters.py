@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, Cruse1998, Symmetric, Weights
-from hexmj.controllers.cruse1998.presets import OWN, weights_toml
+from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, READINGS, Cruse1998, Reading, Symmetric, Weights
+from hexmj.controllers.cruse1998.presets import OWN, network_toml
 from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError
@@ -121,7 +121,7 @@ def test_names_that_do_not_exist():
 def test_names_of_controllers(tmp_path):
     """As in tables and titles: that of a preset, and of a file without its folder and ending."""
     path = tmp_path / "found-0.1.toml"
-    path.write_text(weights_toml(HWS.weights))
+    path.write_text(network_toml(HWS))
     names = ("hws", "own-0.1", str(path))
     assert [load_controller(name).name for name in names] == ["hws", "own-0.1", "found-0.1"]
 
@@ -230,7 +230,28 @@ def test_each_of_our_own_sets_names_the_command_that_found_it():
 @pytest.mark.parametrize("weights", [LDVS.weights, Weights.from_vector(np.random.default_rng(1).integers(0, 2, 58))])
 def test_written_weights_are_read_to_the_same_bits(weights, tmp_path):
     path = tmp_path / "weights.toml"
-    path.write_text(weights_toml(weights))
+    path.write_text(network_toml(Cruse1998(weights)))
     read = load_controller(str(path))
     assert isinstance(read, Cruse1998)
     assert np.array_equal(general(read.weights).to_vector(), general(weights).to_vector())
+
+
+@pytest.mark.parametrize("order", ["printed", "sequential"])
+@pytest.mark.parametrize("reading", READINGS)
+def test_written_rules_are_read_again(order, reading, tmp_path):
+    path = tmp_path / "network.toml"
+    path.write_text(network_toml(Cruse1998(LDVS.weights, order, reading=READINGS[reading])))
+    assert load_controller(str(path)) == Cruse1998(LDVS.weights, order, "network", READINGS[reading])
+
+
+@pytest.mark.parametrize(("rule", "valid"), [("order", "sequential"), ("reading", "lasting")])
+def test_unknown_rules_are_refused(rule, valid, tmp_path):
+    path = tmp_path / "network.toml"
+    path.write_text(f'{rule} = "wrong"\n{network_toml(LDVS)}')
+    with pytest.raises(InputError, match=f"{rule} = 'wrong'.*{valid}"):
+        load_controller(str(path))
+
+
+def test_a_reading_without_a_name_is_not_written():
+    with pytest.raises(InputError, match="has no name; named ones: printed, lasting"):
+        network_toml(Cruse1998(LDVS.weights, reading=Reading(rear="strongest")))

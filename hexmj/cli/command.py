@@ -40,7 +40,7 @@ class WalkingCommand:
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
         if acceleration := self.accelerating.procedure:
             line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
-        line += f"; order {self.controlled.order}" if self.controlled.order else ""
+        line += "".join(f"; {rule} {getattr(self.controlled, rule)}" for rule in self.controlled.rules)
         line += "; feedback" if self.controlled.feedback else ""
         if physical:
             values, usual, ground = self.conditions.flat(), Conditions().flat(), OBEYED[self.conditions.ground.ground]

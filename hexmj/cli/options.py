@@ -92,6 +92,9 @@ class Controlled:
     order: str | None = None
     """Order of updates of the 1998 network: 'printed' (Eq. 6 to the letter, unless given), 'undelayed' or
     'sequential'."""
+    reading: str | None = None
+    """Reading of the 1998 paper: 'printed', or 'lasting', in which an anterior leg acts by mechanism 3 while it
+    protracts, too; that of the set unless given."""
     feedback: bool = False
     """The controller reads the legs before each of its steps, where the tips are and which feet meet the ground,
     instead of going on by itself."""
@@ -100,18 +103,28 @@ class Controlled:
         """A controller by its name, see `load_controller`, planning in this way.
 
         Raises:
-            InputError: no such controller, or one that has no order of updates, or not this one.
+            InputError: no such controller, or one that has no order of updates or reading, or not this one.
         """
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.named import load_controller
         from hexmj.controllers.reads_legs import ReadsLegs
 
         found = load_controller(name)
-        if self.order is not None:
+        for rule, value in self.rules.items():
             if not isinstance(found, Cruse1998):
-                raise InputError(f"--order = {self.order} with {name}; expected it with the 1998 network only")
-            found = replace(found, order=self.order)  # pyright: ignore[reportArgumentType]
+                raise InputError(
+                    f"--{rule} = {getattr(self, rule)} with {name}; expected it with the 1998 network only"
+                )
+            found = replace(found, **{rule: value})
         return ReadsLegs(found) if self.feedback else found
+
+    @property
+    def rules(self) -> dict[str, Any]:
+        """What was given of the 1998 network's order of updates and reading."""
+        from hexmj.controllers.cruse1998.readings import named_reading
+
+        given = {"order": self.order, "reading": self.reading and named_reading(self.reading)}
+        return {name: value for name, value in given.items() if value is not None}
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

@@ -126,9 +126,9 @@ class Search(WalkingCommand):
         from hexmj.search.network_forms import FORMS, NetworkForm
 
         if self.form in FORMS:
-            return NetworkForm(self.form, self.controlled.order or NetworkForm.order)  # pyright: ignore[reportArgumentType]
-        if self.controlled.order:
-            raise InputError(f"--order = {self.controlled.order} with {self.form}; expected it with {', '.join(FORMS)}")
+            return NetworkForm(self.form, **self.controlled.rules)
+        for name in self.controlled.rules:
+            raise InputError(f"--{name} with {self.form}; expected it with {', '.join(FORMS)}")
         try:
             return FieldsForm(load_controller(self.form))
         except InputError as error:
@@ -188,11 +188,11 @@ class Search(WalkingCommand):
     def _toml(self, problem: "Problem", found: "Found") -> str:
         """What `load_controller` reads to the same bits: weights, or a controller and its fields."""
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.cruse1998.presets import weights_toml
+        from hexmj.controllers.cruse1998.presets import network_toml
 
         controller = problem.form.controller(found.vector)
         if isinstance(controller, Cruse1998):
-            return weights_toml(controller.weights)
+            return network_toml(controller)
         values = zip(problem.form.names, found.vector.tolist(), strict=True)
         lines = [f"controller = {json.dumps(self.form)}", "", "[fields]", *(f"{key} = {one!r}" for key, one in values)]
         return "\n".join(lines) + "\n"

@@ -11,8 +11,8 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from hexmj.checks import typed
-from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
-from hexmj.controllers.cruse1998.presets import read_weights
+from hexmj.controllers.cruse1998 import PRESETS
+from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.files import read_toml
@@ -52,7 +52,7 @@ def load_controller(name: str) -> Controller:
     table = read_toml(path)
     if set(table) == {"controller", "fields"} and isinstance(table["fields"], dict):
         return _with_fields(path, str(table["controller"]), table["fields"])
-    return Cruse1998(read_weights(table, name), name=literal(path.stem))
+    return read_network(table, name, literal(path.stem))
 
 
 def known_names() -> Iterator[str]:

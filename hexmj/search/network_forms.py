@@ -6,13 +6,14 @@ all 58 are free.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import Cruse1998, Order
+from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.controllers.cruse1998.weights import BINARY, NEIGHBOURS, AnyWeights, Symmetric, Weights, general
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -79,6 +80,8 @@ class NetworkForm:
     """Which weights are free."""
     order: Order = "printed"
     """See `Cruse1998.order`."""
+    reading: Reading = field(default_factory=Reading)
+    """See `Cruse1998.reading`."""
 
     __post_init__ = check_types
 
@@ -105,7 +108,7 @@ class NetworkForm:
 
     def controller(self, vector: np.ndarray) -> Cruse1998:
         """See `Form.controller`."""
-        return Cruse1998(FORMS[self.name].weights(vector), self.order)
+        return Cruse1998(FORMS[self.name].weights(vector), self.order, reading=self.reading)
 
     def vector(self, controller: Controller) -> np.ndarray:
         """See `Form.vector`."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hexmj
 from hexmj.bodies.loading import compile_body
-from hexmj.controllers.cruse1998.presets import weights_toml
+from hexmj.controllers.cruse1998.presets import network_toml
 
 WORDS = b"nan", b"-1", b"1e999", b"\xff\xfe", b"[[[[", b'"""', b"9" * 5000, b"{}<>", b"[" * 5000
 
@@ -38,7 +38,7 @@ def originals() -> Path:
     folder = Path(mkdtemp(prefix="hexmj-originals-"))
     walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 3.0)
     hexmj.save_recording(hexmj.record(walked), folder / "recording.nc")
-    (folder / "weights.toml").write_text(weights_toml(hexmj.LDVS.weights))
+    (folder / "weights.toml").write_text(network_toml(hexmj.LDVS))
     shutil.copy(hexmj.STICK_INSECT.mjcf, folder / "insect.xml")
     return folder
 

@@ -2,6 +2,18 @@
 
 from hexmj.controllers.cruse1998.network import Cruse1998, Order
 from hexmj.controllers.cruse1998.presets import HWS, LDVS, PRESETS, UNCOORDINATED
+from hexmj.controllers.cruse1998.readings import READINGS, Reading
 from hexmj.controllers.cruse1998.weights import Symmetric, Weights
 
-__all__ = ["HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Order", "Symmetric", "Weights"]
+__all__ = [
+    "HWS",
+    "LDVS",
+    "PRESETS",
+    "READINGS",
+    "UNCOORDINATED",
+    "Cruse1998",
+    "Order",
+    "Reading",
+    "Symmetric",
+    "Weights",
+]

@@ -19,6 +19,7 @@ from hexmj.legs import MIRROR, N2, N4
 
 LANES = 64
 PRINTED, UNDELAYED, SEQUENTIAL = range(3)
+ABOVE, BOTH, SUM = range(3)
 
 # A leg without the neighbour in question names itself, with weight 0.
 REAR = tuple(n[0] if n else d for d, n in enumerate(N2))
@@ -40,23 +41,39 @@ _P31_CONTRA, _P32_CONTRA, _P33_CONTRA, _P34_CONTRA = range(48, 72, 6)
 # The constants: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, the origins of the legs' axes, 1 / |y| of their lines.
 _AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y = 0, 1, 2, 3, 4, 5, 6, 12
 
+# How the equations are read, see `network.Rules`: a choice is the length of a tuple, and so part of its type; each
+# combination is compiled by itself, and what another would do costs nothing.
+_ORDER, _FRONT_LASTS, _CONTRA_LASTS, _CAP, _STRONGEST, _FINAL = range(6)
+
 
 @njit(nogil=True, forceinline=True)
-def _influence(d, x, s, s_old, aep, v, p, k):
-    """Eq. 2-5 for leg d: the sum of Delta^1, Delta^2 and Delta^3, and Delta^4."""
+def _influence(d, x, s, s_old, aep, v, p, k, rules):
+    """Eq. 2-5 for leg d: the sum of Delta^1, Delta^2 and Delta^3, and Delta^4; `v` is V_r of P^nr."""
     rear, contra, front = REAR[d], CONTRA[d], FRONT[d]
-    pep = (0.0 if s[rear] == 1.0 else -p[_P1_REAR + d]) + (0.0 if s[contra] == 1.0 else -p[_P1_CONTRA + d])  # Eq. 2
+    one, other = 0.0 if s[rear] == 1.0 else -p[_P1_REAR + d], 0.0 if s[contra] == 1.0 else -p[_P1_CONTRA + d]  # Eq. 2
+    pep = (one if abs(one) > abs(other) else other) if len(rules[_STRONGEST]) else one + other
     pep += p[_P2_REAR + d] if (s[rear] == 1.0) & (s_old[rear] == 0.0) else 0.0  # Eq. 3
     ahead = p[_P31_FRONT + d] + p[_P34_FRONT + d] * v - x[front]
-    shift = (p[_P32_FRONT + d] if ahead >= 0.0 else p[_P33_FRONT + d]) * ahead
-    shift = shift if shift < 4.0 else 4.0
-    pep += shift if s[front] == 1.0 else 0.0  # Eq. 4
+    one = _capped((p[_P32_FRONT + d] if ahead >= 0.0 else p[_P33_FRONT + d]) * ahead, rules)
+    one = one if (s[front] == 1.0) | (len(rules[_FRONT_LASTS]) == 1) else 0.0  # Eq. 4
     ahead = p[_P31_CONTRA + d] + p[_P34_CONTRA + d] * v - x[contra]
-    shift = (p[_P32_CONTRA + d] if ahead >= 0.0 else p[_P33_CONTRA + d]) * ahead
-    shift = shift if shift < 4.0 else 4.0
-    pep += shift if s[contra] == 1.0 else 0.0  # Eq. 4
+    other = _capped((p[_P32_CONTRA + d] if ahead >= 0.0 else p[_P33_CONTRA + d]) * ahead, rules)
+    other = other if (s[contra] == 1.0) | (len(rules[_CONTRA_LASTS]) == 1) else 0.0  # Eq. 4
+    pep = pep + one + other
+    if len(rules[_CAP]) == SUM:
+        pep -= one + other - 4.0 if one + other > 4.0 else 0.0
     crossed = k[_ORIGIN + d] + x[d] >= k[_ORIGIN + front] + x[front]
     return pep, (k[_PEP_MIN] - aep[d]) * p[_P4_FRONT + d] if crossed else 0.0  # Eq. 5
+
+
+@njit(nogil=True, forceinline=True)
+def _capped(shift, rules):
+    """Eq. 4's bound of an influence of mechanism 3."""
+    if len(rules[_CAP]) != SUM:
+        shift = shift if shift < 4.0 else 4.0
+    if len(rules[_CAP]) == BOTH:
+        shift = shift if shift > -4.0 else -4.0
+    return shift
 
 
 @njit(nogil=True, forceinline=True)
@@ -72,14 +89,14 @@ def _move(x, s, pep_shift, aep_shift, v, k):
 
 
 @njit(nogil=True, forceinline=True)
-def _influences(x, s, s_old, aep, v, p, k):
+def _influences(x, s, s_old, aep, v, p, k, rules):
     """Eq. 2-5 for all legs: the shifts of PEP, and those of AEP."""
-    pep0, aep0 = _influence(0, x, s, s_old, aep, v, p, k)
-    pep1, aep1 = _influence(1, x, s, s_old, aep, v, p, k)
-    pep2, aep2 = _influence(2, x, s, s_old, aep, v, p, k)
-    pep3, aep3 = _influence(3, x, s, s_old, aep, v, p, k)
-    pep4, aep4 = _influence(4, x, s, s_old, aep, v, p, k)
-    pep5, aep5 = _influence(5, x, s, s_old, aep, v, p, k)
+    pep0, aep0 = _influence(0, x, s, s_old, aep, v, p, k, rules)
+    pep1, aep1 = _influence(1, x, s, s_old, aep, v, p, k, rules)
+    pep2, aep2 = _influence(2, x, s, s_old, aep, v, p, k, rules)
+    pep3, aep3 = _influence(3, x, s, s_old, aep, v, p, k, rules)
+    pep4, aep4 = _influence(4, x, s, s_old, aep, v, p, k, rules)
+    pep5, aep5 = _influence(5, x, s, s_old, aep, v, p, k, rules)
     return (pep0, pep1, pep2, pep3, pep4, pep5), (aep0, aep1, aep2, aep3, aep4, aep5)
 
 
@@ -96,9 +113,9 @@ def _moves(x, s, pep_shift, aep_shift, v, k):
 
 
 @njit(nogil=True, forceinline=True)
-def _move_in_turn(d, x, s, s_old, aep, v, p, k):
+def _move_in_turn(d, x, s, s_old, aep, v, v_neutral, p, k, rules):
     """Eq. 2-6 for leg d, the legs before it having moved already."""
-    pep_shift, aep_shift = _influence(d, x, s, s_old, aep, v, p, k)
+    pep_shift, aep_shift = _influence(d, x, s, s_old, aep, v_neutral, p, k, rules)
     x_d, s_d, aep_d = _move(x[d], s[d], pep_shift, aep_shift, v, k)
     return _put(x, d, x_d), _put(s, d, s_d), _put(s_old, d, s[d]), _put(aep, d, aep_d)
 
@@ -111,14 +128,14 @@ def _put(six, d, value):
 
 
 @njit(nogil=True, forceinline=True)
-def _moves_in_turn(x, s, s_old, aep, v, p, k):
+def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
     """Eq. 2-6 leg after leg."""
-    x, s, s_old, aep = _move_in_turn(0, x, s, s_old, aep, v, p, k)
-    x, s, s_old, aep = _move_in_turn(1, x, s, s_old, aep, v, p, k)
-    x, s, s_old, aep = _move_in_turn(2, x, s, s_old, aep, v, p, k)
-    x, s, s_old, aep = _move_in_turn(3, x, s, s_old, aep, v, p, k)
-    x, s, s_old, aep = _move_in_turn(4, x, s, s_old, aep, v, p, k)
-    return _move_in_turn(5, x, s, s_old, aep, v, p, k)
+    x, s, s_old, aep = _move_in_turn(0, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(1, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(2, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(3, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(4, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    return _move_in_turn(5, x, s, s_old, aep, v, v_neutral, p, k, rules)
 
 
 @njit(nogil=True, forceinline=True)
@@ -165,6 +182,12 @@ def _store(z, row, j, six):
 
 
 @njit(nogil=True, forceinline=True)
+def _neutral_velocity(z, j, rules):
+    """V_r of P^nr, in lane j."""
+    return z[(V_FINAL if len(rules[_FINAL]) else V) * LANES + j]
+
+
+@njit(nogil=True, forceinline=True)
 def _finish(z, j, x, s, s_old, aep, v, k):
     """Store a lane's legs after a step, note a first loss of static stability, and accelerate."""
     _store(z, X, j, x)
@@ -180,44 +203,50 @@ def _finish(z, j, x, s, s_old, aep, v, k):
 
 
 @njit(nogil=True)
-def _step_printed(z, p, k):
+def _step_printed(z, p, k, rules):
     """One step of a block, all six legs at once, PEP(t + dt) from Delta(t)."""
     for j in range(LANES):
-        x, s, s_old, aep, v = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j), z[V * LANES + j]
+        x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
+        v = z[V * LANES + j]
+        v_neutral = _neutral_velocity(z, j, rules)
         x_new, s_new, aep_new = _moves(x, s, _load(z, PEP_SHIFT, j), _load(z, AEP_SHIFT, j), v, k)
-        pep_shift, aep_shift = _influences(x, s, s_old, aep, v, p, k)
+        pep_shift, aep_shift = _influences(x, s, s_old, aep, v_neutral, p, k, rules)
         _store(z, PEP_SHIFT, j, pep_shift)
         _store(z, AEP_SHIFT, j, aep_shift)
         _finish(z, j, x_new, s_new, s, aep_new, v, k)
 
 
 @njit(nogil=True)
-def _step_undelayed(z, p, k):
+def _step_undelayed(z, p, k, rules):
     """One step of a block, all six legs at once, PEP(t + dt) from Delta(t + dt)."""
     for j in range(LANES):
-        x, s, s_old, aep, v = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j), z[V * LANES + j]
-        pep_shift, aep_shift = _influences(x, s, s_old, aep, v, p, k)
+        x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
+        v = z[V * LANES + j]
+        v_neutral = _neutral_velocity(z, j, rules)
+        pep_shift, aep_shift = _influences(x, s, s_old, aep, v_neutral, p, k, rules)
         x_new, s_new, aep_new = _moves(x, s, pep_shift, aep_shift, v, k)
         _finish(z, j, x_new, s_new, s, aep_new, v, k)
 
 
 @njit(nogil=True)
-def _step_sequential(z, p, k):
+def _step_sequential(z, p, k, rules):
     """One step of a block, leg after leg."""
     for j in range(LANES):
-        x, s, s_old, aep, v = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j), z[V * LANES + j]
-        x, s, s_old, aep = _moves_in_turn(x, s, s_old, aep, v, p, k)
+        x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
+        v = z[V * LANES + j]
+        v_neutral = _neutral_velocity(z, j, rules)
+        x, s, s_old, aep = _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules)
         _finish(z, j, x, s, s_old, aep, v, k)
 
 
 @njit(nogil=True)
-def _step(z, order, p, k):
-    if order == SEQUENTIAL:
-        _step_sequential(z, p, k)
-    elif order == UNDELAYED:
-        _step_undelayed(z, p, k)
+def _step(z, order, p, k, rules):
+    if len(order) == SEQUENTIAL:
+        _step_sequential(z, p, k, rules)
+    elif len(order) == UNDELAYED:
+        _step_undelayed(z, p, k, rules)
     else:
-        _step_printed(z, p, k)
+        _step_printed(z, p, k, rules)
 
 
 @njit(nogil=True)
@@ -233,10 +262,10 @@ def _begin(z, j, start, v, v_final, steps, k):
 
 
 @njit(cache=True, nogil=True)
-def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, order: int, p: Any, k: Any, lost: Any) -> None:
+def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, lost: Any) -> None:
     """Write the step of each start's first loss of static stability within its `steps`, or 0, to `lost`, (start,).
 
-    `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `order`, `p` and `k` as in `network`.
+    `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `p`, `k` and `rules` are `network.Constants`.
     """
     z, who = np.zeros(ROWS * LANES), np.full(LANES, -1)  # which start is in each lane
     following = undecided = 0
@@ -252,7 +281,7 @@ def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, order: int, p: A
                     following += 1
         if who.max() < 0:
             return
-        _step(z, order, p, k)
+        _step(z, rules[_ORDER], p, k, rules)
         undecided = 0
         for j in range(LANES):
             undecided += _undecided(z, j)
@@ -272,7 +301,7 @@ def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None
 
 
 @njit(cache=True, nogil=True)
-def record(blocks: Any, begin: int, end: int, order: int, p: Any, k: Any, velocity: Any, x: Any, stance: Any) -> None:
+def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, velocity: Any, x: Any, stance: Any) -> None:
     """Step blocks `begin` to `end` on; write V_r of each step, tips and states after it, (step, start, leg)."""
     steps, starts = velocity.shape
     for b in range(begin, end):
@@ -282,7 +311,7 @@ def record(blocks: Any, begin: int, end: int, order: int, p: Any, k: Any, veloci
         for n in range(steps):
             for j in range(lanes):
                 velocity[n, first + j] = z[V * LANES + j]
-            _step(z, order, p, k)
+            _step(z, rules[_ORDER], p, k, rules)
             for j in range(lanes):
                 for leg in range(6):
                     x[n, first + j, leg] = z[(X + leg) * LANES + j]
@@ -290,11 +319,11 @@ def record(blocks: Any, begin: int, end: int, order: int, p: Any, k: Any, veloci
 
 
 @njit(cache=True, nogil=True)
-def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, order: int, p: Any, k: Any) -> None:
+def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: Any, rules: Any) -> None:
     """Step blocks `begin` to `end` on; their rows `LOST` then hold the first losses after the `unseen` steps."""
     for b in range(begin, end):
         z = blocks[b]
         for n in range(unseen + seen):
             if n == unseen:
-                z[STEPS * LANES : (STEPS + 1) * LANES] = unseen + seen  # before, none counts
-            _step(z, order, p, k)
+                z[STEPS * LANES : (STEPS + 1) * LANES] = z[DONE * LANES] + seen  # before, none counts
+            _step(z, rules[_ORDER], p, k, rules)

@@ -5,14 +5,15 @@ AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent
 `kernel`, compiled; ``tests/plain_network.py`` holds them in their readable form.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import kernel
+from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, general
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
@@ -23,8 +24,11 @@ from hexmj.walks import PlannedWalk
 Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
 
-Constants = tuple[int, tuple[float, ...], tuple[float, ...]]
-"""The order of updates, weights and constants, as the kernel reads them."""
+Rules = tuple[tuple[int, ...], ...]
+"""The order of updates and the choices of a reading, each as a tuple as long as its number among its names."""
+
+Constants = tuple[tuple[float, ...], tuple[float, ...], Rules]
+"""Weights, constants and rules, as the kernel reads them."""
 
 AT_ONCE = 200_000_000
 """Steps of a start in one call of the kernel, at most, as far as it can be divided: about two seconds, in which a
@@ -42,6 +46,8 @@ class Cruse1998:
     Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
     name: str = "cruse1998"
     """Of the set of weights."""
+    reading: Reading = field(default_factory=Reading)
+    """Of what the paper's sentences leave open."""
 
     __post_init__ = check_types
 
@@ -78,6 +84,13 @@ class Cruse1998:
         plan = self.begin(starts, velocity, stride, acceleration, threads)
         return replace(plan, first=plan.final)
 
+    @property
+    def _rules(self) -> Rules:
+        """As the kernel reads them."""
+        chosen: list[tuple[Any, str]] = [(Order, self.order)]
+        chosen += [(hint, getattr(self.reading, name)) for name, hint in get_type_hints(Reading).items()]
+        return tuple((0,) * get_args(names).index(one) for names, one in chosen)
+
     def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:
         """As the kernel reads them."""
         w, d, g = general(self.weights), np.arange(6), stride.geometry
@@ -87,7 +100,7 @@ class Cruse1998:
         p = np.concatenate([matrix[d, source] for matrix, source in table])
         eq11 = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
         k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y))])
-        return get_args(Order).index(self.order), tuple(p.tolist()), tuple(k.tolist())
+        return tuple(p.tolist()), tuple(k.tolist()), self._rules
 
 
 @dataclass(eq=False)
@@ -115,7 +128,7 @@ class NetworkPlan:
     def _blocks(self) -> np.ndarray:
         """The kernel's state of all starts, (block, row of lanes), from time 0 on."""
         blocks = np.empty((-(-len(self.starts) // kernel.LANES), kernel.ROWS * kernel.LANES))
-        kernel.begin_blocks(blocks, self.starts, self.first, self.final, self.constants[-1])
+        kernel.begin_blocks(blocks, self.starts, self.first, self.final, self.constants[1])
         return blocks
 
     def advance(self, steps: int) -> PlannedWalk:

@@ -1,10 +1,11 @@
-"""Sets of weights by name: those of the paper and our own, and parameter files (TOML)."""
+"""Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
 
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from hexmj.controllers.cruse1998.network import Cruse1998
+from hexmj.controllers.cruse1998.readings import named_reading, reading_name
 from hexmj.controllers.cruse1998.weights import (
     HWS_WEIGHTS,
     LDVS_WEIGHTS,
@@ -22,17 +23,28 @@ OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""
 
 
-def read_weights(table: dict[str, Any], where: str) -> AnyWeights:
-    """Weights from the tables of a file.
+def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
+    """A network from the tables of a file.
 
     Args:
         table: either ``[symmetric]`` with fields of `Symmetric`, or ``[weights.p1]`` ... ``[weights.p4]`` with keys
-            ``"d,e"`` (the paper's leg numbers).
+            ``"d,e"`` (the paper's leg numbers); ``order`` and ``reading`` before it, where they are not the printed.
         where: the file, for a sentence.
+        name: of the set.
 
     Raises:
         InputError: a key, type or value that makes no sense.
     """
+    rules = {key: table[key] for key in ("order", "reading") if key in table}
+    weights = _weights({key: value for key, value in table.items() if key not in rules}, where)
+    try:
+        reading = named_reading(rules.get("reading", "printed"))
+        return Cruse1998(weights, rules.get("order", "printed"), name, reading)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _weights(table: dict[str, Any], where: str) -> AnyWeights:
     if list(table) == ["symmetric"]:
         return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{where} [symmetric]"))
     if list(table) != ["weights"] or not isinstance(weights := table["weights"], dict):
@@ -49,16 +61,22 @@ def read_weights(table: dict[str, Any], where: str) -> AnyWeights:
     return Weights.of(numbers)
 
 
-def weights_toml(weights: AnyWeights) -> str:
-    """The text of a TOML file that `read_weights` reads to the same bits; general weights that are 0 are left out."""
+def network_toml(network: Cruse1998) -> str:
+    """The text of a TOML file that `read_network` reads to the same bits; general weights that are 0 are left out.
+
+    Raises:
+        InputError: a reading without a name.
+    """
+    rules, weights = {"order": network.order, "reading": reading_name(network.reading)}, network.weights
+    lines = [f'{key} = "{value}"' for key, value in rules.items() if value != "printed"]
     if isinstance(weights, Symmetric):
-        return "\n".join(["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(weights).items())]) + "\n"
-    lines = []
+        lines += ["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(weights).items())]
+        return "\n".join(lines) + "\n"
     for kind in NEIGHBOURS:
         matrix = getattr(weights, kind)
         lines += ["", f"[weights.{kind}]"]
         lines += [f'"{d + 1},{e + 1}" = {matrix[d, e].item()!r}' for d, e in pairs(kind) if matrix[d, e]]
-    return "\n".join(lines[1:]) + "\n"
+    return "\n".join(lines).lstrip() + "\n"
 
 
 def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
@@ -75,10 +93,11 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
 
 _PAPER = {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS}
 _OWN = {
-    name: read_weights({"weights": entry["weights"]}, f"{OWN.name} [{name}]") for name, entry in read_toml(OWN).items()
+    name: read_network({key: one for key, one in entry.items() if key != "command"}, f"{OWN.name} [{name}]", name)
+    for name, entry in read_toml(OWN).items()
 }
 
-PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in (_PAPER | _OWN).items()}
+PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in _PAPER.items()} | _OWN
 """The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once."""
 
 HWS, LDVS, UNCOORDINATED = (PRESETS[name] for name in ("hws", "ldvs", "uncoordinated"))

@@ -1,0 +1,58 @@
+"""Readings of the paper's ambiguous sentences on the network: each a named choice; what is printed is the default."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from hexmj.checks import check_types
+from hexmj.errors import InputError
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How Section 2 is read, where its words and its equations allow more than one network.
+
+    The order of updates, a lag between legs, is `Cruse1998.order`.
+    """
+
+    ipsilateral: Literal["standing", "lasting"] = "standing"
+    """When the anterior leg acts on the PEP (Eq. 4): while it stands, as the factor s_e(t) has it, or all the time:
+    'the value of the influence depends on the position of the distal point of the influencing leg'."""
+    contralateral: Literal["standing", "lasting"] = "standing"
+    """When the contralateral leg acts by mechanism 3, likewise."""
+    cap: Literal["above", "both", "sum"] = "above"
+    """What the 4 mm of Eq. 4 bound: each influence from above, as printed; each between -4 and 4; or the sum over N^3
+    ('the influences of the anterior and contralateral legs') from above."""
+    rear: Literal["sum", "strongest"] = "sum"
+    """What mechanism 1 amounts to where two legs act ('the effects ... come from the ipsilateral rear leg (if it
+    exists) and the contralateral one'): the sum, as Eq. 6 has it, or the strongest."""
+    neutral: Literal["present", "final"] = "present"
+    """Which V_r moves the neutral position P^nr while the insect accelerates: that of Eq. 6, or the desired V_r*."""
+
+    __post_init__ = check_types
+
+
+READINGS = {"printed": Reading(), "lasting": Reading(ipsilateral="lasting")}
+"""Readings by name: to the letter, and with the anterior leg's influence lasting while that leg protracts."""
+
+
+def named_reading(name: str) -> Reading:
+    """A reading by its name.
+
+    Raises:
+        InputError: no such name.
+    """
+    if name not in READINGS:
+        raise InputError(f"reading = {name!r}; valid names: {', '.join(READINGS)}")
+    return READINGS[name]
+
+
+def reading_name(reading: Reading) -> str:
+    """The name of a reading.
+
+    Raises:
+        InputError: it has none.
+    """
+    for name, one in READINGS.items():
+        if one == reading:
+            return name
+    raise InputError(f"{reading} has no name; named ones: {', '.join(READINGS)}")
