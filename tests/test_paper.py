@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS
+from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, READINGS
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import flss, walk
 from hexmj.paper import found_sets as found
@@ -351,3 +351,15 @@ def test_the_numbers_do_not_depend_on_who_measures(tmp_path):
         both = [measure(name, TINY, executor=executor) for name in ("hws", "ideal", "hws footfall")]
     for name, one in zip(("hws", "ideal", "hws footfall"), both, strict=True):
         assert one.identical(measure(name, TINY, tmp_path, threads=1))
+
+
+def test_other_readings_stand_beside(tmp_path):
+    keys = ("hws-late", "hws-regimes", "p2")
+    alone, _ = reproduce(tmp_path / "alone", replace(TINY, reading=READINGS["lasting"]), only=keys[:2])
+    rows, _ = reproduce(tmp_path, TINY, only=keys, beside=("lasting",))
+    assert [row.beside["lasting"].answers for row in rows[1:]] == [row.answers for row in alone]
+    head, line = (tmp_path / "claims.md").read_text().split("| section")[1].splitlines()[0:3:2]
+    assert "ours, walk | ours, start | lasting, walk | lasting, start" in head
+    assert line.count("|") - 2 == head.count("|") - 1
+    with pytest.raises(InputError, match="reading = 'wrong'; valid names: printed, lasting"):
+        reproduce(tmp_path, TINY, only=keys, beside=("wrong",))

@@ -40,6 +40,8 @@ COMMANDS = {
     f" many.{AGAIN.format('search')}",
     "reproduce": "The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms,"
     f" footfall diagrams.{AGAIN.format('run')}",
+    "readings": "Which reading of the paper explains its numbers best: every combination of choices, scored by the"
+    f" claims.{AGAIN.format('run')}",
     "converge": "The same starts at smaller and smaller V_p: does the insect tend to its plan and to the static"
     f" criterion?{AGAIN.format('run')}",
     "terrain": "Steps, gaps, hurdles and rough ground in physics: how often the insect falls once it has reached"

@@ -21,6 +21,8 @@ class Reproduce:
     """Fewer starts and velocities, under a minute; the full protocol takes several."""
     only: tuple[str, ...] | None = None
     """Keys of the claims to judge, without figures; all unless given."""
+    beside: tuple[str, ...] = ()
+    """Readings of the network under which the claims are judged, too, such as 'lasting'; see `hexmj readings`."""
     seed: int = 1998
     """Seed of the random starts; the ideal sets were searched with 0 and 1."""
     out: Path = Path("results/reproduce")
@@ -33,7 +35,7 @@ class Reproduce:
         """Measure, judge, draw, and print the table."""
         from hexmj.paper.protocol import FULL, QUICK
         from hexmj.paper.reproduce import reproduce
-        from hexmj.paper.table import HEADS, claims_json, summary
+        from hexmj.paper.table import claims_json, heads, summary
 
         if self.only == ():
             raise InputError("--only without keys; expected at least one, or no --only for all")
@@ -41,14 +43,20 @@ class Reproduce:
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with progress_bar("reproducing") as progress, self.sweepers.executor() as executor:
             rows, files = reproduce(
-                self.out, protocol, self.only or (), executor=executor, progress=progress, threads=self.sweepers.threads
+                self.out,
+                protocol,
+                self.only or (),
+                self.beside,
+                executor=executor,
+                progress=progress,
+                threads=self.sweepers.threads,
             )
-        settings = {"protocol": asdict(protocol), "only": self.only or ()}
+        settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": self.beside}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return
-        table = new_table(*HEADS)
+        table = new_table(*heads(rows))
         for row in rows:
             table.add_row(*row.cells)
         show("The claims of the 1998 paper", table, *summary(rows), *map(str, files))

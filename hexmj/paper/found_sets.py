@@ -5,12 +5,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
+from hexmj.controllers.cruse1998 import Cruse1998, Reading, Symmetric
+from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.timing import WINDOWS
 
 TABLE = Path(__file__).with_name("ideal.toml")
+PRINTED = Reading()
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class FoundSet:
     command: str
     """Finds it again, with its seed."""
 
+    @property
+    def place(self) -> tuple[str, float, float, Reading]:
+        """What it was searched for; no two sets of a table have the same."""
+        return self.window, self.low, self.high, self.controller.reading
+
 
 @cache
 def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
@@ -37,20 +44,20 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
     """
     table = read_toml(path)
     found = tuple(_read(entry, f"{path.name}, set {i + 1}") for i, entry in enumerate(table.get("set", [])))
-    places = [(one.window, one.low, one.high) for one in found]
+    places = [one.place for one in found]
     if twice := [place for place in places if places.count(place) > 1]:
         raise InputError(f"{path.name} holds two sets for {twice[0]}; expected one for each window and velocity")
     return found
 
 
-def found_set(window: str, low: float, high: float | None = None) -> Cruse1998 | None:
+def found_set(window: str, low: float, high: float | None = None, reading: Reading = PRINTED) -> Cruse1998 | None:
     """The set for one velocity (Problem 1) or a range (Problem 2); None where no search has been made yet."""
-    place = window, low, low if high is None else high
-    return next((one.controller for one in found_sets() if (one.window, one.low, one.high) == place), None)
+    place = window, low, low if high is None else high, reading
+    return next((one.controller for one in found_sets() if one.place == place), None)
 
 
 def _read(entry: dict[str, Any], where: str) -> FoundSet:
-    if unknown := set(entry) ^ {"window", "velocities", "command", "symmetric"}:
+    if unknown := set(entry) - {"reading"} ^ {"window", "velocities", "command", "symmetric"}:
         raise InputError(f"{where}: {min(unknown)} is missing or unknown; see the head of the file")
     if entry["window"] not in WINDOWS:
         raise InputError(f"{where}: window = {entry['window']!r}; valid names: {', '.join(WINDOWS)}")
@@ -63,5 +70,6 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
         valid = ", ".join(sorted(names))
         raise InputError(f"{where}: {min(unknown)} is no parameter of the {form} form; valid: {valid}")
     weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
-    controller = Cruse1998(weights, name=f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}")
+    name, reading = f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}", entry.get("reading")
+    controller = Cruse1998(weights, name=name, reading=named_reading(reading) if reading else PRINTED)
     return FoundSet(entry["window"], velocities[0], velocities[-1], controller, entry["command"])

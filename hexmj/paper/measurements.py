@@ -4,7 +4,8 @@ The outcome of every start is kept, so that curves can be compared on the same s
 afterwards.
 """
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.gaits import PAIRS, limit_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
-from hexmj.paper.late_losses import lost_after
+from hexmj.paper.late_losses import lost_after, lost_at_periods
 from hexmj.starts import draw_starts
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 
@@ -25,6 +26,9 @@ NO_SET = -1
 
 LATE_PERIODS = 5
 """Periods of a single leg oscillator, (AEP_0 - PEP_0) (1 + 1/V), after which Section 5.2 looks again."""
+
+Looks = Literal["steps", "periods"]
+"""It is looked for a loss of static stability after every step, or after every period of a single leg."""
 
 MOMENTS = 1201
 """Of a footfall diagram."""
@@ -38,6 +42,8 @@ def losses(
     stride: Stride,
     acceleration: Acceleration | None,
     late: bool,
+    looks: Looks = "steps",
+    margin: float = 0.0,
     threads: int | None = None,
 ) -> "xr.Dataset":
     """Which starts lose static stability under both windows, (window, start): 1 lost, 0 not, -1 where there is no set.
@@ -50,19 +56,25 @@ def losses(
         stride: of the walks.
         acceleration: Eq. 11.
         late: look only after `LATE_PERIODS`.
+        looks: at every step, or once a period only.
+        margin: by how much S is narrower than ]PEP_0, AEP_0[ at either end [mm].
         threads: one per core unless given.
     """
     import xarray as xr
 
-    starts = draw_starts(n_starts, seed, stride)
+    inner = replace(stride, pep0=stride.pep0 + margin, aep0=stride.aep0 - margin)
+    starts = draw_starts(n_starts, seed, inner)
     lost = np.full((len(WINDOWS), n_starts), NO_SET, dtype=np.int8)
     for one in dict.fromkeys(sets):
         if one is not None:
             rows = [row for row, other in enumerate(sets) if other == one]
             times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
             durations = np.array(times)
-            if late:
-                wait = stride.periods(velocity, LATE_PERIODS)
+            wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
+            if looks == "periods":
+                how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+                lost[rows] = [lost_at_periods(starts, one, velocity, wait, time.item(), **how) for time in times]
+            elif late:
                 lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
             else:
                 how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}

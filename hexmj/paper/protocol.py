@@ -3,12 +3,12 @@
 A measurement is taken velocity by velocity.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
+from hexmj.controllers.cruse1998 import PRESETS, READINGS, Cruse1998, Order, Reading
 from hexmj.paper.found_sets import found_set
-from hexmj.paper.measurements import footfalls, limit_regimes, losses
+from hexmj.paper.measurements import Looks, footfalls, limit_regimes, losses
 from hexmj.paper.obstacles import Answer, losses_after
 from hexmj.starts import SAMPLE
 from hexmj.sweeps import Cell
@@ -16,6 +16,9 @@ from hexmj.timing import WINDOWS, Acceleration, Stride
 
 WIDE = (0.1, 0.7)
 """The range on which the paper could not fit a hard-wired system."""
+
+OWN = {reading: name for name, reading in READINGS.items() if name != "printed"}
+"""Readings under which sets of our own were searched -> what their names begin with, instead of 'own'."""
 
 RANGES = {"wide": WIDE, "hws again": (0.1, 0.45), "ldvs again": (0.1, 0.5)}
 """Problem 2: sets of the table of found sets -> the range W of their search; 'again' are the paper's two problems."""
@@ -49,13 +52,21 @@ class Protocol:
     """Of the gaits; the time step is that of Figs. 5 and 6."""
     acceleration: Acceleration = field(default_factory=Acceleration)
     """Eq. 11, for the accelerated walks and all gaits."""
+    order: Order = "printed"
+    """Order of updates of all networks."""
+    reading: Reading = field(default_factory=Reading)
+    """Reading of all networks."""
+    looks: Looks = "steps"
+    """When it is looked whether a walk is stable (Eq. 7)."""
+    margin: float = 0.0
+    """By how much S is narrower than ]PEP_0, AEP_0[ at either end [mm]."""
 
     def network(self, name: str, window: str, velocity: float) -> Cruse1998 | None:
-        """The controller of any measurement at a velocity.
+        """The network of a measurement at a velocity, as this protocol reads it.
 
         Args:
-            name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window, or 'own', the
-                preset of our own for this velocity alone.
+            name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window and this reading,
+                or 'own', the preset of our own for this velocity alone.
             window: one of `WINDOWS`.
             velocity: V_r.
 
@@ -63,10 +74,12 @@ class Protocol:
             None where no such set is known.
         """
         if name == "ideal":
-            return found_set(window, velocity)
-        if name == "own":
-            return PRESETS.get(f"own-{velocity:g}")
-        return found_set(window, *RANGES[name]) if name in RANGES else PRESETS[name]
+            found = found_set(window, velocity, reading=self.reading)
+        elif name == "own":
+            found = PRESETS.get(f"{OWN.get(self.reading, 'own')}-{velocity:g}")
+        else:
+            found = found_set(window, *RANGES[name], reading=self.reading) if name in RANGES else PRESETS[name]
+        return found and replace(found, order=self.order, reading=self.reading)
 
 
 FULL = Protocol()
@@ -108,6 +121,8 @@ class Losses:
             "stride": protocol.stride,
             "acceleration": protocol.acceleration if self.accelerated else None,
             "late": self.late,
+            "looks": protocol.looks,
+            "margin": protocol.margin,
         }
 
 

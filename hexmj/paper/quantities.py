@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from hexmj.controllers.cruse1998 import Reading
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
 from hexmj.intervals import WILSON_Z, wilson_interval
-from hexmj.paper.found_sets import found_sets
+from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
 
 if TYPE_CHECKING:
@@ -195,6 +196,8 @@ class Weight:
 
     parameter: str
     over: str | None = None
+    reading: Reading = PRINTED
+    """Under which the sets were searched."""
     windowed = True
     needs: tuple[str, ...] = ()
 
@@ -206,7 +209,7 @@ class Weight:
     def points(self, measured: Measured, window: str) -> Iterator[Point]:
         """One for each set."""
         for one in found_sets():
-            if one.window == window and one.low == one.high:
+            if one.window == window and one.low == one.high and one.controller.reading == self.reading:
                 value = getattr(one.controller.weights, self.parameter)
                 if self.over:
                     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,11 +1,12 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from hexmj import results
+from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
@@ -23,7 +24,7 @@ KEPT = "measurements"
 
 
 def reproduce(
-    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), **how: Unpack[Execution]
+    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), beside: Sequence[str] = (), **how: Unpack[Execution]
 ) -> tuple[list[Row], list[Path]]:
     """Measure what the claims need, judge them, draw the figures.
 
@@ -34,16 +35,19 @@ def reproduce(
         out: folder for ``claims.md``, ``claims.json``, figures (PDF, PNG and their data as NetCDF) and measurements.
         protocol: how much is simulated.
         only: keys of the claims to judge, all unless given; figures are drawn only with all.
+        beside: names of readings of the network under which the claims are judged, too.
         how: see `sweeps.Execution`.
 
     Returns:
         The rows in the paper's order, and the files written.
 
     Raises:
-        InputError: a key that no claim has, a folder that cannot be written to, or a damaged measurement.
+        InputError: a key that no claim has, a name that no reading has, a folder that cannot be written to, or a
+            damaged measurement.
     """
     if unknown := [key for key in only if key not in {claim.key for claim in CLAIMS}]:
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
+    readings = {name: named_reading(name) for name in beside}
     results_folder(out, TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
     measured: dict[str, xr.Dataset] = {}
@@ -55,6 +59,12 @@ def reproduce(
     if not only:
         for name, (_, draw) in FIGURES.items():
             files += save_figure(*draw(measured), out / "figures" / name)
+    for name, reading in readings.items():
+        other = replace(protocol, reading=reading)
+        measured = dict(_measurements(_needed(claims, figures=False), other, out / KEPT, how))
+        for key, row in judged.items():
+            judged[key] = replace(row, beside=row.beside | {name: judge(row.claim.under(reading), measured)})
+        files[:2] = _judge_ready(out, claims, measured, judged, protocol)
     return _rows(claims, judged), files
 
 

@@ -1,7 +1,7 @@
 """The table of claims: each judged over both windows, as rows, Markdown and JSON."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from hexmj.paper.claims import IN_PHYSICS, Claim
@@ -23,6 +23,8 @@ class Row:
     claim: Claim
     answers: dict[str, Answer | None]
     """By window; one, under '', where no window is involved; None where a set has not been searched yet."""
+    beside: "dict[str, Row]" = field(default_factory=dict)
+    """The same claim under other readings of the network, by their names."""
 
     @property
     def verdicts(self) -> dict[str, str]:
@@ -47,18 +49,27 @@ class Row:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Section, the paper's words and value, its kind, our answers under 'walk' and 'start', which fits, why."""
-        ours = [
+        """What `heads` names: our answers under each window, those of other readings, which window fits, why."""
+        why = self.claim.why if "differs" in self.verdicts.values() else ""
+        kind = f"{self.kind}: {'; '.join(self.claim.calibrates)}" if self.claim.calibrates else self.kind
+        answered = [cell for row in (self, *self.beside.values()) for cell in row.ours]
+        return self.claim.section, self.claim.words, self.claim.value, kind, *answered, self.fits, why
+
+    @property
+    def ours(self) -> list[str]:
+        """Our answers under each window."""
+        told = [
             f"{verdict}: {_number(answer)}" if answer else verdict
             for verdict, answer in zip(self.verdicts.values(), self.answers.values(), strict=True)
         ]
-        why = self.claim.why if "differs" in self.verdicts.values() else ""
-        ours += [SAME] * (len(WINDOWS) - len(ours))
-        kind = f"{self.kind}: {'; '.join(self.claim.calibrates)}" if self.claim.calibrates else self.kind
-        return self.claim.section, self.claim.words, self.claim.value, kind, *ours, self.fits, why
+        return told + [SAME] * (len(WINDOWS) - len(told))
 
 
-HEADS = ("section", "the paper", "its value", "kind", *(f"ours, {window}" for window in WINDOWS), "fits", "why")
+def heads(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Of the columns of `Row.cells`."""
+    readings = ("ours", *(rows[0].beside if rows else ()))
+    answers = (f"{reading}, {window}" for reading in readings for window in WINDOWS)
+    return "section", "the paper", "its value", "kind", *answers, "fits", "why"
 
 
 def judge(claim: Claim, measured: Measured) -> Row:
@@ -85,10 +96,12 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     size = f"{settings['samples']} times {settings['sample']} starts, gaits from {settings['gait_starts']} starts"
     head = ["# The claims of the 1998 paper", "", f"{size}; seed {settings['seed']}.  An answer is the number that"]
     head[-1] += " strains the rule most, with its 95 % interval, and where."
-    lines = [*head, "", *(f"- {line}" for line in summary(rows)), "", _line(HEADS), _line(["---"] * len(HEADS))]
-    lines += [_line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
-    lines += ["", "## Rules and commands", "", _line(("the paper", "agrees if", "command")), _line(["---"] * 3)]
-    lines += [_line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
+    lines = [*head, "", *(f"- {one}" for one in summary(rows)), ""]
+    lines += _beside(rows)
+    lines += [line(heads(rows)), line(["---"] * len(heads(rows)))]
+    lines += [line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
+    lines += ["", "## Rules and commands", "", line(("the paper", "agrees if", "command")), line(["---"] * 3)]
+    lines += [line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
     lines += ["", "## Judged in physics", "", "What a plan knows nothing of; the README has the answers.", ""]
     lines += [f"- {name} (Section 6): {told}; `{command}`" for name, (command, told) in IN_PHYSICS.items()]
     return "\n".join(lines) + "\n"
@@ -106,8 +119,20 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
             for window, answer in row.answers.items()
         }
         how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": claim.command}
-        claims.append(told | {"ours": ours} | how)
+        beside = {
+            name: {window or "any": one for window, one in other.verdicts.items()} for name, other in row.beside.items()
+        }
+        claims.append(told | {"ours": ours, "beside": beside} | how)
     return {"claims": claims, "summary": summary(rows), "protocol": settings}
+
+
+def _beside(rows: Sequence[Row]) -> list[str]:
+    """Sentences that count the verdicts under the other readings."""
+    lines = []
+    for name in rows[0].beside if rows else ():
+        others = [row.beside[name] for row in rows]
+        lines += [f"- reading {name}, {one}" for one in summary(others)]
+    return [*lines, ""] if lines else []
 
 
 def _counts(verdicts: Sequence[str]) -> str:
@@ -122,5 +147,6 @@ def _number(answer: Answer) -> str:
     return f"{answer.value:.4f}{interval} at {answer.where}"
 
 
-def _line(cells: Sequence[str]) -> str:
+def line(cells: Sequence[str]) -> str:
+    """A row of a table in Markdown."""
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,71 @@
+"""`hexmj readings`."""
+
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+from tyro.conf import OmitArgPrefixes
+
+from hexmj.cli.manifest import MANIFEST, save_manifest
+from hexmj.cli.options import Sweepers
+from hexmj.cli.tables import new_table, print_json, save_figure, show
+from hexmj.errors import InputError
+from hexmj.progress import progress_bar
+from hexmj.results import results_folder, save_dataset, save_text
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Options of `hexmj readings`, which `main.COMMANDS` describes."""
+
+    only: tuple[str, ...] | None = None
+    """Named readings alone ('printed', 'lasting'); every combination of choices unless given."""
+    best: int = 12
+    """How many of them are looked at more closely, with ideal sets searched under each."""
+    starts: int = 300
+    """Random starts of each curve."""
+    gait_starts: int = 20
+    """Random starts of each gait."""
+    seed: int = 1998
+    """Seed of the random starts."""
+    out: Path = Path("results/readings")
+    """Folder for the page (Markdown), the scores (NetCDF), the figure and what was scored."""
+    json: bool = False
+    """Print one JSON object on standard output, nothing else."""
+    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
+
+    def run(self) -> None:
+        """Score, rank, draw, and print the best."""
+        from hexmj.controllers.cruse1998.readings import named_reading
+        from hexmj.paper.readings import combinations, compare_readings, ranking
+        from hexmj.paper.readings_figure import readings_figure
+        from hexmj.paper.readings_table import HEADS, readings_markdown, readings_rows
+        from hexmj.paper.scores import SCORING
+
+        if self.only == ():
+            raise InputError("--only without names; expected at least one, or no --only for all")
+        protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
+        readings = list(combinations(protocol))
+        if self.only:
+            named = [named_reading(name) for name in dict.fromkeys(("printed", *self.only))]
+            readings = [replace(protocol, reading=one) for one in named]
+        if not 1 <= self.best <= len(readings):
+            raise InputError(f"--best = {self.best}; expected 1 to {len(readings)}, the number of readings")
+        out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
+        with progress_bar("reading") as progress, self.sweepers.executor() as executor:
+            how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads}
+            scores = compare_readings(readings, self.best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
+        files = [
+            save_text(readings_markdown(scores, readings), out / "readings.md"),
+            save_dataset(scores, out / "readings.nc"),
+            save_figure(readings_figure(scores, readings), out / "readings.png"),
+        ]
+        settings = {"protocol": asdict(protocol), "only": self.only or (), "best": self.best}
+        files.append(save_manifest(self, settings, files, out / MANIFEST))
+        rows = readings_rows(scores, ranking(scores).tolist()[: self.best])
+        if self.json:
+            print_json({"readings": [dict(zip(HEADS, row, strict=True)) for row in rows], "files": files})
+            return
+        table = new_table(*HEADS)
+        for row in rows:
+            table.add_row(*row)
+        show("Readings of the 1998 paper", table, *map(str, files))

@@ -1,0 +1,149 @@
+"""Which reading of the paper explains its numbers best: every combination of choices, scored by the claims.
+
+First every combination, with the constants as inferred and refined; then the best of them with the choices that only
+acceleration or the measure knows of, and with ideal sets searched under each.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack, get_args, get_type_hints
+
+import numpy as np
+
+from hexmj.controllers.cruse1998 import Order, Reading
+from hexmj.legs import CENTRED, FIG1
+from hexmj.paper.claims import INFERRED_FROM
+from hexmj.paper.protocol import Protocol
+from hexmj.paper.scores import score, score_as_is, score_of_ideals
+from hexmj.sweeps import Cell, Execution, run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "order": get_args(Order),
+    **{name: get_args(hint) for name, hint in get_type_hints(Reading).items() if name != "neutral"},
+}
+"""Choices that every walk depends on, the printed one first; all are combined."""
+
+ASIDE: dict[str, tuple[Any, ...]] = {
+    "neutral": ("present", "final"),
+    "looks": ("steps", "periods"),
+    "margin": (0.0, 1.0),
+}
+"""Choices of which only acceleration or the measure knows: combined for the best."""
+
+CALIBRATED = frozenset(key for keys in INFERRED_FROM.values() for key in keys)
+
+
+def combinations(protocol: Protocol) -> Iterator[Protocol]:
+    """A protocol in every combination of `CHOICES`, the printed one first."""
+    for chosen in product(*CHOICES.values()):
+        yield read(protocol, dict(zip(CHOICES, chosen, strict=True)))
+
+
+def read(protocol: Protocol, choices: dict[str, Any]) -> Protocol:
+    """A protocol with some of its choices, of `CHOICES` and `ASIDE`, made otherwise."""
+    of_reading = {name: one for name, one in choices.items() if hasattr(protocol.reading, name)}
+    of_protocol = {name: one for name, one in choices.items() if name not in of_reading}
+    return replace(protocol, **of_protocol, reading=replace(protocol.reading, **of_reading))
+
+
+def chosen(protocol: Protocol, name: str) -> Any:
+    """A choice of a protocol."""
+    return getattr(protocol.reading if hasattr(protocol.reading, name) else protocol, name)
+
+
+def title(protocol: Protocol) -> str:
+    """What is not read as printed, in words."""
+    other = [name for name, choices in (CHOICES | ASIDE).items() if chosen(protocol, name) != choices[0]]
+    return ", ".join(f"{name} {chosen(protocol, name)}" for name in other) or "as printed"
+
+
+def compare_readings(
+    readings: Sequence[Protocol], best: int = 12, folder: Path | None = None, **how: Unpack[Execution]
+) -> "xr.Dataset":
+    """Scores of all readings, and a closer look at the best.
+
+    Args:
+        readings: how much is simulated, and how the paper is read; the first as printed.
+        best: how many of them are looked at more closely.
+        folder: keeps every score; a stopped run goes on where it was.
+        how: see `sweeps.Execution`.
+
+    Returns:
+        Over reading, constants, claim and window: `agrees` and `miss`, see `scores.judged`, and the refined constants.
+        Of the best readings, over `best` and `aside`: `aside_agrees`; and over `ideal_claim`: `ideal_agrees`, with
+        `ideal_flss` over `ideal_velocity`.
+    """
+    import xarray as xr
+
+    first = run([Cell(title(one), score, {"protocol": one}) for one in readings], folder, **how)
+    scores = xr.concat(first, xr.Variable("reading", [title(one) for one in readings]))
+    order = ranking(scores)[:best]
+    closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
+    names = scores.reading.values[order]
+    return scores.assign(look_closer(closest, folder, **how)).assign_coords(best=names)
+
+
+def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
+    """Readings with the choices aside, and with ideal sets searched under each; see `compare_readings`."""
+    import xarray as xr
+
+    asides = [dict(zip(ASIDE, one, strict=True)) for one in product(*ASIDE.values())][1:]
+    looked = [read(one, aside) for one in readings for aside in asides]
+    judged = run([Cell(title(one), score_as_is, {"protocol": one}) for one in looked], folder, **how)
+    rows = [xr.concat(judged[i : i + len(asides)], "aside").agrees for i in range(0, len(judged), len(asides))]
+    names = ["; ".join(f"{name} {one}" for name, one in aside.items() if one != ASIDE[name][0]) for aside in asides]
+    searched = run([Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}) for one in readings], folder, **how)
+    ideal = xr.concat(searched, "best").rename(claim="ideal_claim")
+    closer = {"aside_agrees": xr.concat(rows, "best").assign_coords(aside=names)}
+    return xr.Dataset(closer | {"ideal_agrees": ideal.agrees, "ideal_flss": ideal.flss})
+
+
+def refined_as(protocol: Protocol, scored: "xr.Dataset") -> Protocol:
+    """A protocol with the constants that were found for it."""
+    lengths = {name: scored[name].item() for name in ("aep0", "pep0", "pep_min")}
+    stride = replace(protocol.stride, **lengths, geometry=CENTRED if scored.centred.item() else FIG1)
+    return replace(protocol, stride=stride, gait_stride=replace(stride, dt=protocol.gait_stride.dt))
+
+
+def agreeing(scores: "xr.Dataset", held_out: bool = True) -> "xr.DataArray":
+    """How many claims agree, of those that were held out or of the calibrated ones, over the other axes."""
+    kept = [key for key in scores.claim.values if (key not in CALIBRATED) == held_out]
+    return (scores.agrees.sel(claim=kept) == 1).sum("claim")
+
+
+def ranking(scores: "xr.Dataset") -> np.ndarray:
+    """Places of the readings, (reading,), the best first.
+
+    More held-out claims agree, under the window and with the constants that fit better; among equals, less is missed.
+    """
+    count = agreeing(scores).max(("constants", "window")).values
+    miss = scores.miss.sum("claim").min(("constants", "window")).values
+    return np.lexsort((miss, -count))
+
+
+def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray":
+    """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, window)."""
+    import xarray as xr
+
+    count = agreeing(scores).max("constants")
+    rows = {}
+    for name, choices in CHOICES.items():
+        of = np.array([choices.index(chosen(one, name)) for one in readings])
+        for i in sorted(set(of.tolist())):
+            rows[f"{name} {choices[i]}"] = count.isel(reading=np.flatnonzero(of == i)).mean("reading")
+    values = np.stack([row.values for row in rows.values()])
+    return xr.DataArray(values, {"choice": list(rows), "window": count.window}, ("choice", "window"))
+
+
+def gained(scores: "xr.Dataset", reading: str, window: str) -> tuple[list[str], list[str]]:
+    """Held-out claims that agree under a reading but not as printed, and the reverse; constants as inferred."""
+    kept = [key for key in scores.claim.values if key not in CALIBRATED]
+    at = scores.agrees.sel(claim=kept, window=window, constants="inferred") == 1
+    one, printed = at.sel(reading=reading).values, at.sel(reading="as printed").values
+    keys = np.array(kept)
+    return keys[one & ~printed].tolist(), keys[printed & ~one].tolist()

@@ -1,0 +1,56 @@
+"""The comparison of readings as a figure: what each choice changes."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.paper.protocol import Protocol
+from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, chosen
+from hexmj.studies.drawing import tidy
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+WORDS = {
+    "order": "order\nof updates",
+    "ipsilateral": "anterior leg\nacts (Eq. 4)",
+    "contralateral": "contralateral leg\nacts (Eq. 4)",
+    "cap": "what 4 mm\nbound (Eq. 4)",
+    "rear": "mechanism 1\nof two legs",
+}
+COLOURS = {"walk": "#1b6ca8", "start": "#e08e1b"}
+
+
+def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Figure":
+    """Held-out claims that agree, a dot for every reading and window, by each choice; bars are means."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    panels = figure.subplots(1, len(CHOICES), sharey=True, width_ratios=[len(one) for one in CHOICES.values()])
+    count, shift = agreeing(scores).max("constants"), dict(zip(COLOURS, (-0.13, 0.13), strict=True))
+    for axes, (name, choices) in zip(panels, CHOICES.items(), strict=True):
+        of = np.array([choices.index(chosen(one, name)) for one in readings])
+        for window, colour in COLOURS.items():
+            values = count.sel(window=window).values
+            for i in sorted(set(of.tolist())):
+                here = values[of == i]
+                spread = np.linspace(-0.09, 0.09, len(here))[np.argsort(np.argsort(here, kind="stable"))]
+                axes.plot(i + shift[window] + spread, here, ".", color=colour, alpha=0.45, markersize=5)
+                axes.hlines(
+                    here.mean(), i + shift[window] - 0.12, i + shift[window] + 0.12, color=colour, linewidth=2.4
+                )
+        axes.set_xticks(range(len(choices)), choices)
+        axes.set(title=WORDS[name], xlim=(-0.5, len(choices) - 0.5))
+        axes.title.set_fontsize(10)
+        tidy(axes)
+    held = sum(key not in CALIBRATED for key in scores.claim.values)
+    panels[0].set_ylabel(f"claims that agree, of {held} held out")
+    dots = [
+        Line2D([], [], linestyle="", marker=".", color=one, label=f"window {name}") for name, one in COLOURS.items()
+    ]
+    figure.legend(handles=dots, frameon=False, fontsize=9, loc="outside lower center", ncols=2)
+    figure.suptitle(f"{len(readings)} readings of the 1998 paper; the printed choice stands first", fontsize=11)
+    return figure

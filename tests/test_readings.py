@@ -1,0 +1,152 @@
+"""Readings of the paper: all combinations, what each may and may not change, and how they are ranked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from hexmj.cli.main import options_of
+from hexmj.controllers.cruse1998 import HWS, LDVS, READINGS, Reading
+from hexmj.errors import InputError
+from hexmj.legs import CENTRED
+from hexmj.measures.kinematic import walk
+from hexmj.paper.claims import CLAIMS
+from hexmj.paper.measurements import losses
+from hexmj.paper.readings import (
+    CALIBRATED,
+    CHOICES,
+    agreeing,
+    combinations,
+    effects,
+    gained,
+    ranking,
+    read,
+    refined_as,
+    title,
+)
+from hexmj.paper.readings_figure import readings_figure
+from hexmj.paper.readings_table import readings_markdown
+from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, refined
+from hexmj.starts import draw_starts
+from hexmj.timing import Acceleration, Stride
+
+SMALL = replace(REFINING, sample=20, gait_starts=2)
+STRIDE = Stride()
+
+
+def test_all_choices_are_combined_and_what_is_printed_comes_first():
+    readings = list(combinations(SCORING))
+    assert len({(one.order, one.reading) for one in readings}) == len(readings) == 3 * 2 * 2 * 3 * 2
+    assert readings[0] == SCORING
+    assert title(readings[0]) == "as printed"
+    assert replace(SCORING, reading=READINGS["lasting"]) in readings
+    assert len({title(one) for one in readings}) == len(readings)
+
+
+def test_where_the_claims_come_from_that_decide():
+    keys = {claim.key for claim in CLAIMS}
+    assert keys >= {*REFINED_BY}
+    assert {*REFINED_BY} <= CALIBRATED
+
+
+@pytest.mark.parametrize("controller", [HWS, LDVS])
+def test_what_only_acceleration_knows_changes_no_other_walk(controller):
+    starts, final = draw_starts(20, 3), replace(controller, reading=Reading(neutral="final"))
+    one, other = (walk(starts, as_read, 0.5, 60.0).x for as_read in (controller, final))
+    assert np.array_equal(one, other)
+    faster = Acceleration(rate=0.01)
+    one, other = (walk(starts, as_read, 0.5, 60.0, acceleration=faster).x for as_read in (controller, final))
+    assert np.array_equal(one, other) == (controller is HWS)  # whose neutral positions hang on no velocity
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("acceleration", [None, Acceleration(rate=0.005)])
+def test_who_looks_once_a_period_sees_fewer_losses(late, acceleration):
+    def lost(looks):
+        how = {"stride": STRIDE, "acceleration": None if late else acceleration, "late": late, "looks": looks}
+        return losses(0.6, (HWS, HWS), 300, 5, **how).lost.values
+
+    seldom, always = lost("periods"), lost("steps")
+    assert (seldom <= always).all()
+    assert not seldom[1].any() or acceleration  # the window 'start' is shorter than a period
+    assert 0 < seldom[0].sum() < always[0].sum()
+
+
+def test_a_margin_leaves_out_the_ends_of_s():
+    def lost(margin):
+        return losses(0.3, (LDVS, LDVS), 1000, 5, STRIDE, None, False, margin=margin).lost.values
+
+    assert not np.array_equal(lost(0.0), lost(1.0))
+    with pytest.raises(InputError):
+        lost(10.0)
+
+
+def test_refined_constants_miss_no_more(monkeypatch):
+    monkeypatch.setattr("hexmj.paper.scores.REFINING", SMALL)
+    monkeypatch.setattr("hexmj.paper.scores.ROUNDS", (({"aep0": 9.0, "pep0": -9.0},), ({"pep_min": -25.0},)))
+    better, claims = refined(SMALL, threads=1), [claim for claim in CLAIMS if claim.key in REFINED_BY]
+    before, after = (judged(claims, one, threads=1).miss.sum("claim").min().item() for one in (SMALL, better))
+    assert after <= before
+    assert replace(better, stride=STRIDE, gait_stride=STRIDE) == SMALL
+
+
+def scores_of(readings, agrees):
+    """Made up: `agrees` says for each reading which of four claims do."""
+    keys = ["hws-late", "ldvs-late", "hws-majority", "hws-0.4"]
+    values = np.array(agrees, dtype=np.int8)[:, np.newaxis, :, np.newaxis] * np.ones((1, 2, 1, 2), dtype=np.int8)
+    told = {"agrees": (("reading", "constants", "claim", "window"), values)}
+    told |= {"miss": (("reading", "constants", "claim", "window"), np.where(values == 1, 0.0, 0.25))}
+    lengths = {
+        name: ("reading", np.full(len(readings), one))
+        for name, one in (("aep0", 9.0), ("pep0", -9.0), ("pep_min", -25.0), ("centred", True))
+    }
+    axes = {"claim": keys, "window": ["walk", "start"], "constants": ["inferred", "refined"]}
+    return xr.Dataset(told | lengths, axes | {"reading": [title(one) for one in readings]})
+
+
+def test_held_out_claims_rank_and_calibrated_ones_do_not():
+    readings = [SCORING, replace(SCORING, reading=READINGS["lasting"]), replace(SCORING, order="undelayed")]
+    scores = scores_of(readings, [[1, 0, 0, 1], [1, 1, 1, 0], [1, 0, 1, -1]])
+    assert ranking(scores).tolist() == [1, 2, 0]
+    assert agreeing(scores).sel(window="walk", constants="inferred").values.tolist() == [1, 3, 2]
+    assert agreeing(scores, held_out=False).sel(window="walk", constants="inferred").values.tolist() == [1, 0, 0]
+    assert gained(scores, "ipsilateral lasting", "walk") == (["ldvs-late", "hws-majority"], [])
+    changed = effects(scores, readings).sel(window="start")
+    assert changed.sel(choice="ipsilateral lasting").item() == 3
+    assert changed.sel(choice="order printed").item() == 2
+    better = refined_as(readings[1], scores.isel(reading=1))
+    assert better.stride == better.gait_stride == Stride(aep0=9.0, pep0=-9.0, pep_min=-25.0, geometry=CENTRED)
+    closer = {"aside_agrees": (("best", "aside", "claim", "window"), np.ones((1, 1, 4, 2), dtype=np.int8))}
+    closer |= {"ideal_agrees": (("best", "ideal_claim", "window"), np.ones((1, 2, 2), dtype=np.int8))}
+    closer |= {"ideal_flss": (("best", "ideal_velocity"), np.full((1, 1), 0.0123))}
+    told = {"best": ["ipsilateral lasting"], "aside": ["margin 1.0"], "ideal_velocity": [0.1]}
+    page = readings_markdown(scores.assign(closer).assign_coords(told), readings)
+    assert "| ipsilateral lasting | 3 / 3 | 3 / 3 | 0 / 0 | 0.25 / 0.25 | 9, -9, -25, centred |" in page
+    assert "gains ldvs-late, hws-majority; loses none" in page
+    assert "| ipsilateral lasting | 2 of 2 | 0.0123 |" in page
+    assert len(readings_figure(scores, readings).axes) == len(CHOICES)
+
+
+def test_choices_are_read_and_titled():
+    one = read(SCORING, {"order": "undelayed", "cap": "sum", "looks": "periods", "margin": 1.0})
+    assert title(one) == "order undelayed, cap sum, looks periods, margin 1.0"
+    assert (one.order, one.reading, one.looks, one.margin) == ("undelayed", Reading(cap="sum"), "periods", 1.0)
+
+
+@pytest.mark.parametrize(
+    "words", [["--only", "wrong"], ["--best", "0"], ["--only", "printed", "--best", "2"], ["--only"]]
+)
+def test_bad_options_are_refused(words, tmp_path):
+    with pytest.raises(InputError, match=r"expected|valid names"):
+        options_of(["readings", *words, "--out", str(tmp_path)]).run()
+
+
+def test_command(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("hexmj.paper.scores.ROUNDS", ())
+    monkeypatch.setattr("hexmj.paper.scores.IDEAL", replace(IDEAL, budget=12))
+    monkeypatch.setattr("hexmj.paper.readings.ASIDE", {"margin": (0.0, 1.0)})
+    sizes = ["--starts", "10", "--gait-starts", "2", "--best", "1", "--only", "printed"]
+    options_of(["readings", *sizes, "--out", str(tmp_path)]).run()
+    assert "as printed" in capsys.readouterr().out
+    assert {"readings.md", "readings.nc", "readings.png", "manifest.json"} <= {one.name for one in tmp_path.iterdir()}
