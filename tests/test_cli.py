@@ -418,6 +418,10 @@ NONSENSE = [
     (["flss", "--window", "1e300"], "at most"),
     (["flss", "--starts", "100000000000000"], "at most 100000000"),
     (["flss", "--physical", "--contact-gap", "-1"], "contact_gap = -1.0; expected 0 to 1000 ms"),
+    *(
+        ([*words, "--contact-gap", "5"], "--contact-gap = 5 with falls only; expected it where a polygon is measured")
+        for words in (["flss", "--physical"], ["terrain"], ["disturb"], ["search", "--physical"])
+    ),
     (["flss", "--pep-min", "5"], "hexmj: pep_min = 5.0, pep0 = -10.0, aep0 = 10.0 mm; expected"),
     (["flss", "--model", "x" * 400], "neither one of hws, ldvs"),
     (["flss", "--out", "results/flss/manifest.json"], "is a file; expected a folder"),

@@ -49,6 +49,7 @@ class Flss(WalkingCommand):
         if not self.physical:
             self.refuse_physical("without --physical")
         controller = self.controlled.controller(self.model)
+        self.refuse_contact_gap(controller)
         if self.out:
             results_folder(self.out, ("flss.nc", "flss.png", MANIFEST))
         table = self._measured(controller)

@@ -78,12 +78,13 @@ class Search(WalkingCommand):
 
         self._check()
         problem, effort = self._problem(), self._effort()
+        beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
+        self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
         out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", MANIFEST))
         with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
-        beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
         settings = {
             "problem": problem.settings(),
