@@ -1,6 +1,7 @@
 """The search: laws of the paper's evolutionary algorithm, known minima, resuming, and what a damaged file does."""
 
 import math
+import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -227,6 +228,31 @@ def test_the_fields_of_a_controller_are_searched():
         assert found.history.parameter.values.tolist() == ["good", "idle"]
         assert found.cost == 0.0 < expected[0]
         assert abs(found.vector[0] - 3.0) < 2.0
+
+
+SCRATCH = np.zeros(1)
+"""What careless controllers share."""
+
+
+@dataclass(frozen=True)
+class Careless(Pace):
+    """Its plans go through an array of this module."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        def step(v: np.ndarray) -> Step:
+            SCRATCH[0] = self.good
+            time.sleep(1e-3)  # for other threads
+            return Step(starts, starts < 10.0 * SCRATCH[0])
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+def test_candidates_that_share_an_array_of_their_module_are_walked_one_after_the_other():
+    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, window=1.0), 50, 0)
+    vectors = np.array([[good, 0.0] for good in (0.5, 1.0, 0.0, 2.0)])
+    alone = [sample.costs(vector[None])[0] for vector in vectors]
+    assert len(set(alone)) > 2
+    assert sample.costs(vectors, threads=4).tolist() == alone
 
 
 @dataclass(frozen=True)
