@@ -431,6 +431,17 @@ def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(
     assert kept.read_bytes().startswith(before)
 
 
+def test_only_candidates_of_this_search_count_as_known(tmp_path):
+    first, second = (Effort(one, budget=30, starts=20, refine_budget=0) for one in ("evolution", "cmaes"))
+    rows = [
+        {row.tobytes() for row in search(PROBLEM, one, folder=tmp_path).history.candidate.values}
+        for one in (first, second)
+    ]
+    (kept,) = tmp_path.iterdir()
+    kept.write_text("".join(kept.read_text().splitlines(keepends=True)[: 1 + len(rows[0])]))
+    assert search(PROBLEM, second, folder=tmp_path).replayed == len(rows[0] & rows[1]) < len(rows[1]) / 2
+
+
 def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_alone(tmp_path):
     effort = Effort(budget=30, starts=20, refine_budget=0)
     whole = search(PROBLEM, effort, folder=tmp_path)
