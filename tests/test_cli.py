@@ -360,6 +360,24 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     assert "share" in text and "usual" in text
 
 
+def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"
+    words = ["search", "--velocity", 0.4, "--window", "start", "--starts", 20, "--budget", 10, "--refine-budget", 0]
+    words += ["--verdict-starts", 20]
+    assert run(*words, "--form", form, "--out", first)[0] == 0
+    found = first / "found.toml"
+    found.write_text(found.read_text() + 'name = "gewählt"\n')
+    for option in (["--form", found], ["--form", form, "--begin", found]):
+        code, _, error = run(*words, *option, "--out", first)
+        assert code == 2
+        assert "the search begins with found.toml there; expected another folder" in error
+    assert run(*words, "--form", found, "--out", again)[0] == 0
+    one = hexmj.load_controller(str(again / "found.toml"))
+    assert type(one).__name__ == "Waits"
+    assert one.name == "gewählt"
+
+
 NONSENSE = [
     (["reproduce", "--only", "nothing"], "claim 'nothing'; valid keys: "),
     (["reproduce", "--quick", "--seed", "-1"], "seed = -1"),
