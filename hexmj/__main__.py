@@ -20,11 +20,15 @@ def main() -> None:
         from hexmj.cli.main import main as command
 
         command()
-    except (KeyboardInterrupt, ImportError):
-        if not _HEARD:
+    except (KeyboardInterrupt, ImportError, SystemExit) as error:
+        told = isinstance(error, SystemExit)
+        if not _HEARD or (told and error.code != 130):
             raise
-        print("hexmj: stopped", file=sys.stderr, flush=True)
-        os._exit(130)  # half-imported modules may not survive the interpreter's own end
+        for one in STOPS:
+            signal.signal(one, signal.SIG_IGN)
+        if not told:
+            print("hexmj: stopped", file=sys.stderr, flush=True)
+        os._exit(130)  # half-imported modules, or one more Ctrl-C, may not survive the interpreter's own end
 
 
 def _stop(number: int, frame: Any) -> None:

@@ -43,9 +43,10 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
 @pytest.mark.parametrize("module", ["tyro", "numpy", "mujoco"])
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_while_it_is_imported(by, module):
-    """While a module that the command needs is being looked for."""
+    """While a module that the command needs is being looked for; and once more as the program ends."""
     script = (
-        "import os, sys\n"
+        "import atexit, os, sys\n"
+        f"atexit.register(os.kill, os.getpid(), {int(by)})\n"
         "class Stop:\n"
         "    def find_spec(self, name, *_):\n"
         f"        if name == {module!r}: os.kill(os.getpid(), {int(by)})\n"
