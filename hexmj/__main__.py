@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from threading import Timer
 from typing import Any
 
 STOPS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
@@ -13,6 +14,7 @@ _HEARD: list[int] = []
 
 def main() -> None:
     """Run the command line; Ctrl-C, SIGTERM and a terminal that closes stop it, exit code 130."""
+    sys.unraisablehook = _unheard
     try:
         for one in STOPS:
             if signal.getsignal(one) != signal.SIG_IGN:  # as `nohup` has it
@@ -35,6 +37,14 @@ def _stop(number: int, frame: Any) -> None:
     """As Ctrl-C does; some modules make an ImportError of it while they are imported."""
     _HEARD.append(number)
     raise KeyboardInterrupt
+
+
+def _unheard(ignored: Any) -> None:
+    """A stop that C code swallows, as while numba loads what it has compiled, comes once more."""
+    if _HEARD and ignored.exc_type is KeyboardInterrupt:
+        Timer(0.1, os.kill, (os.getpid(), _HEARD[-1])).start()
+    else:
+        sys.__unraisablehook__(ignored)
 
 
 if __name__ == "__main__":

@@ -59,6 +59,24 @@ def test_while_it_is_imported(by, module):
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 
+def test_while_c_code_calls_back():
+    """As numba does while it loads compiled code; what such a callback raises goes no farther."""
+    script = (
+        "import ctypes, os, sys\n"
+        "callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), 2))\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'mujoco':\n"
+        "            callback()\n"
+        "from hexmj.__main__ import main\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "main()"
+    )
+    words = [sys.executable, "-c", script, "flss", "--physical", "--starts", "5000"]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
+
+
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
 def test_while_a_film_is_written(tmp_path, by, group):
     stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
