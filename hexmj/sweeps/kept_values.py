@@ -42,6 +42,8 @@ class KeptValues:
             self._begin(self._path, record)
         self._held = frozenset(self._values)
         self._replayed = set[bytes]()
+        self.known = len(self._held)
+        """Values that the file held."""
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """The values, (row,), of rows (row, number)."""
