@@ -279,7 +279,7 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, m
     monkeypatch.setattr("hexmj.search.stages.refine", stop)
     code, out, error = run(*SEARCH, "--out", tmp_path)
     assert (code, out) == (130, "")
-    assert error.endswith("hexmj: stopped\n")
+    assert error.endswith("hexmj: stopped; what is finished is kept. Repeat the command to go on\n")
     (kept,) = (tmp_path / "evaluations").glob("population-*.jsonl")
     assert len(kept.read_text().splitlines()) == 1 + 37
 
@@ -543,7 +543,9 @@ def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, t
 def test_check_controller_says_what_is_wrong(run, tmp_path):
     code, out, _ = run("check-controller", "ldvs")
     assert code == 0
-    assert all(line.startswith("well   ") for line in out.splitlines())
+    *laws, last = out.splitlines()
+    assert all(line.startswith("well   ") for line in laws)
+    assert last.startswith("note   sliding: ")
     wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
     (tmp_path / "mine.py").write_text(wrong)
     code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")

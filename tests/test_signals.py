@@ -36,7 +36,7 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
     finally:
         running.kill()
     assert running.returncode == 130, error
-    assert error.strip() == b"hexmj: stopped"
+    assert error.startswith(b"hexmj: stopped") and error.count(b"\n") == 1
     assert out == b""
 
 
