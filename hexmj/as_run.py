@@ -3,7 +3,6 @@
 They are noted as modules run, from the first import of this package on; those that ran before are read then.
 """
 
-import hashlib
 import os
 import re
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from hexmj.errors import InputError
+from hexmj.files import digest
 
 _NOT_ITS_USERS = tuple(
     f"{folder}{os.sep}"
@@ -48,7 +48,7 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
     """
     if (versions := _RUN.get(str(file))) is None:
         return None
-    meant = [one for one in versions if hashlib.sha256(one).hexdigest().startswith(stamp)]
+    meant = [one for one in versions if digest(one).startswith(stamp)]
     if len(meant) != 1:
         raise InputError(f"{file} was edited while this program used it; start it again")
     return meant[0]

@@ -119,6 +119,30 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
+def read_bytes(path: Path) -> bytes:
+    """What a file holds.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    with opened(path) as file:
+        return file.read()
+
+
+def digest_of(path: Path) -> str:
+    """Of a file as it is now.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return digest(read_bytes(path))
+
+
+def digest(content: bytes) -> str:
+    """Of some bytes: the first 12 digits of their SHA-256."""
+    return hashlib.sha256(content).hexdigest()[:12]
+
+
 def read_text(path: Path, most: int = 1_000_000) -> str:
     """A text in UTF-8, with a byte-order mark or without.
 

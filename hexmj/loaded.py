@@ -5,7 +5,6 @@ so pickle, which knows classes and functions by the names of their modules, find
 same file; and an edited file is another module, never mistaken for the one that is already loaded.
 """
 
-import hashlib
 import os
 import sys
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from types import ModuleType
 from urllib.parse import quote_from_bytes, unquote_to_bytes
 
 from hexmj.errors import InputError
+from hexmj.files import digest
 
 __path__: list[str] = []
 """Makes this module a package: its modules are the loaded files."""
@@ -31,7 +31,7 @@ def importable(path: str | Path) -> ModuleType:
     """
     path = Path(path).absolute()
     try:
-        return import_module(module_name(path, _digest(path)))
+        return import_module(module_name(path, digest(path.read_bytes())))
     except OSError as error:
         raise InputError(f"{path} cannot be loaded: {error.strerror or error}") from None
     except InputError:
@@ -45,10 +45,6 @@ def module_name(path: Path, stamp: str) -> str:
     return f"{__name__}.{quote_from_bytes(os.fsencode(path), safe='').replace('.', '%2E')}@{stamp}"
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-
-
 class _Source(SourceLoader):
     """Runs a file as it is named; writes no bytecode beside it."""
 
@@ -59,8 +55,9 @@ class _Source(SourceLoader):
         return Path(os.fsdecode(path)).read_bytes()
 
     def exec_module(self, module: ModuleType) -> None:
-        if not module.__name__.endswith(f"@{_digest(Path(self.get_filename(module.__name__)))}"):
-            raise InputError(f"{self.get_filename(module.__name__)} was edited while it was in use; start again")
+        path = self.get_filename(module.__name__)
+        if not module.__name__.endswith(f"@{digest(self.get_data(path))}"):
+            raise InputError(f"{path} was edited while it was in use; start again")
         super().exec_module(module)
 
 

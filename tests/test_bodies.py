@@ -25,6 +25,7 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
 from hexmj.errors import InputError
 from hexmj.legs import FIG1
+from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
@@ -33,6 +34,7 @@ from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.starts import draw_starts
+from hexmj.timing import Stride
 from other_bodies import found, renamed
 from test_inverse_kinematics import any_hexapod
 
@@ -320,6 +322,28 @@ def test_a_body_of_other_names_is_recorded_and_filmed(longer: Body, tmp_path: Pa
         with pytest.raises(InputError, match="of the body 'stretched', not of 'stick_insect'"):
             render([recording], tmp_path / "other.mp4", film)
     assert read_film(tmp_path / "film.mp4")[0].shape == (1, 120, 320, 3)
+
+
+def test_a_body_is_filmed_by_its_own_cameras_and_without_looks(tmp_path: Path):
+    tree = ElementTree.fromstring(STICK_INSECT.text())
+    assets = found(tree, "asset")
+    for one in [*assets.findall("texture"), *assets.findall("material")]:
+        assets.remove(one)
+    for element in tree.iter():
+        element.attrib.pop("material", None)
+        if element.get("name") == "side":
+            element.set("name", "eye")
+    (tmp_path / "plain.xml").write_text(ElementTree.tostring(tree, encoding="unicode"))
+    body = replace(STICK_INSECT, name="plain", mjcf=tmp_path / "plain.xml", cameras=("eye",))
+    stride = Stride()
+    planned = walk(draw_starts(1, 0), LDVS, 0.3, 1.0, stride=stride)
+    puppet, film = record_plan(planned, conditions(body), stride), tmp_path / "film.mp4"
+    if gl.missing():
+        pytest.skip("nothing can be rendered here")
+    assert render([puppet], film, Film("eye", width=160, height=120, slow_motion=1.0), body=body) == 1
+    for cameras, told in ((("eye",), "eye"), ((), "none")):
+        with pytest.raises(InputError, match=f"camera = 'following'; valid names of plain: {told}"):
+            render([puppet], film, body=replace(body, cameras=cameras))
 
 
 def changed_leg(**changes: Any) -> tuple[Leg, ...]:

@@ -279,7 +279,7 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, m
     monkeypatch.setattr("hexmj.search.stages.refine", stop)
     code, out, error = run(*SEARCH, "--out", tmp_path)
     assert (code, out) == (130, "")
-    assert error.endswith("hexmj: stopped\n")
+    assert error.endswith("hexmj: stopped; what is finished is kept. Repeat the command to go on\n")
     (kept,) = (tmp_path / "evaluations").glob("population-*.jsonl")
     assert len(kept.read_text().splitlines()) == 1 + 37
 
@@ -360,6 +360,24 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     assert "share" in text and "usual" in text
 
 
+def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"
+    words = ["search", "--velocity", 0.4, "--window", "start", "--starts", 20, "--budget", 10, "--refine-budget", 0]
+    words += ["--verdict-starts", 20]
+    assert run(*words, "--form", form, "--out", first)[0] == 0
+    found = first / "found.toml"
+    found.write_text(found.read_text() + 'name = "gewählt"\n')
+    for option in (["--form", found], ["--form", form, "--begin", found]):
+        code, _, error = run(*words, *option, "--out", first)
+        assert code == 2
+        assert "the search begins with found.toml there; expected another folder" in error
+    assert run(*words, "--form", found, "--out", again)[0] == 0
+    one = hexmj.load_controller(str(again / "found.toml"))
+    assert type(one).__name__ == "Waits"
+    assert one.name == "gewählt"
+
+
 NONSENSE = [
     (["reproduce", "--only", "nothing"], "claim 'nothing'; valid keys: "),
     (["reproduce", "--quick", "--seed", "-1"], "seed = -1"),
@@ -418,6 +436,10 @@ NONSENSE = [
     (["flss", "--window", "1e300"], "at most"),
     (["flss", "--starts", "100000000000000"], "at most 100000000"),
     (["flss", "--physical", "--contact-gap", "-1"], "contact_gap = -1.0; expected 0 to 1000 ms"),
+    *(
+        ([*words, "--contact-gap", "5"], "--contact-gap = 5 with falls only; expected it where a polygon is measured")
+        for words in (["flss", "--physical"], ["terrain"], ["disturb"], ["search", "--physical"])
+    ),
     (["flss", "--pep-min", "5"], "hexmj: pep_min = 5.0, pep0 = -10.0, aep0 = 10.0 mm; expected"),
     (["flss", "--model", "x" * 400], "neither one of hws, ldvs"),
     (["flss", "--out", "results/flss/manifest.json"], "is a file; expected a folder"),
@@ -521,7 +543,9 @@ def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, t
 def test_check_controller_says_what_is_wrong(run, tmp_path):
     code, out, _ = run("check-controller", "ldvs")
     assert code == 0
-    assert all(line.startswith("well   ") for line in out.splitlines())
+    *laws, last = out.splitlines()
+    assert all(line.startswith("well   ") for line in laws)
+    assert last.startswith("note   sliding: ")
     wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
     (tmp_path / "mine.py").write_text(wrong)
     code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")

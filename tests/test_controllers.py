@@ -310,6 +310,8 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     assert hexmj.load_controller("robot").name == "taller"
     assert "robot" in named.known_names()
+    (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "taller", "height": 4.0}
 
 
 def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):

@@ -322,6 +322,16 @@ def test_offsets_move_the_feet():
     assert height[1] - height[0] == pytest.approx(1.0, abs=0.3)
 
 
+def test_an_episode_ends_with_the_ground():
+    walking = dm.load(conditions=Conditions.of(ground="gap", ground_length=4.0), actions="tips")
+    walking.reset()
+    assert walking.step(ZEROS).mid()
+    walking.physics.data.qpos[1] = 1000.0
+    step = walking.step(ZEROS)
+    assert step.last()
+    assert step.discount == 1.0
+
+
 def test_divergence_raises():
     walking = dm.load(actions="tips")
     walking.reset()

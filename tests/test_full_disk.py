@@ -104,7 +104,9 @@ def test_evaluations_go_on_wherever_the_disk_was_full(tmp_path, room):
         KeptValues(Cell("squares", squares, {}), tmp_path)(rows)
     again = KeptValues(Cell("squares", squares, {}), tmp_path)
     assert again(rows).tobytes() == squares(rows).tobytes()
-    assert KeptValues(Cell("squares", squares, {}), tmp_path).known == 300
+    held = KeptValues(Cell("squares", squares, {}), tmp_path)
+    assert held(rows[::-1]).tobytes() == squares(rows[::-1]).tobytes()
+    assert held.replayed == 300
 
 
 WALK = ("walk", "--window", "40", "--velocity", "0.5", "--out")

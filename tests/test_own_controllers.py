@@ -259,7 +259,7 @@ def test_a_controller_that_breaks_a_law_ends_the_command_with_1(run, tmp_path):
     )
     code, out, _ = run("check-controller", f"{tmp_path / 'lazy.py'}:Lazy")
     assert code == 1
-    (wrong,) = (line for line in out.splitlines() if not line.startswith("well"))
+    (wrong,) = (line for line in out.splitlines() if line.startswith("WRONG"))
     assert "x is 99 mm in step 0, start 0 (V = 0), leg L1; expected -21 to 11 mm" in wrong
 
 

@@ -12,11 +12,10 @@ import xarray as xr
 from hexmj import netcdf
 from hexmj.cli.rerun import _Repeated
 from hexmj.cli.words import deciding, files
-from hexmj.files import sealed, write_whole
+from hexmj.files import digest, sealed, write_whole
 from hexmj.paper.protocol import QUICK
 from hexmj.results import save_dataset
 from hexmj.same_numbers import Compared, compared
-from hexmj.sweeps.plain import digest
 from hexmj.timing import Acceleration
 
 FLSS = ("flss", "--velocities", "0.5", "--starts", "40", "--window", "start")

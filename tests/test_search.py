@@ -1,6 +1,7 @@
 """The search: laws of the paper's evolutionary algorithm, known minima, resuming, and what a damaged file does."""
 
 import math
+import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -229,6 +230,31 @@ def test_the_fields_of_a_controller_are_searched():
         assert abs(found.vector[0] - 3.0) < 2.0
 
 
+SCRATCH = np.zeros(1)
+"""What careless controllers share."""
+
+
+@dataclass(frozen=True)
+class Careless(Pace):
+    """Its plans go through an array of this module."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        def step(v: np.ndarray) -> Step:
+            SCRATCH[0] = self.good
+            time.sleep(1e-3)  # for other threads
+            return Step(starts, starts < 10.0 * SCRATCH[0])
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+def test_candidates_that_share_an_array_of_their_module_are_walked_one_after_the_other():
+    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, window=1.0), 50, 0)
+    vectors = np.array([[good, 0.0] for good in (0.5, 1.0, 0.0, 2.0)])
+    alone = [sample.costs(vector[None])[0] for vector in vectors]
+    assert len(set(alone)) > 2
+    assert sample.costs(vectors, threads=4).tolist() == alone
+
+
 @dataclass(frozen=True)
 class Picky(Pace):
     """Refuses nearly all that is not usual."""
@@ -403,6 +429,17 @@ def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(
     assert kept.read_bytes() == before
     assert search(PROBLEM, replace(few, budget=60), folder=tmp_path).replayed == before.count(b"\n") - 1
     assert kept.read_bytes().startswith(before)
+
+
+def test_only_candidates_of_this_search_count_as_known(tmp_path):
+    first, second = (Effort(one, budget=30, starts=20, refine_budget=0) for one in ("evolution", "cmaes"))
+    rows = [
+        {row.tobytes() for row in search(PROBLEM, one, folder=tmp_path).history.candidate.values}
+        for one in (first, second)
+    ]
+    (kept,) = tmp_path.iterdir()
+    kept.write_text("".join(kept.read_text().splitlines(keepends=True)[: 1 + len(rows[0])]))
+    assert search(PROBLEM, second, folder=tmp_path).replayed == len(rows[0] & rows[1]) < len(rows[1]) / 2
 
 
 def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_alone(tmp_path):

@@ -36,16 +36,17 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
     finally:
         running.kill()
     assert running.returncode == 130, error
-    assert error.strip() == b"hexmj: stopped"
+    assert error.startswith(b"hexmj: stopped") and error.count(b"\n") == 1
     assert out == b""
 
 
 @pytest.mark.parametrize("module", ["tyro", "numpy", "mujoco"])
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_while_it_is_imported(by, module):
-    """While a module that the command needs is being looked for."""
+    """While a module that the command needs is being looked for; and once more as the program ends."""
     script = (
-        "import os, sys\n"
+        "import atexit, os, sys\n"
+        f"atexit.register(os.kill, os.getpid(), {int(by)})\n"
         "class Stop:\n"
         "    def find_spec(self, name, *_):\n"
         f"        if name == {module!r}: os.kill(os.getpid(), {int(by)})\n"
@@ -55,6 +56,24 @@ def test_while_it_is_imported(by, module):
     )
     words = [sys.executable, "-c", script, "flss", "--physical", "--starts", "5000"]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
+
+
+def test_while_c_code_calls_back():
+    """As numba does while it loads compiled code; what such a callback raises goes no farther."""
+    script = (
+        "import ctypes, os, sys\n"
+        "callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), 2))\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'mujoco':\n"
+        "            callback()\n"
+        "from hexmj.__main__ import main\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "main()"
+    )
+    words = [sys.executable, "-c", script, "flss", "--physical", "--starts", "5000"]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 

@@ -7,7 +7,8 @@ from typing import Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Accelerating, Controlled, Walks, changed
-from hexmj.conditions import OBEYED, Conditions
+from hexmj.conditions import OBEYED, Conditions, Numerics
+from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 
 TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
@@ -64,3 +65,21 @@ class WalkingCommand:
         if given:
             name = given[0].replace("_", "-")
             raise InputError(f"--{name} {reason}; expected it only where the insect walks in physics")
+
+    def refuse_contact_gap(self, controller: Controller) -> None:
+        """Refuse a contact gap where no polygon is measured and no plan of the controller reads it.
+
+        Raises:
+            InputError: it is not the usual one.
+        """
+        from hexmj.controllers.asking import begin
+        from hexmj.starts import draw_starts
+
+        gap, stride = self.conditions.numerics.contact_gap, self.walks.stride
+        if gap != Numerics.contact_gap:
+            plan = begin(controller, draw_starts(1, self.walks.seed, stride), 0.5, stride, threads=1)
+            if not isinstance(plan, ReadingPlan):
+                raise InputError(
+                    f"--contact-gap = {gap:g} with falls only; expected it where a polygon is measured (compare, map,"
+                    " converge, walk --physical) or the controller reads the legs"
+                )

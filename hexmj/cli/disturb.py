@@ -61,9 +61,11 @@ class Disturb(StudyCommand):
         """
         if self.kinematic:
             self.refuse_physical("with --kinematic")
+        controller = self.controlled.controller(self.model)
+        self.refuse_contact_gap(controller)
         left_out = PHYSICAL if self.kinematic else ()
         study = DisturbedWalks(
-            self.controlled.controller(self.model),
+            controller,
             self.velocities,
             self.disturbances or [one for one in DisturbedWalks.disturbances if one not in left_out],
             self.impulses,

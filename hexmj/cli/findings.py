@@ -12,7 +12,7 @@ def report(findings: Iterable[Any], json: bool, **beside: Any) -> NoReturn:
     """One line for each finding, or one JSON object; ends the program, with exit code 1 if one is not well.
 
     Args:
-        findings: frozen dataclasses with `name`, `well` and `found`, and perhaps a `remedy`.
+        findings: frozen dataclasses with `name`, `well` and `found`, and perhaps a `remedy` or `note`.
         json: print the JSON object.
         beside: what stands beside the findings there.
     """
@@ -21,7 +21,8 @@ def report(findings: Iterable[Any], json: bool, **beside: Any) -> NoReturn:
         told.append(finding)
         if not json:
             remedy = f"; remedy: {finding.remedy}" if getattr(finding, "remedy", "") else ""
-            print(f"{'well ' if finding.well else 'WRONG'}  {finding.name}: {finding.found}{remedy}", flush=True)
+            kind = "note " if getattr(finding, "note", False) else "well " if finding.well else "WRONG"
+            print(f"{kind}  {finding.name}: {finding.found}{remedy}", flush=True)
     well = all(finding.well for finding in told)
     if json:
         print_json(beside | {"well": well, "checks": [asdict(finding) for finding in told]})

@@ -49,6 +49,7 @@ class Flss(WalkingCommand):
         if not self.physical:
             self.refuse_physical("without --physical")
         controller = self.controlled.controller(self.model)
+        self.refuse_contact_gap(controller)
         if self.out:
             results_folder(self.out, ("flss.nc", "flss.png", MANIFEST))
         table = self._measured(controller)
@@ -84,6 +85,7 @@ class Flss(WalkingCommand):
             lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
             print_json(lists | ({"report": report} if report else {}) | {"settings": table.attrs, "files": files})
             return
+        columns = [name for name in columns if table[name].notnull().any()]  # no sample_sd of less than two samples
         rows = new_table("V", *columns)
         for v in table.velocity.values:
             one = table.sel(velocity=v)

@@ -28,7 +28,8 @@ NUMBA = (
 
 ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice."
 
-AGAIN = "\n\nRepeat the command to go on with a {} that was stopped."
+GOES_ON = "Repeat the command to go on"
+AGAIN = f"\n\n{GOES_ON} with a {{}} that was stopped."
 
 COMMANDS = {
     "compare": "Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait"
@@ -81,7 +82,9 @@ def main() -> None:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()
     except KeyboardInterrupt:
-        sys.exit(_complain("stopped", 130))
+        goes_on = options and GOES_ON in COMMANDS.get(sys.argv[1], "")
+        kept = f"; what is finished is kept. {GOES_ON}" if goes_on else ""
+        sys.exit(_complain(f"stopped{kept}", 130))
     except InputError as error:
         sys.exit(_complain(error, 2))
     except SimulationError as error:

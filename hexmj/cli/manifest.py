@@ -14,12 +14,11 @@ import numpy as np
 
 from hexmj.cli import words
 from hexmj.errors import InputError
-from hexmj.files import WRITTEN, read_text
+from hexmj.files import WRITTEN, digest, digest_of, read_text
 from hexmj.literal import literal
 from hexmj.loaded import importable, module_name
 from hexmj.results import json_text, save_text
 from hexmj.sweeps.code import code
-from hexmj.sweeps.plain import digest, digest_of
 
 FORMAT = 2
 """Of the file; 1 had settings and versions only."""

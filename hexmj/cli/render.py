@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes, Positional
 
+from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers, changed
@@ -72,6 +73,7 @@ class Render(WalkingCommand):
 
     def _check(self) -> None:
         """Refuse options that would not be obeyed."""
+        self.film.check_camera(STICK_INSECT)
         if len(self.recordings) > 2:
             raise InputError(f"{len(self.recordings)} recordings were given; expected one, or two for side by side")
         obeyed = Render(recordings=self.recordings, out=self.out, json=self.json, film=self.film)

@@ -12,6 +12,7 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
+from hexmj.files import read_toml
 from hexmj.literal import literal
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_text
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from hexmj.search.forms import Form
     from hexmj.search.problems import Problem
     from hexmj.search.stages import Effort, Found
+
+FOUND = "found.toml"
+"""What was found."""
 
 KEPT = "evaluations"
 """Folder of the evaluations, beside the results."""
@@ -78,12 +82,13 @@ class Search(WalkingCommand):
 
         self._check()
         problem, effort = self._problem(), self._effort()
+        beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
+        self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
-        out = results_folder(self.out, ("history.nc", "found.toml", "convergence.png", MANIFEST))
+        out = results_folder(self.out, ("history.nc", FOUND, "convergence.png", MANIFEST))
         with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
-        beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
         settings = {
             "problem": problem.settings(),
@@ -108,6 +113,8 @@ class Search(WalkingCommand):
             self.refuse_physical("without --physical")
         if self.verdict_seed == self.walks.seed:
             raise InputError(f"--verdict-seed = {self.verdict_seed} is also --seed; expected another, for fresh starts")
+        if any(one and Path(one).resolve() == (self.out / FOUND).resolve() for one in (self.form, self.begin)):
+            raise InputError(f"--out {self.out}: the search begins with {FOUND} there; expected another folder")
         if self.velocity is not None and self.velocities is not None:
             raise InputError("--velocity and --velocities were both given; expected one velocity or one range")
         if self.refine_starts is not None and not self.refine_budget:
@@ -180,7 +187,7 @@ class Search(WalkingCommand):
         text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
         files = [
             save_dataset(found.history, self.out / "history.nc"),
-            save_text(text, self.out / "found.toml"),
+            save_text(text, self.out / FOUND),
             save_figure(convergence_figure(found.history, self._title), self.out / "convergence.png"),
         ]
         return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
@@ -193,8 +200,10 @@ class Search(WalkingCommand):
         controller = problem.form.controller(found.vector)
         if isinstance(controller, Cruse1998):
             return network_toml(controller)
-        values = zip(problem.form.names, found.vector.tolist(), strict=True)
-        lines = [f"controller = {json.dumps(self.form)}", "", "[fields]", *(f"{key} = {one!r}" for key, one in values)]
+        table = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
+        values = table["fields"] | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
+        lines = [f"controller = {json.dumps(table['controller'], ensure_ascii=False)}", "", "[fields]"]
+        lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
         return "\n".join(lines) + "\n"
 
     def _show(

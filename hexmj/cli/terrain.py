@@ -66,8 +66,10 @@ class Terrain(StudyCommand):
 
     def study(self) -> terrain.Terrain:
         """See `StudyCommand.study`."""
+        controller = self.controlled.controller(self.model)
+        self.refuse_contact_gap(controller)
         return terrain.Terrain(
-            self.controlled.controller(self.model),
+            controller,
             self.velocities,
             self.grounds,
             self.heights,

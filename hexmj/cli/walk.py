@@ -1,5 +1,6 @@
 """`hexmj walk`."""
 
+import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,9 @@ from hexmj.results import results_folder
 
 SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part))
 """Conditions that the puppet of a plan shows too."""
+
+TIMES = ("planned loss", "measured loss", "fall")
+"""What a walk tells the time of, if it happens."""
 
 
 @dataclass(frozen=True)
@@ -58,5 +62,12 @@ class Walk(WalkingCommand):
         if self.json:
             print_json(summary | {"settings": told, "files": files})
         else:
-            lines = [f"{key}: {short(value)}" for key, value in summary.items()]
+            lines = [f"{key}: {_told(key, value)}" for key, value in summary.items() if value is not None]
             show(title, *lines, self.conditions_line(self.physical), *map(str, files))
+
+
+def _told(key: str, value: Any) -> str:
+    """A number of a walk; a time in words."""
+    if key in TIMES:
+        return f"at {value:.4g} time units" if math.isfinite(value) else "none"
+    return short(value)

@@ -63,6 +63,8 @@ class Finding:
     """Whether it is kept."""
     found: str
     """One sentence: what is wrong, with values, or what was looked at."""
+    note: bool = False
+    """Whether it is only told, and no law."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +127,7 @@ def findings(controller: object, stride: Stride | None = None) -> Iterator[Findi
             yield Finding(name, False, f"{wrong}; the laws after this one were not tried")
             return
         yield Finding(name, wrong is None, wrong or looked_at)
-    yield Finding("sliding", True, _sliding(trials))
+    yield Finding("sliding", True, _sliding(trials), note=True)
 
 
 def _trials(controller: Controller, stride: Stride) -> Iterator[Trial]:

@@ -63,8 +63,8 @@ def known_names() -> Iterator[str]:
 
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     """The controller that a file names, with these fields."""
-    if ":" not in named:
-        raise InputError(f"{path}: controller = {named!r}; expected module:object or file.py:object")
+    if ":" not in named and not entry_points(group=ENTRY_POINTS, name=named):
+        raise InputError(f"{path}: controller = {named!r}; expected module:object, file.py:object or an entry point")
     found: Any = load_controller(named)
     try:
         wanted = get_type_hints(type(found))

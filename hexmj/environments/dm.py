@@ -24,8 +24,9 @@ Observations, all float64:
 
 The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the
 step, the command c and the upward component u of the body's vertical; it is 0 on a fall.  An episode ends on a
-fall, when the trunk touches the ground, with discount 0, and after its duration with discount 1.  A simulation
-that diverges raises dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
+fall, when the trunk touches the ground, with discount 0; with discount 1 after its duration, or where a foot comes to
+the end of a step, gap or hurdle.  A simulation that diverges raises dm_control's PhysicsError.  Contacts are those of
+the last substep, known once it is done.
 """
 
 from collections import OrderedDict
@@ -41,6 +42,7 @@ from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.bodies.loading import compile_body
 from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Conditions
@@ -289,10 +291,12 @@ class Walking(control.Task):
         return planned
 
     def after_step(self, physics: InsectPhysics) -> None:
-        """Note which feet stand and whether the trunk has touched the ground."""
+        """Note which feet stand, whether the trunk has touched the ground, and whether that ends here."""
         columns, sensors = physics.compiled.columns, physics.shown["sensors"]
         self._senses.feel(ONLY, sensors, physics.shown["force"][:, :, columns.ctrl])
         self._fell = bool((sensors[:, :, columns.trunk] > 0).any())
+        feet, conditions = sensors[0, :, columns.foot].reshape(-1, 6, 3), self.conditions
+        self._at_the_end = bool(beyond_the_ground(conditions.ground, conditions.body.lengths, feet).any())
 
     def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
         """The specs of all observations by their names."""
@@ -324,10 +328,10 @@ class Walking(control.Task):
         return 0.0 if self._fell else at_speed * max(0.0, upright)
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
-        """Discount 0 on a fall, 1 when the time is over, nothing before."""
+        """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""
         if self._fell:
             return 0.0
-        return None if self._orders.steps_ahead() else 1.0
+        return 1.0 if self._at_the_end or not self._orders.steps_ahead() else None
 
 
 class JointTargets(Walking):

@@ -17,6 +17,7 @@ from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
 from hexmj.search.domain import Domain
 from hexmj.search.forms import Form
+from hexmj.search.network_forms import NetworkForm
 from hexmj.starts import check_draw, checked_velocities, draw_starts
 from hexmj.sweeps.plain import plain
 from hexmj.threads import thread_count
@@ -166,7 +167,8 @@ class Sample:
             except OutOfReach:
                 return REFUSED
 
-        if self.problem.conditions or len(vectors) == 1:
+        # A user's plans may share a module's arrays, and hold the interpreter's lock anyway.
+        if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
             return np.array([cost(vector, threads) for vector in vectors])
         with ThreadPoolExecutor(thread_count(threads)) as pool:
             return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))

@@ -158,7 +158,7 @@ def _search(
         best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget)
     asked = history.dataset(problem.form.names)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
-    replayed = min(sum(one.known for one in kept.values()), asked.sizes["evaluation"])
+    replayed = sum(one.replayed for one in kept.values())
     refused = list(filter(None, map(problem.refusal, asked.candidate.values)))
     if why := problem.refusal(best):
         raise InputError(

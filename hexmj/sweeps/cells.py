@@ -10,8 +10,9 @@ from typing import Any
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
+from hexmj.files import digest
 from hexmj.sweeps.code import code
-from hexmj.sweeps.plain import classes, digest, label, plain
+from hexmj.sweeps.plain import classes, label, plain
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""

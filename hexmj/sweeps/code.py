@@ -19,7 +19,8 @@ from pathlib import Path
 
 from hexmj import as_run
 from hexmj.errors import InputError
-from hexmj.sweeps.plain import digest, module_label
+from hexmj.files import digest
+from hexmj.sweeps.plain import module_label
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -40,13 +40,16 @@ class KeptValues:
             self._seed = zlib.crc32(record.encode())
             self._path = folder / f"{cell.stem(record)}.jsonl"
             self._begin(self._path, record)
-        self.known = len(self._values)
+        self._held = frozenset(self._values)
+        self._replayed = set[bytes]()
+        self.known = len(self._held)
         """Values that the file held."""
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """The values, (row,), of rows (row, number)."""
         rows = np.ascontiguousarray(rows, dtype=float)
         keys = [row.tobytes() for row in rows]
+        self._replayed |= self._held.intersection(keys)
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
@@ -56,6 +59,11 @@ class KeptValues:
                 _add(self._path, "".join(map(self._line, new, values.tolist())))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])
+
+    @property
+    def replayed(self) -> int:
+        """Different rows that were asked for, and whose values the file held."""
+        return len(self._replayed)
 
     def _begin(self, path: Path, record: str) -> None:
         first, lines = "", []

@@ -1,6 +1,5 @@
 """Settings as plain JSON: what a cell is named by and what its file tells."""
 
-import hashlib
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.files import opened
+from hexmj.files import digest, read_bytes
 
 NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["']""")
 """Files and their folders in an MJCF."""
@@ -87,7 +86,7 @@ def content(path: Path) -> bytes:
     """
     found, new = dict[Path, bytes](), {path}
     while new:
-        found |= {one: _read(one) for one in new}
+        found |= {one: read_bytes(one) for one in new}
         named = [
             one for text in found.values() if b"\0" not in text for one in NAMED.findall(text.decode(errors="replace"))
         ]
@@ -104,25 +103,6 @@ def _is_file(text: str) -> bool:
         return "." in text and Path(text).is_file()
     except (OSError, ValueError):  # too long for a name, or with a null character
         return False
-
-
-def _read(path: Path) -> bytes:
-    with opened(path) as file:
-        return file.read()
-
-
-def digest_of(path: Path) -> str:
-    """Of a file as it is now.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    return digest(_read(path))
-
-
-def digest(content: bytes) -> str:
-    """Of some bytes: the first 12 digits of their SHA-256."""
-    return hashlib.sha256(content).hexdigest()[:12]
 
 
 def _check_fields(value: Any) -> None:

@@ -1,14 +1,14 @@
 """Files that the package reads, damaged."""
 
-import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import xarray as xr
 from hypothesis import strategies as st
 
 import hexmj
@@ -19,8 +19,8 @@ WORDS = b"nan", b"-1", b"1e999", b"\xff\xfe", b"[[[[", b'"""', b"9" * 5000, b"{}
 
 
 def _recording(path: Path) -> None:
-    with hexmj.load_recording(path) as read, hexmj.load_recording(originals() / "recording.nc") as whole:
-        if not read.identical(whole):
+    with hexmj.load_recording(path) as read:
+        if not read.identical(originals()[1]):
             raise AssertionError("other values than were written")
 
 
@@ -33,21 +33,21 @@ READERS: dict[str, Callable[[Path], Any]] = {
 
 
 @cache
-def originals() -> Path:
-    """A folder with each of them, whole."""
-    folder = Path(mkdtemp(prefix="hexmj-originals-"))
+def originals() -> tuple[dict[str, bytes], xr.Dataset]:
+    """Name of each file -> what it holds; and the recording, as it is read."""
     walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 3.0)
-    hexmj.save_recording(hexmj.record(walked), folder / "recording.nc")
-    (folder / "weights.toml").write_text(network_toml(hexmj.LDVS))
-    shutil.copy(hexmj.STICK_INSECT.mjcf, folder / "insect.xml")
-    return folder
+    with TemporaryDirectory(prefix="hexmj-originals-") as folder:
+        path = hexmj.save_recording(hexmj.record(walked), Path(folder) / "recording.nc")
+        with hexmj.load_recording(path) as recording:
+            whole = {path.name: path.read_bytes(), "weights.toml": network_toml(hexmj.LDVS).encode()}
+            return whole | {"insect.xml": hexmj.STICK_INSECT.mjcf.read_bytes()}, recording.load()
 
 
 @st.composite
 def damages(draw: st.DrawFn) -> tuple[str, bytes]:
     """The name of a file, and its bytes after some accident."""
     name = draw(st.sampled_from(tuple(READERS)))
-    whole = bytearray((originals() / name).read_bytes())
+    whole = bytearray(originals()[0][name])
     for _ in range(draw(st.integers(1, 3))):
         size = len(whole)
         at, other = draw(st.integers(0, max(0, size - 1))), draw(st.integers(0, size))

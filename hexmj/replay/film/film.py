@@ -3,18 +3,17 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from hexmj.bodies.description import Body
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-
-CAMERAS = ("following", "side", "top", "front")
 
 
 @dataclass(frozen=True)
 class Film:
     """Camera, size, speed and quality of a video."""
 
-    camera: Literal["following", "side", "top", "front"] = "following"
-    """Camera of the MJCF."""
+    camera: str = "following"
+    """One of `Body.cameras`: following, side, top, front of the stick insect."""
     width: int = 640
     """Width of a panel [pixels], even."""
     height: int = 480
@@ -34,3 +33,13 @@ class Film:
         for name, value, least, most in (("fps", self.fps, 1, 240), ("slow_motion", self.slow_motion, 0.001, 1000)):
             if not least <= value <= most:
                 raise InputError(f"{name} = {value}; expected {least} to {most}")
+
+    def check_camera(self, body: Body) -> None:
+        """Refuse a camera that a body has not.
+
+        Raises:
+            InputError: it is one.
+        """
+        if self.camera not in body.cameras:
+            cameras = ", ".join(body.cameras) or "none"
+            raise InputError(f"camera = {self.camera!r:.80}; valid names of {body.name}: {cameras}")

@@ -29,6 +29,9 @@ from hexmj.stability import support_polygon
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
 
+GROUND = "ground"
+"""The ground's texture, where an MJCF has it."""
+
 
 def render(
     recordings: Sequence[xr.Dataset],
@@ -59,6 +62,7 @@ def render(
     recordings = typed("recordings", recordings, tuple[xr.Dataset, ...])
     if len(recordings) not in (1, 2):
         raise InputError(f"{len(recordings)} recordings were given; expected one, or two for side by side")
+    film.check_camera(typed("body", body, Body))
     if path.suffix != ".mp4" or not path.parent.is_dir():
         raise InputError(f"the film cannot be written to {path}; expected a name with .mp4 in a folder that exists")
     if reason := gl.missing():
@@ -108,10 +112,11 @@ def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:
         return model
     model.vis.quality.offsamples = 0
     model.light_castshadow[:] = False
-    ground = model.texture("ground")
-    begin = int(ground.adr[0])
-    colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
-    colours[:] = np.minimum(BRIGHTER * colours, 255)
+    if (i := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, GROUND)) >= 0:
+        ground = model.texture(i)
+        begin = int(ground.adr[0])
+        colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
+        colours[:] = np.minimum(BRIGHTER * colours, 255)
     return model
 
 
