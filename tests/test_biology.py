@@ -17,7 +17,8 @@ from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.studies.biology.animals import ANIMALS, SOURCES, SPEEDS, STEP, Animal, timing
 from hexmj.studies.biology.ground_forces import GroundForces
-from hexmj.studies.biology.quantities import SEGMENTS, UNITS, quantities
+from hexmj.studies.biology.names import SEGMENTS, UNITS
+from hexmj.studies.biology.quantities import quantities
 from hexmj.studies.biology.strides import Strides, last_strides, onsets, strides_between
 from hexmj.studies.biology.study import Biology
 from hexmj.sweeps import conduct
@@ -121,6 +122,7 @@ def test_every_row_is_a_quantity_with_a_source_and_a_range_or_none():
     row = Animal("speed", 1.0, 2.0)
     assert [row.verdict(value) for value in (0.5, 1.0, 2.0, 2.5)] == ["below", "within", "within", "above"]
     assert replace(row, low=math.nan).verdict(1.0) == "no figure found"
+    assert row.verdict(math.nan) == "none walked"
 
 
 @pytest.fixture(scope="module")

@@ -7,14 +7,14 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from hexmj.studies.biology.quantities import JOINTS, SEGMENTS
+from hexmj.studies.biology.names import JOINTS, SEGMENTS
 
-Verdict = Literal["within", "below", "above", "no figure found"]
+Verdict = Literal["within", "below", "above", "no figure found", "none walked"]
 
 SOURCES = {
-    "motion capture": "one adult female Carausius morosus, public motion capture of Theunissen and Duerr: phases, way of"
-    " a step, and swings that last 0.10 to 0.16 of the period and 0.14 to 0.17 s, from which period and duty factor"
-    " follow; coxae 'about' 12, 10, 8 mm high, read as 1 mm more or less",
+    "motion capture": "one adult female Carausius morosus, public data of Theunissen and Duerr: phases, way of a step,"
+    " and swings that last 0.10 to 0.16 of the period and 0.14 to 0.17 s, from which period and duty factor follow;"
+    " coxae 'about' 12, 10, 8 mm high, read as 1 mm more or less",
     "Graham 1983": "J. exp. Biol. 104, 129, Introduction: in Carausius the least velocity of a leg's cycle is 'usually"
     " close to zero', read as at most a tenth of the mean",
     "Full et al. 1991": "Full, Blickhan, Ting, J. exp. Biol. 158, 369, Summary: the cockroach Blaberus runs; first legs"
@@ -61,9 +61,9 @@ class Animal:
     """The body or V_p was chosen by it, so agreement says nothing."""
 
     def verdict(self, value: float) -> Verdict:
-        """Of a value of ours."""
-        if math.isnan(self.low):
-            return "no figure found"
+        """Of a value of ours, NaN where no start walked."""
+        if math.isnan(self.low) or math.isnan(value):
+            return "no figure found" if math.isnan(self.low) else "none walked"
         return "below" if value < self.low else "above" if value > self.high else "within"
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.studies.biology.animals import ANIMALS
-from hexmj.studies.biology.quantities import JOINTS, SEGMENTS
+from hexmj.studies.biology.names import JOINTS, SEGMENTS
 from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:

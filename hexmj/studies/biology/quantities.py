@@ -1,55 +1,24 @@
 """What is measured of strides: gait, forces, torques, posture and work, one number each."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.reading import posed
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.legs import SIDE
+from hexmj.physics.settling import settle
 from hexmj.rotations import heading, rotated, turned
-from hexmj.studies.biology.strides import Strides, onsets
+from hexmj.starts import draw_starts
+from hexmj.studies.biology.names import EACH, JOINTS, SEGMENTS, UNITS
+from hexmj.studies.biology.strides import Strides, last_strides, onsets
+from hexmj.timing import Acceleration, Stride
 
-SEGMENTS = ("front", "middle", "hind")
-"""Pairs of legs from front to rear."""
-
-JOINTS = ("thorax-coxa", "coxa-trochanter", "femur-tibia")
-"""Of a leg with three, from the body outwards."""
-
-WHOLE = {
-    "speed": "mm/s",
-    "ripple: least over mean speed": "1",
-    "period": "s",
-    "duty factor": "1",
-    "way of a standing foot": "mm",
-    "phase, ipsilateral": "1",
-    "phase, contralateral": "1",
-    "vertical peaks: greatest over least": "1",
-    "work of standing legs at the coxa-trochanter": "%",
-    **{f"{joint} torque against its movement": "% of stance" for joint in JOINTS},
-    "pitch of the thorax": "deg",
-    "pitch, range over the strides": "deg",
-    "height of the centre of mass, range over the strides": "mm",
-    "cost of transport, positive work": "1",
-    "cost of transport, all work": "1",
-    "positive work of the joints": "J/kg/m",
-    "work on the centre of mass": "J/kg/m",
-}
-"""Quantities of the whole body, and their units."""
-
-EACH = {
-    "vertical impulse": "% W",
-    "fore-aft impulse": "% W",
-    "inward impulse": "% W",
-    "vertical peak of a leg": "W",
-    **{f"{joint} torque": "mN mm" for joint in JOINTS},
-    "height of the coxae": "mm",
-}
-"""Quantities of each pair of legs, and their units; impulses are of both legs together."""
-
-UNITS = WHOLE | {f"{name}, {segment}": unit for name, unit in EACH.items() for segment in SEGMENTS}
-"""All quantities, and their units."""
+if TYPE_CHECKING:
+    import xarray as xr
 
 FRAME = 0.04
 """Speed, height and pitch are means over so long, as a film of 25 frames a second shows them [s]."""
@@ -59,6 +28,42 @@ PLATE = 0.01
 
 TO_MN_MM, TO_J_PER_KG_M = 1e-3, 1e-3
 """From g mm^2/s^2 and from mm/s^2."""
+
+
+def quantity_table(
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    measured: float,
+    *,
+    n_starts: int,
+    seed: int,
+    conditions: Conditions,
+    stride: Stride,
+    acceleration: Acceleration | None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Every quantity of every start, over (quantity, start); NaN where the start fell.
+
+    Args:
+        controller: plans the walks.
+        velocity: V_r.
+        duration: of the walks [time units].
+        measured: how much of it counts, at its end [time units].
+        n_starts: number of starts.
+        seed: of the starts.
+        conditions: of the walks.
+        stride: step range, lines of the tips and time step.
+        acceleration: none.
+        threads: one per core unless given; the table does not depend on it.
+    """
+    import xarray as xr
+
+    settled = settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
+    values = np.full((len(UNITS), n_starts), np.nan)
+    for start, strides in last_strides(settled, controller, velocity, duration, measured, threads):
+        values[:, start] = list(quantities(strides, settled.compiled).values())
+    return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 
 
 def quantities(strides: Strides, compiled: CompiledBody) -> dict[str, float]:

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.checks import whole
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.intervals import WILSON_Z
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
+from hexmj.studies.biology.names import UNITS
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell
-from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,12 +43,13 @@ class Biology(SameStarts):
 
     def cells(self) -> list[Cell]:
         """A cell for each speed; see `sweeps.Study`."""
+        from hexmj.studies.biology.quantities import quantity_table
 
         def cell(speed: float) -> Cell:
             velocity = speed / self.conditions.time.vp
             period = float(self.stride.periods(velocity))
             return self.cell(
-                f"{speed:g}-mm-s", measured_quantities, 1 / velocity, velocity=velocity, conditions=self.conditions,
+                f"{speed:g}-mm-s", quantity_table, 1 / velocity, velocity=velocity, conditions=self.conditions,
                 duration=self.periods * period, measured=MEASURED * period,
             )  # fmt: skip
 
@@ -66,8 +65,6 @@ class Biology(SameStarts):
             `verdict`, and whether it was `built_in`.
         """
         import xarray as xr
-
-        from hexmj.studies.biology.quantities import UNITS
 
         table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
         ours = [_mean(table.value.sel(speed=row.speed, quantity=row.quantity).values) for row in ANIMALS]
@@ -85,47 +82,6 @@ class Biology(SameStarts):
         }
         told = {name: ("row", values, {"units": "mm/s" if name == "at" else "1"}) for name, values in columns.items()}
         return table.assign(told).assign_attrs(self.attributes(periods=self.periods, speeds=list(SPEEDS)))
-
-
-def measured_quantities(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    measured: float,
-    *,
-    n_starts: int,
-    seed: int,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None,
-    threads: int | None = None,
-) -> "xr.Dataset":
-    """Every quantity of every start, over (quantity, start); NaN where the start fell.
-
-    Args:
-        controller: plans the walks.
-        velocity: V_r.
-        duration: of the walks [time units].
-        measured: how much of it counts, at its end [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        conditions: of the walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: none.
-        threads: one per core unless given; the table does not depend on it.
-    """
-    import xarray as xr
-
-    from hexmj.physics.settling import settle
-    from hexmj.starts import draw_starts
-    from hexmj.studies.biology.quantities import UNITS, quantities
-    from hexmj.studies.biology.strides import last_strides
-
-    settled = settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
-    values = np.full((len(UNITS), n_starts), np.nan)
-    for start, strides in last_strides(settled, controller, velocity, duration, measured, threads):
-        values[:, start] = list(quantities(strides, settled.compiled).values())
-    return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 
 
 def _mean(values: np.ndarray) -> tuple[float, float, float]:
