@@ -50,6 +50,8 @@ COMMANDS = {
     "map": f"Physical FLSS over the velocity and one condition, and why starts fall or do not.{AGAIN.format('run')}",
     "disturb": "Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies"
     f" buy.{AGAIN.format('run')}",
+    "biology": "Forces, torques, gait, posture and work of the walking insect beside those of measured"
+    f" insects.{AGAIN.format('run')}",
     "rerun": "Makes a result again from its manifest: is every number equal to the last bit?  If not, exit code 1 and"
     " a sentence on what else is not as it was.",
     "check-controller": "Does a controller keep the protocol?  A check that fails says in a sentence what is wrong;"

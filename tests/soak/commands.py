@@ -21,6 +21,7 @@ SMALL = {
     "converge": "--vps 400 --starts 2 --window 2",
     "terrain": "--grounds step --heights 1 --velocities 0.5 --starts 1 --grasps 0",
     "map": "--values 80 --velocities 0.5 --starts 2 --window 3",
+    "biology": "--starts 1 --periods 4",
     "disturb": "--velocities 0.5 --starts 2 --window 3 --disturbances halt --strategies reorganise",
     "rerun": "nowhere",
     "check-controller": "nobody",

@@ -1,0 +1,120 @@
+"""The last strides of walks that have found their gait: what the body did at every physics step."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from hexmj.controllers.asking import begin
+from hexmj.controllers.protocol import Controller
+from hexmj.physics.drive import Chunk, drive
+from hexmj.physics.settling import Settled
+from hexmj.studies.biology.ground_forces import GroundForces
+
+HOP = 0.03
+"""A foot that is off the ground for less does not swing [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strides:
+    """One start, from one onset of leg 1 to another."""
+
+    count: int
+    """Strides."""
+    step: float
+    """Physics step [s]."""
+    qpos: np.ndarray
+    """(row, position) before each step."""
+    velocity: np.ndarray
+    """(row, 3) of the root [mm/s]."""
+    turning: np.ndarray
+    """(row, joint) velocities of the joints over the step that ends there [rad/s]."""
+    torques: np.ndarray
+    """(row, joint) of the servos over that step, with their damping as the integrator took it [g mm^2/s^2]."""
+    standing: np.ndarray
+    """(row, leg)."""
+    centre: np.ndarray
+    """(row, 3) centre of mass in the world [mm]."""
+    every: int
+    """Rows from one of `ground` to the next: a step of the plan."""
+    ground: np.ndarray
+    """(sample, leg, 3) of the ground on the feet, in the world [g mm/s^2]."""
+
+
+def last_strides(
+    settled: Settled,
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    measured: float,
+    threads: int | None = None,
+) -> Iterator[tuple[int, Strides]]:
+    """The whole strides within the last part of every walk, start by start; those that fall have none.
+
+    Args:
+        settled: starts at rest.
+        controller: plans the walks.
+        velocity: V_r.
+        duration: of the walks [time units].
+        measured: how much of it counts [time units].
+        threads: that step; one per core unless given.
+    """
+    plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
+    first = (duration - measured) / settled.stride.dt * settled.substeps
+    chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
+    walked = chunks[-1].ids[~chunks[-1].fell] if chunks else ()
+    forces = GroundForces(settled.compiled)
+    for start in walked:
+        standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
+        begun = onsets(standing, settled.compiled.model.opt.timestep)
+        if len(begun) > 1:
+            yield int(start), strides_between(settled, chunks, start, begun, forces)
+
+
+def strides_between(
+    settled: Settled, chunks: Sequence[Chunk], start: int, begun: np.ndarray, forces: GroundForces
+) -> Strides:
+    """What a start did from the first to the last of some rows.
+
+    Args:
+        settled: what the walk began with.
+        chunks: that follow each other.
+        start: which.
+        begun: rows of the chunks in which strides begin, at least two, none among the first two rows.
+        forces: of the ground.
+    """
+    model, columns = settled.compiled.model, settled.compiled.columns
+    h, m, rows = model.opt.timestep, settled.substeps, slice(begun[0], begun[-1])
+    qpos, sensors, force, standing = (
+        np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
+        for name in ("qpos", "sensors", "force", "standing")
+    )
+    moved = np.diff(qpos, axis=0) / h  # row t is the velocity at row t + 1
+    turning, damping = moved[:, columns.qpos], -model.actuator_biasprm[columns.ctrl, 2]
+    torques = force[1:-1] - damping * np.diff(turning, axis=0)
+    ground = []
+    for row in range(begun[0], begun[-1], m):
+        qvel = np.zeros(model.nv)
+        mujoco.mj_differentiatePos(model, qvel, h, qpos[row - 1], qpos[row])
+        ground.append(forces.on_feet(qpos[row], qvel, force[row]))
+    return Strides(
+        count=len(begun) - 1,
+        step=h,
+        qpos=qpos[rows],
+        velocity=moved[begun[0] - 1 : begun[-1] - 1, :3],
+        turning=turning[begun[0] - 1 : begun[-1] - 1],
+        torques=torques[begun[0] - 2 : begun[-1] - 2],
+        standing=standing[rows],
+        centre=sensors[rows, columns.centre_of_mass],
+        every=m,
+        ground=np.array(ground),
+    )
+
+
+def onsets(standing: np.ndarray, step: float) -> np.ndarray:
+    """Rows in which a foot, (row,), leaves the ground for longer than it hops."""
+    changes = np.flatnonzero(standing[1:] != standing[:-1]) + 1
+    lifted = changes[~standing[changes]]
+    landed = np.append(changes[standing[changes]], len(standing))
+    return lifted[landed[np.searchsorted(landed, lifted)] - lifted > HOP / step]

@@ -1,0 +1,93 @@
+"""The animal beside the machine: what the walking insect's legs and body do, beside what was measured in insects."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.checks import whole
+from hexmj.errors import InputError
+from hexmj.intervals import WILSON_Z
+from hexmj.studies.biology.animals import ANIMALS, SPEEDS
+from hexmj.studies.biology.names import UNITS
+from hexmj.studies.same_starts import SameStarts
+from hexmj.sweeps import Cell
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MEASURED = 3
+"""Periods of a single leg at the end of a walk that are measured, as far as they are whole strides."""
+
+
+@dataclass(frozen=True)
+class Biology(SameStarts):
+    """The same starts at every speed at which the animal was measured."""
+
+    periods: int = 30
+    """Of a single leg; so long do the starts walk, until they have found their gait."""
+    n_starts: int = field(default=20, kw_only=True)
+    window: str = field(default="periods", init=False)
+    """All walk so many periods."""
+    acceleration: None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole("periods", self.periods, MEASURED + 1, 1000)
+        vp = self.conditions.time.vp
+        if not max(SPEEDS) < vp:
+            raise InputError(f"vp = {vp}; expected more than {max(SPEEDS):g} mm/s, the fastest walk that is compared")
+        if self.conditions.contact.grasp:
+            raise InputError(f"grasp = {self.conditions.contact.grasp}; expected 0, since adhesion is no ground force")
+
+    def cells(self) -> list[Cell]:
+        """A cell for each speed; see `sweeps.Study`."""
+        from hexmj.studies.biology.quantities import quantity_table
+
+        def cell(speed: float) -> Cell:
+            velocity = speed / self.conditions.time.vp
+            period = float(self.stride.periods(velocity))
+            return self.cell(
+                f"{speed:g}-mm-s", quantity_table, 1 / velocity, velocity=velocity, conditions=self.conditions,
+                duration=self.periods * period, measured=MEASURED * period,
+            )  # fmt: skip
+
+        return [cell(speed) for speed in SPEEDS]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Ours beside the animals'.
+
+        Returns:
+            Over (speed, quantity, start): `value`, NaN where a start fell.  Over row, one for each of `ANIMALS`: its
+            `name`, `unit`, `at` which speed and whether the animals' figure `depends` on it; our `mean` over the starts
+            with its 95 % interval `low`, `high`; the animals' `animal_low`, `animal_high` and their `source`; the
+            `verdict`, and whether it was `built_in`.
+        """
+        import xarray as xr
+
+        table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
+        ours = [_mean(table.value.sel(speed=row.speed, quantity=row.quantity).values) for row in ANIMALS]
+        columns = {
+            "name": [row.quantity for row in ANIMALS],
+            "unit": [UNITS[row.quantity] for row in ANIMALS],
+            "at": [row.speed for row in ANIMALS],
+            "depends": [row.depends for row in ANIMALS],
+            **dict(zip(("mean", "low", "high"), np.transpose(ours), strict=True)),
+            "animal_low": [row.low for row in ANIMALS],
+            "animal_high": [row.high for row in ANIMALS],
+            "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
+            "built_in": [row.built_in for row in ANIMALS],
+            "source": [row.source for row in ANIMALS],
+        }
+        told = {name: ("row", values, {"units": "mm/s" if name == "at" else "1"}) for name, values in columns.items()}
+        return table.assign(told).assign_attrs(self.attributes(periods=self.periods, speeds=list(SPEEDS)))
+
+
+def _mean(values: np.ndarray) -> tuple[float, float, float]:
+    """Mean of those that are known, and its 95 % interval."""
+    known = values[np.isfinite(values)]
+    if len(known) < 2:
+        return (float(known.mean()) if len(known) else np.nan), np.nan, np.nan
+    middle, half = known.mean(), WILSON_Z * known.std(ddof=1) / np.sqrt(len(known))
+    return middle, middle - half, middle + half

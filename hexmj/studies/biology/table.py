@@ -1,0 +1,46 @@
+"""The animal beside the machine as a table: texts, and Markdown with the sources."""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from hexmj.studies.biology.animals import SOURCES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HEADS = ("quantity", "ours (95 %)", "insects", "verdict", "source")
+
+
+def rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
+    """The cells of each row of a result of `Biology`, under `HEADS`."""
+    for n in range(result.sizes["row"]):
+        row = {name: result[name].values[n] for name in result.data_vars if result[name].dims == ("row",)}
+        at = f" at {row['at']:g} mm/s" if row["depends"] else ""
+        unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
+        ours = f"{row['mean']:.3g} ({row['low']:.3g} to {row['high']:.3g})"
+        built_in = ", built in" if row["built_in"] else ""
+        insects = _range(row["animal_low"], row["animal_high"])
+        yield f"{row['name']}{at}{unit}", ours, insects, f"{row['verdict']}{built_in}", row["source"]
+
+
+def biology_markdown(result: "xr.Dataset") -> str:
+    """The table, and the sources it names."""
+    lines = [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, rows(result)), ""]
+    named = {*result.source.values}
+    return (
+        "\n".join([*lines, *(f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text)]) + "\n"
+    )
+
+
+def _range(low: float, high: float) -> str:
+    """From least to greatest; "-" where it is not known."""
+    if math.isnan(low):
+        return "-"
+    if math.isinf(low) or math.isinf(high):
+        return f"above {low:.3g}" if math.isinf(high) else f"below {high:.3g}"
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+
+
+def _line(cells: "tuple[str, ...] | list[str]") -> str:
+    return f"| {' | '.join(cells)} |"

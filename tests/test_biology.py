@@ -1,0 +1,176 @@
+"""The animal beside the machine: laws of forces and work, what is read from animals, and the command."""
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.controllers.asking import begin
+from hexmj.legs import MIRROR
+from hexmj.physics.drive import drive
+from hexmj.physics.settling import settle
+from hexmj.studies.biology.animals import ANIMALS, SOURCES, SPEEDS, STEP, Animal, timing
+from hexmj.studies.biology.ground_forces import GroundForces
+from hexmj.studies.biology.names import SEGMENTS, UNITS
+from hexmj.studies.biology.quantities import quantities
+from hexmj.studies.biology.strides import Strides, last_strides, onsets, strides_between
+from hexmj.studies.biology.study import Biology
+from hexmj.sweeps import conduct
+
+WEIGHT = STICK_INSECT.mass * 9810.0
+PERIOD = 20.0 * (1.0 + 1.0 / 0.3)  # of a single leg at V = 0.3
+
+
+def seen(starts: np.ndarray, velocity: float, duration: float) -> tuple[Strides, np.ndarray]:
+    """All that one start did, and what the touch sensors showed, (row, leg)."""
+    settled = settle(starts)
+    chunks = list(drive(settled, begin(LDVS, settled.starts, velocity, settled.stride), duration))
+    rows = sum(chunk.qpos.shape[1] for chunk in chunks)
+    touch = np.concatenate([chunk.sensors[0, :, settled.compiled.columns.touch] for chunk in chunks])
+    strides = strides_between(settled, chunks, 0, np.array([2, rows]), GroundForces(settled.compiled))
+    return strides, touch[2::2]
+
+
+@pytest.fixture(scope="module")
+def walking() -> tuple[dict[int, Strides], list[dict[str, float]]]:
+    """The strides of three starts after three periods, and their quantities."""
+    settled = settle(draw_starts(3, 0))
+    strides = dict(last_strides(settled, LDVS, 0.3, 6 * PERIOD, 3 * PERIOD))
+    return strides, [quantities(one, settled.compiled) for one in strides.values()]
+
+
+def test_over_strides_the_ground_carries_the_weight_and_neither_drives_nor_brakes(walking):
+    for strides in walking[0].values():
+        force = strides.ground.sum(axis=1).mean(axis=0) / WEIGHT
+        assert_allclose(force, [0.0, 0.0, 1.0], atol=0.01)
+        assert strides.count >= 1
+        assert strides.qpos[-1, 0] - strides.qpos[0, 0] > 20.0 * strides.count
+
+
+def test_vertical_forces_are_what_the_touch_sensors_show():
+    strides, touch = seen(draw_starts(1, 0), 0.3, 30.0)
+    off = np.abs(strides.ground[:, :, 2] - touch[: len(strides.ground)]) / WEIGHT
+    assert np.median(off) < 1e-12
+    assert off.max() < 1e-4  # a step taken in parts shows their mean
+    assert (np.linalg.norm(strides.ground[..., :2], axis=2) <= 1.0001 * strides.ground[..., 2] + 1e-6).all()  # friction
+
+
+def test_a_standing_insect_carries_its_weight_and_stands_on_its_friction():
+    strides, _ = seen(draw_starts(1, 1), 0.0, 2.0)
+    assert_allclose(strides.ground.sum(axis=1) / WEIGHT, len(strides.ground) * [[0.0, 0.0, 1.0]], atol=1e-3)
+    assert np.abs(strides.ground[..., 1]).mean() > 0.01 * WEIGHT
+
+
+def test_mirrored_starts_feel_mirrored_forces():
+    starts, mirror = draw_starts(1, 0), list(MIRROR)
+    one, other = (seen(x, 0.3, 30.0)[0] for x in (starts, starts[:, mirror]))
+    assert_allclose(one.ground, other.ground[:, mirror] * [1, -1, 1], atol=1e-6 * WEIGHT)
+    assert_allclose(one.torques.reshape(-1, 6, 3), other.torques.reshape(-1, 6, 3)[:, mirror], atol=1.0)
+
+
+def test_servos_put_in_more_work_than_they_take_out(walking):
+    """Over strides nothing is gained, so their work is what friction and strikes take."""
+    for one in walking[1]:
+        positive, every = one["cost of transport, positive work"], one["cost of transport, all work"]
+        assert 0.0 < 2.0 * positive - every < 0.2 * positive
+        assert one["positive work of the joints"] == pytest.approx(9.81 * positive)
+        assert 0.0 < one["work on the centre of mass"] < one["positive work of the joints"]
+
+
+def test_quantities_agree_with_each_other_and_with_the_plan(walking):
+    for one in walking[1]:
+        assert list(one) == list(UNITS)
+        assert all(map(math.isfinite, one.values()))
+        assert sum(one[f"vertical impulse, {segment}"] for segment in SEGMENTS) == pytest.approx(100.0, abs=0.5)
+        assert one["speed"] == pytest.approx(24.0, rel=0.03)
+        assert one["duty factor"] == pytest.approx(1.0 / 1.3, abs=0.01)
+        assert one["period"] == pytest.approx(PERIOD / 80.0, rel=0.1)
+        assert 0.0 < one["ripple: least over mean speed"] < 1.0
+        heights = [one[f"height of the coxae, {segment}"] for segment in SEGMENTS]
+        assert heights == sorted(heights, reverse=True)
+
+
+def test_a_hop_is_no_swing():
+    standing = np.ones(100, dtype=bool)
+    standing[10:12] = standing[40:60] = standing[90:] = False
+    assert onsets(standing, 0.01).tolist() == [40, 90]
+
+
+def test_period_and_duty_factor_follow_from_step_and_swing():
+    for speed in SPEEDS:
+        (shortest, longest), (least, most) = timing(speed)
+        assert STEP[0] / speed < shortest < longest
+        assert shortest - STEP[0] / speed == pytest.approx(0.10 * shortest + 0.14)
+        assert STEP[0] / speed / least * 0.16 + 0.17 == pytest.approx(STEP[0] / speed / least - STEP[0] / speed)
+        assert 0.5 < least < most < 1.0
+    assert all(timing(a)[0][0] > timing(b)[0][0] for a, b in pairwise(SPEEDS))
+
+
+def test_every_row_is_a_quantity_with_a_source_and_a_range_or_none():
+    for row in ANIMALS:
+        assert row.quantity in UNITS
+        assert row.source in SOURCES
+        assert math.isnan(row.low) == math.isnan(row.high) and not row.low > row.high
+        assert math.isnan(row.low) or row.source not in ("", "not read")
+    assert {row.source for row in ANIMALS} == set(SOURCES)
+    row = Animal("speed", 1.0, 2.0)
+    assert [row.verdict(value) for value in (0.5, 1.0, 2.0, 2.5)] == ["below", "within", "within", "above"]
+    assert replace(row, low=math.nan).verdict(1.0) == "no figure found"
+    assert row.verdict(math.nan) == "none walked"
+
+
+@pytest.fixture(scope="module")
+def falling(tmp_path_factory):
+    """Short walks, of which some fall."""
+    return conduct(Biology(UNCOORDINATED, 4, n_starts=5), tmp_path_factory.mktemp("biology"), threads=1)
+
+
+def test_starts_that_fall_count_nowhere(falling):
+    walked = falling.value.sel(quantity="speed").notnull()
+    assert (walked.sum("start") < 5).any()
+    row = falling.isel(row=list(falling.name.values).index("way of a standing foot"))
+    some = falling.value.sel(speed=24.0, quantity="way of a standing foot").dropna("start")
+    assert row["mean"].item() == pytest.approx(some.mean().item()) or (some.size == 0 and math.isnan(row["mean"]))
+
+
+def test_threads_change_no_bit(falling):
+    assert conduct(Biology(UNCOORDINATED, 4, n_starts=5), threads=2).identical(falling)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"periods": 3}, "periods = 3"),
+        ({"conditions": Conditions.of(vp=38.0)}, "vp = 38.0; expected more than 38 mm/s"),
+        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0"),
+        ({"n_starts": 0}, "at least 1"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(wrong, said):
+    with pytest.raises(InputError, match=said):
+        Biology(LDVS, **wrong)
+
+
+def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
+    words = ("biology", "--starts", 2, "--periods", 4, "--out", tmp_path)
+    code, text, _ = run(*words, "--json")
+    assert code == 0
+    answer = json.loads(text)
+    names = {"biology.nc", "biology.png", "biology.md", "manifest.json", "walks"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert len(answer["name"]) == len(answer["verdict"]) == len(ANIMALS)
+    assert answer["settings"]["window"] == "periods"
+    code, text, _ = run(*words)
+    assert code == 0
+    table = (tmp_path / "biology.md").read_text()
+    assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
+    assert table.count("\n| ") >= len(ANIMALS)
+    assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)
+    for option in ("--window", "--grasp", "--acceleration"):
+        assert run(*words, option, 1)[0] == 2
