@@ -265,7 +265,11 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
         assert_allclose(walked.measured.feet[known, start], seen, atol=1e-9)
         standing = np.concatenate([one.standing[row, :valid] for (one, row), valid in zip(rows, until, strict=True)])
         assert_array_equal(walked.measured.stance[known, start], standing[steps])
-        assert np.isnan(walked.measured.x[len(seen) :, start]).all()
+        height = shown[:, columns.foot].reshape(-1, 6, 3)[..., 2] - compiled.foot_radius
+        assert_allclose(walked.height[known, start], height[steps], atol=1e-9)
+        assert_array_equal(walked.load[known, start], shown[steps, columns.touch])
+        for unknown in (walked.measured.x, walked.height, walked.load):
+            assert np.isnan(unknown[len(seen) :, start]).all()
     assert_array_equal(outcomes.measured_loss, loss_time(walked.measured))
     assert np.isfinite(outcomes.fall).any() == (velocity == 0.7)
     assert outcomes.saturation.any() == (strength < 1.0)

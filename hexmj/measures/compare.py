@@ -171,10 +171,10 @@ def physical_flss(
     return table.assign(reported.data_vars).assign_attrs(result.attrs)
 
 
-def with_flss(data: "xr.Dataset") -> "xr.Dataset":
-    """The FLSS of `MEASURES` with 95 % Wilson intervals, and `agreement`, beside outcomes over (..., start)."""
+def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
+    """The FLSS of `measures` with 95 % Wilson intervals, and `agreement`, beside outcomes over (..., start)."""
     new: dict[str, xr.DataArray] = {}
-    for measure, outcome in MEASURES.items():
+    for measure, outcome in measures.items():
         lost = data[outcome] < np.inf
         new[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
         ends = wilson_intervals(lost.sum("start").values, data.sizes["start"])

@@ -81,6 +81,22 @@ def measured_walk(
     return shown, walk, centre
 
 
+def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How high the feet are above the ground [mm], and what it carries them with [g mm/s^2], both (step, n, leg).
+
+    Args:
+        chunk: of `drive.drive`.
+        settled: what it began with.
+        columns: of the chunk's substeps, (step,); NaN is shown after a fall.
+    """
+    sensors, compiled = chunk.sensors[:, columns], settled.compiled
+    feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
+    shown = (columns < chunk.valid[:, None])[..., None]
+    values = -compiled.depth(feet), sensors[..., compiled.columns.touch]
+    height, load = (np.where(shown, one, np.nan).swapaxes(0, 1) for one in values)
+    return height, load
+
+
 @njit(cache=True, nogil=True)
 def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
     """Feet ahead of and beside the centre of mass, seen along the root's heading, up to the fall."""
