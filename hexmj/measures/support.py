@@ -15,7 +15,7 @@ from hexmj.walks import Walk
 
 GROUNDED = 0.05
 """How high a foot may hover that counts as on the ground, as a share of the standing height; 0.05 to 0.2 give the same
-FLSS at V_p = 20 mm/s, see `docs/static_limit.md`."""
+FLSS at V_p = 20 mm/s within 0.04, see `docs/static_limit.md`."""
 
 
 def grounded(walk: PhysicalWalk, share: float = GROUNDED) -> Walk:
