@@ -133,7 +133,7 @@ def test_the_values_of_every_condition_make_sense():
         assert sorted(condition.values) == list(condition.values)
         for value in condition.values:
             assert Conditions.of(**{name: value}).flat()[name] == value
-    assert set(FLSS) == {"kinematic", "measured", "physical", "static"}
+    assert set(FLSS) == {"kinematic", "measured", "physical", "toppled", "static"}
 
 
 @pytest.mark.parametrize(

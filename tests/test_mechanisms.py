@@ -59,6 +59,8 @@ def staged(*, fall: bool = False, lean: dict[int, tuple[float, float]] | None = 
         outcomes=outcomes,
         qpos=qpos,
         centre_of_mass=np.zeros((STEPS, 1, 3)),
+        height=np.zeros(x.shape),
+        load=np.ones(x.shape),
         conditions=Conditions(),
         stride=Stride(),
     )

@@ -21,6 +21,7 @@ from hexmj.physics import chunks as chunks_module
 from hexmj.physics.backend import STATE
 from hexmj.physics.drive import drive
 from hexmj.physics.orders import OrdersFromPlan
+from hexmj.physics.outcomes import TOPPLED
 from hexmj.physics.settling import Settled, settle
 from hexmj.rotations import heading, rotated, turned
 from hexmj.stability import loss_time
@@ -250,6 +251,8 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
         taken = len(q) - 1 if fell else round(duration / dt) * m
         assert outcomes.clearance[start] == pytest.approx(lowest.min())
         assert outcomes.tilt[start] == pytest.approx(np.arccos(upright.min()))
+        beyond = np.flatnonzero(np.arccos(upright) > TOPPLED)
+        assert outcomes.topple[start] == (pytest.approx(beyond[0] / m * dt) if beyond.size else np.inf)
         assert outcomes.slip[start] == pytest.approx(slid / contacts / compiled.model.opt.timestep)
         assert outcomes.saturation[start] == (torques >= 0.999 * compiled.torque_limits).mean()
         assert outcomes.depth[start] == max(0.0, np.concatenate(depth)[: len(q) - fell].max())
@@ -265,7 +268,11 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
         assert_allclose(walked.measured.feet[known, start], seen, atol=1e-9)
         standing = np.concatenate([one.standing[row, :valid] for (one, row), valid in zip(rows, until, strict=True)])
         assert_array_equal(walked.measured.stance[known, start], standing[steps])
-        assert np.isnan(walked.measured.x[len(seen) :, start]).all()
+        height = shown[:, columns.foot].reshape(-1, 6, 3)[..., 2] - compiled.foot_radius
+        assert_allclose(walked.height[known, start], height[steps], atol=1e-9)
+        assert_array_equal(walked.load[known, start], shown[steps, columns.touch])
+        for unknown in (walked.measured.x, walked.height, walked.load):
+            assert np.isnan(unknown[len(seen) :, start]).all()
     assert_array_equal(outcomes.measured_loss, loss_time(walked.measured))
     assert np.isfinite(outcomes.fall).any() == (velocity == 0.7)
     assert outcomes.saturation.any() == (strength < 1.0)

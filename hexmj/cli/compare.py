@@ -15,7 +15,7 @@ from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, new_table, physical_report, report_line
 from hexmj.errors import InputError, RenderingError
-from hexmj.measures.compare import AGREEMENT, MEASURES, Comparison
+from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
 from hexmj.progress import progress_bar
 from hexmj.replay.film.film import Film
 
@@ -76,7 +76,10 @@ class Compare(StudyCommand):
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """The frequencies and answers of every controller."""
         summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
-        keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")] + ["agreement", *AGREEMENT]
+        keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")] + [
+            "agreement",
+            *AGREEMENT,
+        ]
         for name in result.controller.values:
             one = result.sel(controller=name)
             summary[name] = {key: one[key].values.tolist() for key in keys}
@@ -88,7 +91,7 @@ class Compare(StudyCommand):
         frequencies, answers = _tables(result)
         yield "Frequency of the loss of static stability, with 95 % intervals"
         yield frequencies
-        yield "Starts by what happened: lost on paper (kin.), fell (phys.); speed over command"
+        yield "Starts: lost on paper (kin.), fell (phys.); frequency of those that toppled; speed over command"
         yield answers
         yield self.conditions_line()
         yield report_line(physical_report(result))
@@ -117,14 +120,16 @@ class Compare(StudyCommand):
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
     """A row for each controller and velocity: the frequencies, and what the starts did."""
     frequencies = new_table("controller", "V", "t", *MEASURES)
-    answers = new_table("controller", "V", "agree", "both", "only kin.", "only phys.", "none", "speed")
+    answers = new_table("controller", "V", "agree", "both", "only kin.", "only phys.", "none", *BESIDE, "speed")
     for name in result.controller.values:
         for v in result.velocity.values:
             one = result.sel(controller=name, velocity=v)
             intervals = (interval(one, measure) for measure in MEASURES)
             frequencies.add_row(name, f"{v:g}", f"{one.duration.item():.0f}", *intervals)
             counts = [str(one[case].item()) for case in AGREEMENT]
-            answers.add_row(name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, _speeds(one))
+            answers.add_row(
+                name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, f"{one.toppled.item():.3f}", _speeds(one)
+            )
     return frequencies, answers
 
 

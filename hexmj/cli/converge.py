@@ -1,7 +1,8 @@
 """`hexmj converge`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,31 @@ from hexmj.cli.options import ControllerName, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, new_table
 from hexmj.conditions import Conditions
-from hexmj.measures.compare import MEASURES
 from hexmj.studies.static_limit.study import FINE, VARIED, StaticLimit
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
+
+SAME = {
+    "measured": "agreement_measured",
+    "grounded": "agreement_grounded",
+    "physical": "agreement",
+    "same feet": "same_feet",
+    "at the ground": "same_feet_grounded",
+}
+"""Heading -> the fraction of starts whose answer is the kinematic one, or of steps with the planned feet."""
+
+OFF = {
+    "margin": "margin",
+    "grounded": "margin_grounded",
+    "pressure": "margin_pressure",
+    "same feet": "margin_same_feet",
+    "drift": "drift",
+    "slip": "slip",
+    "tracking": "tracking",
+}
+"""Heading -> how far the walk is from its plan."""
 
 
 @dataclass(frozen=True)
@@ -59,33 +79,38 @@ class Converge(StudyCommand):
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The frequencies, the distances from the plan, and the conditions."""
-        name, (frequencies, distances) = self.controlled.controller(self.model).name, _tables(_means(result))
+        from hexmj.studies.static_limit.distances import LOSSES
+
+        name, means = self.controlled.controller(self.model).name, _means(result)
         yield f"{name}, V = {self.velocity:g}, {self.starts} starts: FLSS, with 95 % intervals"
-        yield frequencies
+        yield _table(means, {measure: partial(interval, measure=measure) for measure in LOSSES})
+        yield "Starts whose answer is the kinematic one; steps in which the planned feet stand, or are at the ground"
+        yield _table(means, {heading: partial(_number, name=one) for heading, one in SAME.items()})
         yield (
-            "Distances from the plan [mm] until it loses stability, the fraction of steps in which the same feet stand,"
-            " slip [mm/s] and tracking [mm] to the end"
+            "Distances from the planned margin until the plan loses stability: of the measured one, of that with all"
+            " feet at the ground, of the centre of pressure's, of the measured one where the same feet stand; of the"
+            " centre of mass from O [mm]; slip [mm/s] and tracking [mm] to the end"
         )
-        yield distances
+        yield _table(means, {heading: partial(_number, name=one) for heading, one in OFF.items()})
         yield self.conditions_line(varied=VARIED)
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
     """Over the starts."""
-    return result.drop_vars(MEASURES.values()).mean("start", keep_attrs=True)
+    from hexmj.studies.static_limit.distances import LOSSES
+
+    return result.drop_vars(LOSSES.values()).mean("start", keep_attrs=True)
 
 
-def _tables(means: "xr.Dataset") -> "tuple[Table, Table]":
-    """A row for each mass of the legs and V_p: the frequencies, and the distances from the plan."""
-    from hexmj.studies.static_limit.distances import DISTANCES, REPORTED
-
-    frequencies = new_table("legs", "V_p", *MEASURES, "agreement")
-    distances = new_table("legs", "V_p", *DISTANCES, *REPORTED)
+def _table(means: "xr.Dataset", columns: Mapping[str, "Callable[[xr.Dataset], str]"]) -> "Table":
+    """A row for each mass of the legs and V_p."""
+    table = new_table("legs", "V_p", *columns)
     for mass in means.leg_mass.values:
         for vp in means.vp.values:
             one = means.sel(leg_mass=mass, vp=vp)
-            intervals = (interval(one, measure) for measure in MEASURES)
-            off = (f"{one[name].item():.3f}" for name in (*DISTANCES, *REPORTED))
-            frequencies.add_row(f"{mass:g}", f"{vp:g}", *intervals, f"{one.agreement.item():.3f}")
-            distances.add_row(f"{mass:g}", f"{vp:g}", *off)
-    return frequencies, distances
+            table.add_row(f"{mass:g}", f"{vp:g}", *(column(one) for column in columns.values()))
+    return table
+
+
+def _number(one: "xr.Dataset", name: str) -> str:
+    return f"{one[name].item():.3f}"

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical": "fall"}
 """Measure of FLSS -> the outcome whose frequency it is."""
 
+BESIDE = {"toppled": "topple"}
+"""The same of a second answer, which knows no direction: the trunk is tilted by more than `outcomes.TOPPLED`."""
+
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
 """What a start can do: lose stability on paper, touch the ground, both or none."""
 
@@ -93,7 +96,7 @@ class Comparison:
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         attributes = settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
-        return _with_answers(with_flss(table)).assign_attrs(attributes)
+        return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes)
 
 
 def compare(
@@ -125,8 +128,8 @@ def compare(
         how: executor, threads and progress, see `sweeps.Execution`; the result does not depend on it.
 
     Returns:
-        Over (controller, velocity): the three FLSS with their 95 % Wilson intervals (`kinematic`,
-        `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
+        Over (controller, velocity): the three FLSS and that of `BESIDE` with their 95 % Wilson intervals
+        (`kinematic`, `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
         fraction of starts for which kinematic and physical answer are the same; over (controller, velocity,
         start) every field of `Outcomes`.
 
@@ -157,7 +160,8 @@ def physical_flss(
     """Physical FLSS: the frequency with which the trunk touches the ground; arguments and errors as of `compare`.
 
     Returns:
-        The table of `kinematic.flss`, and the time of the fall and the outcomes `REPORTED` of every start.
+        The table of `kinematic.flss`, the frequency of `BESIDE` with its interval; the times of the fall and of
+        `BESIDE`, and the outcomes `REPORTED`, of every start.
     """
     from hexmj.measures.kinematic import frequency_table, losses_by_sample
 
@@ -167,14 +171,16 @@ def physical_flss(
     )  # fmt: skip
     fell = losses_by_sample(np.isfinite(result.fall.values[0]))
     table = frequency_table(fell, n_starts, result.velocity.values, result.duration.values)
-    reported = result.isel(controller=0, drop=True)[["fall", *REPORTED]].drop_vars("duration")
+    beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
+    wanted = [*beside, "fall", *BESIDE.values(), *REPORTED]
+    reported = result.isel(controller=0, drop=True)[wanted].drop_vars("duration")
     return table.assign(reported.data_vars).assign_attrs(result.attrs)
 
 
-def with_flss(data: "xr.Dataset") -> "xr.Dataset":
-    """The FLSS of `MEASURES` with 95 % Wilson intervals, and `agreement`, beside outcomes over (..., start)."""
+def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
+    """The FLSS of `measures` with 95 % Wilson intervals, and `agreement`, beside outcomes over (..., start)."""
     new: dict[str, xr.DataArray] = {}
-    for measure, outcome in MEASURES.items():
+    for measure, outcome in measures.items():
         lost = data[outcome] < np.inf
         new[measure] = lost.mean("start").assign_attrs(units="1", long_name=f"{measure} FLSS")
         ends = wilson_intervals(lost.sum("start").values, data.sizes["start"])

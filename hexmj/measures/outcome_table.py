@@ -21,6 +21,7 @@ UNITS = {
     "planned_loss": "time unit",
     "measured_loss": "time unit",
     "fall": "time unit",
+    "topple": "time unit",
     "clearance": "mm",
     "tilt": "rad",
     "slip": "mm/s",

@@ -12,7 +12,7 @@ from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
-from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, measured_walk
+from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
 from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress
 from hexmj.stability import loss_time
@@ -36,6 +36,10 @@ class PhysicalWalk:
     """(step, start, position) MuJoCo's positions at the end of each step of the plan."""
     centre_of_mass: np.ndarray
     """(step, start, 3) in the world [mm]."""
+    height: np.ndarray
+    """(step, start, leg) of the feet above the ground [mm]; below 0 where they sink in."""
+    load: np.ndarray
+    """(step, start, leg) normal force of the ground on the feet [g mm/s^2]."""
     conditions: Conditions
     """Of the walk."""
     stride: Stride
@@ -143,7 +147,7 @@ def physical_walk_of_plan(
     conditions, stride = settled.conditions, settled.stride
     so_far = OutcomesSoFar(settled, loss_time(planned, threads=threads))
     shape = planned.stance.shape
-    x, y, stance = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+    (x, y, height, load), stance = np.full((4, *shape), np.nan), np.zeros(shape, dtype=bool)
     qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
     told: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
@@ -152,8 +156,11 @@ def physical_walk_of_plan(
         columns, seen, seen_centre = measured_walk(chunk, settled)
         at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
         x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre
+        height[at], load[at] = feet_on_ground(chunk, settled, columns)
         over = (columns[:, None] >= chunk.valid)[..., None]
         qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
     measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
     ordered = joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]) if told else planned
-    return PhysicalWalk(planned, ordered, measured, so_far.outcomes(), qpos, centre, conditions, stride)
+    return PhysicalWalk(
+        planned, ordered, measured, so_far.outcomes(), qpos, centre, height, load, conditions, stride
+    )  # fmt: skip

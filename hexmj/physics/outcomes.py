@@ -18,8 +18,14 @@ from hexmj.walks import Walk
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
 
+TOPPLED = 0.1
+"""Tilt of the trunk beyond which it has toppled, whatever the direction [rad]; see `docs/falls.md`."""
+
 MOST_UNREACHABLE = 0.1
 """Share of the tips that may be out of reach in a walk that counts."""
+
+LEAST_UPRIGHT = float(np.cos(TOPPLED))
+"""Upward component of the trunk's vertical at that tilt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,8 @@ class Outcomes:
     """(start,) first loss of measured static stability: feet in contact, the body's centre of mass."""
     fall: np.ndarray
     """(start,) first contact of head, thorax or abdomen with the ground."""
+    topple: np.ndarray
+    """(start,) first tilt of the trunk by more than `TOPPLED`; until the fall, as everything here."""
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touched first, -1 for none."""
     clearance: np.ndarray
@@ -81,6 +89,22 @@ def measured_walk(
     return shown, walk, centre
 
 
+def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How high the feet are above the ground [mm], and what it carries them with [g mm/s^2], both (step, n, leg).
+
+    Args:
+        chunk: of `drive.drive`.
+        settled: what it began with.
+        columns: of the chunk's substeps, (step,); NaN is shown after a fall.
+    """
+    sensors, compiled = chunk.sensors[:, columns], settled.compiled
+    feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
+    shown = (columns < chunk.valid[:, None])[..., None]
+    values = -compiled.depth(feet), sensors[..., compiled.columns.touch]
+    height, load = (np.where(shown, one, np.nan).swapaxes(0, 1) for one in values)
+    return height, load
+
+
 @njit(cache=True, nogil=True)
 def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
     """Feet ahead of and beside the centre of mass, seen along the root's heading, up to the fall."""
@@ -112,6 +136,8 @@ class _Sums(NamedTuple):
     """(start,) see `Outcomes.clearance`."""
     upright: np.ndarray
     """(start,) least upward component of the trunk's vertical."""
+    toppled: np.ndarray
+    """(start,) substeps until the trunk has toppled; inf where it has not."""
     slid: np.ndarray
     """(start,) way that feet slid in contact [mm]."""
     contacts: np.ndarray
@@ -136,7 +162,8 @@ class OutcomesSoFar:
         self._walked, self._commanded, self._depth = np.zeros((3, size))
         misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
         slid, contacts, saturated, shown = np.zeros((4, size))
-        self._sums = _Sums(np.full(size, np.inf), np.ones(size), slid, contacts, saturated, shown, misses)
+        never = np.full(size, np.inf)
+        self._sums = _Sums(never, np.ones(size), never.copy(), slid, contacts, saturated, shown, misses)
         columns, ground = compiled.columns, -settled.conditions.path.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
         self._scale = ground, lengths.tracking_bin
@@ -178,6 +205,7 @@ class OutcomesSoFar:
             planned_loss=self._planned_loss,
             measured_loss=self._measured_loss,
             fall=self._fall,
+            topple=sums.toppled / self._settled.substeps * self._settled.stride.dt,
             fall_part=self._fall_part,
             clearance=sums.clearance,
             tilt=np.arccos(np.clip(sums.upright, -1.0, 1.0)),
@@ -224,6 +252,8 @@ def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
                 height = q[2] + up_x * corner[c, 0] + up_y * corner[c, 1] + up_z * corner[c, 2] - radius[c]
                 sums.clearance[start] = min(sums.clearance[start], height)
             sums.upright[start] = min(sums.upright[start], up_z)
+            if up_z < LEAST_UPRIGHT:
+                sums.toppled[start] = min(sums.toppled[start], sums.shown[start])
             for leg in range(6):
                 if t > 0 and sensed[touch + leg] > 0 and sensors[i, t - 1, touch + leg] > 0:
                     f, before = feet + 3 * leg, sensors[i, t - 1]

@@ -7,13 +7,13 @@ import numpy as np
 from hexmj.bodies.loading import gravity
 from hexmj.conditions import Conditions
 from hexmj.intervals import paired_difference, wilson_intervals
-from hexmj.measures.compare import MEASURES
+from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.studies.stability_map.mechanisms import MECHANISMS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FLSS = MEASURES | {"static": "static_loss"}
+FLSS = MEASURES | BESIDE | {"static": "static_loss"}
 """Measure -> the outcome whose frequency it is.  `static` is the planned polygon around the body's own centre of mass;
 `kinematic` the same around O, which knows no condition."""
 

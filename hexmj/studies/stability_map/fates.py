@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BLOCK = 100
-"""Starts walked at a time: their walks are kept whole, 0.4 GB at V = 0.1."""
+"""Starts walked at a time: their walks are kept whole, 0.5 GB at V = 0.1."""
 
 
 def fates(

@@ -6,19 +6,31 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.measures.compare import MEASURES
 from hexmj.measures.physical import PhysicalWalk, physical_walk
-from hexmj.stability import walk_margin
+from hexmj.measures.support import grounded, pressure_margin
+from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
     import xarray as xr
 
+LOSSES = {
+    "kinematic": "planned_loss",
+    "measured": "measured_loss",
+    "grounded": "grounded_loss",
+    "physical": "fall",
+}
+"""Measure of FLSS -> the outcome whose frequency it is: `compare.MEASURES`, and `grounded`, which is the measured one
+with all the feet at the ground, see `measures.support`."""
+
 DISTANCES = {  # units, long_name
     "margin": ("mm", "mean distance between measured and planned stability margin"),
-    "margin_same_feet": ("mm", "the same where the same feet stand"),
+    "margin_grounded": ("mm", "the same with all the feet at the ground"),
+    "margin_pressure": ("mm", "the same of the margin of the centre of pressure"),
+    "margin_same_feet": ("mm", "that of the measured one where the same feet stand"),
     "same_feet": ("1", "fraction of steps in which the same feet stand"),
+    "same_feet_grounded": ("1", "the same with all the feet at the ground"),
     "drift": ("mm", "mean distance of the centre of mass from O"),
 }
 """How far a measured walk is from its plan; counted until the plan loses stability or the insect falls."""
@@ -39,7 +51,7 @@ def distance_table(
     acceleration: Acceleration | None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """The outcomes of `compare.MEASURES`, `DISTANCES` and `REPORTED` over start.
+    """The outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start.
 
     Args:
         controller: plans the walks.
@@ -58,7 +70,8 @@ def distance_table(
         draw_starts(n_starts, seed, stride), controller, velocity, duration,
         conditions=conditions, stride=stride, acceleration=acceleration, threads=threads,
     )  # fmt: skip
-    lost = {name: ("start", getattr(walk.outcomes, name), {"units": "time unit"}) for name in MEASURES.values()}
+    happened = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
+    lost = {name: ("start", happened[name], {"units": "time unit"}) for name in LOSSES.values()}
     off = {
         name: ("start", values, dict(zip(("units", "long_name"), DISTANCES[name], strict=True)))
         for name, values in distances(walk).items()
@@ -69,16 +82,20 @@ def distance_table(
 
 def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
     """`DISTANCES` of every start, (start,); NaN where the plan is lost at once."""
-    planned, measured, outcomes = walk.planned, walk.measured, walk.outcomes
+    planned, measured, near, outcomes = walk.planned, walk.measured, grounded(walk), walk.outcomes
     compared = planned.time[:, None] < np.minimum(outcomes.planned_loss, outcomes.fall)
-    off = np.abs(walk_margin(measured) - walk_margin(planned))
-    same = (measured.stance == planned.stance).all(axis=-1)
+    wanted, pressure = walk_margin(planned), pressure_margin(walk)
+    off = np.abs(walk_margin(measured) - wanted)
+    same, same_near = ((one.stance == planned.stance).all(axis=-1) for one in (measured, near))
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
     touching = compared & measured.stance.any(axis=-1)  # without any foot there is no margin
     return {
         "margin": _mean(off, touching),
+        "margin_grounded": _mean(np.abs(walk_margin(near) - wanted), touching),
+        "margin_pressure": _mean(np.abs(pressure - wanted), compared & np.isfinite(pressure)),
         "margin_same_feet": _mean(off, touching & same),
         "same_feet": _mean(same, compared),
+        "same_feet_grounded": _mean(same_near, compared),
         "drift": _mean(drift, compared),
     }
 

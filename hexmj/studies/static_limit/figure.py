@@ -10,11 +10,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+COLOURS = MEASURE_COLOURS | {"grounded": "#46a35e"}
+
 PANELS = {  # label of the axis, then for each curve its colour and name
-    "agreement": ("fraction", {"agreement": ("0.1", "both answers agree"), "same_feet": ("0.6", "same feet stand")}),
+    "agreement": (
+        "starts whose answer is the kinematic one",
+        {
+            "agreement_measured": (COLOURS["measured"], "measured"),
+            "agreement_grounded": (COLOURS["grounded"], "grounded"),
+            "agreement": (COLOURS["physical"], "physical"),
+        },
+    ),
     "margin": (
-        "measured from planned margin [mm]",
-        {"margin": ("#1b6ca8", "all steps"), "margin_same_feet": ("#6a4c93", "where the same feet stand")},
+        "distance from the planned margin [mm]",
+        {
+            "margin_pressure": ("0.6", "centre of pressure"),
+            "margin": (COLOURS["measured"], "measured"),
+            "margin_grounded": (COLOURS["grounded"], "grounded"),
+            "margin_same_feet": ("#6a4c93", "measured, same feet stand"),
+        },
     ),
     "drift": ("centre of mass from O [mm]", {"drift": ("#1b6ca8", "")}),
 }
@@ -57,14 +71,14 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _frequencies(axes: "Axes", one: "xr.Dataset", line: str, first: bool) -> None:
-    """The three FLSS at one mass of the legs; the kinematic one, a band, depends on no mass and no V_p."""
+    """The FLSS at one mass of the legs; the kinematic one, a band, depends on no mass and no V_p."""
     if first:
         low, middle, high = (one[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
         axes.axhspan(low, high, color=MEASURE_COLOURS["kinematic"], alpha=0.15, linewidth=0)
         axes.axhline(middle, color=MEASURE_COLOURS["kinematic"], linewidth=1.6, label="kinematic")
     shift = 0.97 if first else 1.03
-    for measure in ("measured", "physical"):
-        style = {"linestyle": line, "color": MEASURE_COLOURS[measure], "label": measure if first else None}
+    for measure in ("measured", "grounded", "physical"):
+        style = {"linestyle": line, "color": COLOURS[measure], "label": measure if first else None}
         frequency_curve(axes, one.vp * shift, one, measure, **style)
 
 

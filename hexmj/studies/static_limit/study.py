@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hexmj.conditions import Conditions
 from hexmj.errors import check_distinct
 from hexmj.measures.compare import with_flss
@@ -77,14 +79,22 @@ class StaticLimit(SameStarts):
         """FLSS, agreement and distances from the plan.
 
         Returns:
-            Over (leg_mass, vp): the three FLSS of `compare.MEASURES` with their 95 % Wilson intervals and `agreement`,
-            the fraction of starts for which kinematic and physical answer are the same; over (leg_mass, vp, start) the
+            Over (leg_mass, vp): the FLSS of `LOSSES` with their 95 % Wilson intervals and `agreement`, the fraction of
+            starts for which kinematic and physical answer are the same, `agreement_measured` and
+            `agreement_grounded`, those for which kinematic and that answer are; over (leg_mass, vp, start) the
             outcomes behind them, `DISTANCES` and `REPORTED`.
         """
+        from hexmj.studies.static_limit.distances import LOSSES
+
         sizes = {"leg_mass": len(self.leg_masses), "vp": len(self.vps)}
         mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
         table = over_axes(sizes, data).assign_coords(
             vp=("vp", list(self.vps), {"units": "mm/s", "long_name": "velocity V_p of a protracting tip"}),
             leg_mass=("leg_mass", list(self.leg_masses), mass),
         )
-        return with_flss(table).assign_attrs(self.attributes(velocity=self.velocity, duration=self.duration))
+        lost = table.planned_loss < np.inf
+        for measure in ("measured", "grounded"):
+            same = (table[LOSSES[measure]] < np.inf) == lost
+            told = {"units": "1", "long_name": f"kinematic and {measure} answer agree"}
+            table[f"agreement_{measure}"] = same.mean("start").assign_attrs(told)
+        return with_flss(table, LOSSES).assign_attrs(self.attributes(velocity=self.velocity, duration=self.duration))

@@ -1,0 +1,71 @@
+"""What supports a walking body: feet at the ground, and a centre of pressure that lies between them."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hexmj import LDVS, Conditions, draw_starts, loss_time, physical_walk, walk_margin
+from hexmj.measures.physical import PhysicalWalk
+from hexmj.measures.support import GROUNDED, centre_of_pressure, grounded, pressure_margin
+
+
+@pytest.fixture(scope="module")
+def walked() -> PhysicalWalk:
+    """Some of these fall."""
+    return physical_walk(draw_starts(12, 0), LDVS, 0.7, 60.0, conditions=Conditions.of(vp=50.0))
+
+
+@pytest.fixture(scope="module")
+def resting() -> PhysicalWalk:
+    return physical_walk(draw_starts(12, 0), LDVS, 0.0, 3.0)
+
+
+def test_the_higher_a_foot_may_hover_the_more_stand_and_the_later_is_a_loss(walked):
+    walks = [walked.measured, *(grounded(walked, share) for share in (0.0, 0.02, GROUNDED, 0.2))]
+    for fewer, more in pairwise(walks):
+        assert (more.stance >= fewer.stance).all()
+        assert (loss_time(more) >= loss_time(fewer)).all()
+    assert walks[-1].stance.sum() > walks[0].stance.sum()
+
+
+def test_every_foot_that_the_ground_carries_is_at_the_ground(walked):
+    height = GROUNDED * walked.conditions.path.standing_height
+    assert (walked.height[walked.load > 0] < height).all()
+    assert_array_equal(grounded(walked).stance, walked.measured.stance | (walked.height <= height))
+
+
+def test_it_is_the_same_for_a_body_of_another_size(walked):
+    larger = walked.conditions.but(standing_height=1.3 * walked.conditions.path.standing_height)
+    again = replace(walked, height=1.3 * walked.height, conditions=larger)
+    assert_array_equal(grounded(again).stance, grounded(walked).stance)
+
+
+def test_after_a_fall_nothing_is_known(walked):
+    fallen = np.isnan(walked.measured.x).any(axis=-1)
+    assert fallen.any()
+    assert not grounded(walked).stance[fallen].any()
+    assert np.isnan(centre_of_pressure(walked)[fallen]).all()
+    assert np.isnan(pressure_margin(walked)[fallen]).all()
+
+
+def test_at_rest_the_feet_press_below_the_centre_of_mass(resting):
+    assert_allclose(centre_of_pressure(resting), 0.0, atol=0.02)  # mm
+    assert_allclose(pressure_margin(resting), walk_margin(resting.measured), atol=0.02)
+    assert_allclose(walk_margin(grounded(resting)), walk_margin(resting.planned), atol=0.5)
+
+
+def test_the_centre_of_pressure_lies_between_the_feet_that_carry(walked):
+    centre, margin = centre_of_pressure(walked), pressure_margin(walked)
+    known = np.isfinite(centre).all(axis=-1)
+    assert_array_equal(known, np.nansum(walked.load, axis=-1) > 0)
+    feet, carries = walked.measured.feet, (walked.load > 0)[..., None]
+    low = np.where(carries, feet, np.inf).min(axis=-2)
+    high = np.where(carries, feet, -np.inf).max(axis=-2)
+    assert ((low <= centre + 1e-9) & (centre <= high + 1e-9))[known].all()
+    few = known & ((walked.load > 0).sum(axis=-1) <= 2) & (grounded(walked).stance.sum(axis=-1) <= 2)
+    assert few.any()
+    assert_allclose(margin[few], 0.0, atol=1e-6)  # on the edge over which it tips
+    assert (margin[known] >= 0).all()
