@@ -18,7 +18,8 @@ def rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
         row = {name: result[name].values[n] for name in result.data_vars if result[name].dims == ("row",)}
         at = f" at {row['at']:g} mm/s" if row["depends"] else ""
         unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
-        ours = f"{row['mean']:.3g} ({row['low']:.3g} to {row['high']:.3g})"
+        several = row["low"] < row["high"]  # starts
+        ours = f"{row['mean']:.3g}" + (f" ({row['low']:.3g} to {row['high']:.3g})" if several else "")
         built_in = ", built in" if row["built_in"] else ""
         insects = _range(row["animal_low"], row["animal_high"])
         yield f"{row['name']}{at}{unit}", ours, insects, f"{row['verdict']}{built_in}", row["source"]
