@@ -19,9 +19,9 @@ from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.sweeps import Cell, KeptValues, run
+from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
 from tests.soak.faults import KINDS
-from tests.soak.jobs import LOG, Counted
 
 PATHS = (str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}

@@ -75,7 +75,8 @@ def code(modules: frozenset[str]) -> Code:
         content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if content and digest(content) != sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        data |= _data(module_label(name), file, names)
+        if names:
+            data |= _data(module_label(name), file, names)
     return Code(dict(sorted((sources | data).items())), versions)
 
 

@@ -13,12 +13,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 import hexmj
 from hexmj.cli.main import main
-from hexmj.controllers import Plan
 from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import first_loss
 from hexmj.results import results_folder, save_dataset
@@ -26,39 +24,13 @@ from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.sweeps import Cell, over_axes, run
-from hexmj.timing import Acceleration, Stride
-
-LOG = "CRASH_LOG"
-"""Variable with the name of the file of notes; outside the folder whose writes go wrong."""
+from tests.soak import counted
+from tests.soak.counted import Counted
 
 RESULT = "result.nc"
 
 SIZES = {"population": 3, "simplex": 2}
 """Starts of the stages of a search, by which their evaluations are told apart."""
-
-
-@dataclass(frozen=True)
-class Counted:
-    """The network of the paper; notes that it was asked."""
-
-    pull: float = 1.0
-    name: str = "counted"
-
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> Plan:
-        """See `Controller.begin`; V_r depends on `pull`, so that this can be searched."""
-        note = f"V-{velocity[0]:g} {len(starts)}-{np.float64(self.pull).tobytes().hex()}\n"
-        file = os.open(os.environ[LOG], os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-        os.write(file, note.encode())
-        os.close(file)
-        slower = velocity * min(1.0, abs(self.pull))
-        return hexmj.LDVS.begin(starts, slower, stride, acceleration, threads)
 
 
 def losses(controller: Counted, velocity: float) -> xr.Dataset:
@@ -115,7 +87,7 @@ def loses_a_process(folder: Path, **how: Any) -> None:
 
 def command(folder: Path, *more: str) -> None:
     """The command, as from a terminal."""
-    words = "compare", "--models", f"{__file__}:Counted", "--velocities", "0.3", "0.5", "--starts", "2"
+    words = "compare", "--models", f"{counted.__file__}:Counted", "--velocities", "0.3", "0.5", "--starts", "2"
     sys.argv = ["hexmj", *words, "--window", "2", "--no-video", *more, "--out", str(folder)]
     main()
 

@@ -15,13 +15,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from tests.soak.counted import LOG
 from tests.soak.faults import Disk
-from tests.soak.jobs import JOBS, LOG
 
 
 def live(job: str, folder: str, log: str, fault: dict[str, Any] | None) -> int:
     """Do a job to its end, with a fault if one is given; the exit code of a command."""
     from hexmj.errors import InputError
+    from tests.soak.jobs import JOBS
 
     os.environ[LOG] = log
     disk = Disk(Path(folder), **(fault or {}))
@@ -64,6 +65,8 @@ def born(task: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> None:
     """Whatever is asked for; a job is done here once before, so that its sources are known."""
+    from tests.soak.jobs import JOBS  # not by processes of a pool, which import this module too
+
     known = set[str]()
     for line in sys.stdin:
         task = json.loads(line)
