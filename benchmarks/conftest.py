@@ -8,8 +8,12 @@ import pytest
 OURS = "hexmj"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--once", action="store_true", help="take every figure once, and not after a first time")
+
+
 @pytest.fixture
-def measure(benchmark: Any) -> Callable[..., Any]:
+def measure(benchmark: Any, pytestconfig: pytest.Config) -> Callable[..., Any]:
     """``measure(work, what, who, ...)`` runs `work` and returns its value.
 
     `what` names the row, `who` is hexmj or a peer of it.  The figure is `amount` per second in `unit`, or the
@@ -30,6 +34,7 @@ def measure(benchmark: Any) -> Callable[..., Any]:
         warm: bool = True,
     ) -> Any:
         benchmark.extra_info.update(what=what, who=who, amount=amount, unit=unit, bar=bar, ratio=ratio)
-        return benchmark.pedantic(work, rounds=rounds, warmup_rounds=int(warm))
+        once = pytestconfig.getoption("--once")
+        return benchmark.pedantic(work, rounds=1 if once else rounds, warmup_rounds=int(warm and not once))
 
     return run

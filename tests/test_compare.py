@@ -26,7 +26,7 @@ from hexmj.sweeps import Cell, conduct
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
-WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "12", "--window", "60"]
+WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "6", "--window", "30"]
 
 
 @pytest.fixture(scope="module")
@@ -93,24 +93,21 @@ def test_processes_and_threads_give_the_same_bits(name, two_processes):
         assert conduct(STUDIES[name], executor=executor).identical(here)
 
 
-def test_a_killed_command_goes_on_and_ends_like_an_unbroken_one(tmp_path):
-    def command(out: Path, *more: str) -> subprocess.Popen[str]:
-        words = [sys.executable, "-m", "hexmj", *WORDS, "--no-video", "--json", "--out", str(out), *more]
-        paths = str(Path(hexmj.__file__).parents[1])
-        return subprocess.Popen(
-            words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=os.environ | {"PYTHONPATH": paths}
-        )
-
-    killed, walks = command(tmp_path / "killed"), tmp_path / "killed" / "walks"
+def test_a_killed_command_goes_on_and_ends_like_an_unbroken_one(run, tmp_path):
+    words = [*WORDS, "--no-video", "--json", "--out"]
+    command = [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")]
+    environment = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
+    killed = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
+    walks = tmp_path / "killed" / "walks"
     while not list(walks.glob("ldvs-*")) and killed.poll() is None:
         time.sleep(0.01)
     killed.kill()
-    killed.communicate()
+    killed.wait()
     kept = {path: path.stat().st_mtime_ns for path in walks.glob("[!.]*")}
     assert 0 < len(kept) < 6 and not (tmp_path / "killed" / "manifest.json").exists()
     answers = []
     for name, more in (("killed", ("--processes", "2")), ("unbroken", ())):
-        text, _ = command(tmp_path / name, *more).communicate()
+        _, text, _ = run(*words, tmp_path / name, *more)
         answers.append({key: value for key, value in json.loads(text).items() if key != "files"})
     assert answers[0] == answers[1]
     assert kept.items() <= {path: path.stat().st_mtime_ns for path in walks.iterdir()}.items()
