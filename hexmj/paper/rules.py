@@ -98,7 +98,11 @@ class Seen:
             return None
         p = [fisher(int(one.values.sum()), len(one.values), self.count, self.of) for one in points]
         estimates = [(point.estimate, _where(point)) for point in points]
-        return _worst(estimates, [-one for one in p], min(p) >= LEVEL)
+        strain = [
+            (one < LEVEL) + abs(value - self.count / self.of)
+            for one, ((value, _, _), _) in zip(p, estimates, strict=True)
+        ]
+        return _worst(estimates, strain, min(p) >= LEVEL)
 
 
 @dataclass(frozen=True)
