@@ -1,6 +1,7 @@
 """Dynamic stability maps as figures: two heat maps, and the mechanisms as stacked bars."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,8 +22,16 @@ MECHANISM_COLOURS = {
     "tipped_ahead": "#f6d55c",
     "thrown": "#b3261e",
     "unplanned": "#6a4c93",
+    "narrow": "#b79bd6",
 }
-"""Grey where nothing happened, greens for the saved, warm colours for falls after a planned loss."""
+"""Grey where nothing happened, greens for the saved, warm colours for falls after a planned loss, violet for others."""
+
+BAR: Mapping[str, Any] = {"marker": "_", "linestyle": "none"}
+MARKS: Mapping[str, Mapping[str, Any]] = {
+    "physical": {"color": "0.1", "markersize": 22, "markeredgewidth": 1.8},
+    "toppled": {"color": "white", "markersize": 14, "markeredgewidth": 1.8},
+}
+"""Measure -> the mark above which its starts lie."""
 
 
 def map_figure(result: "xr.Dataset") -> "Figure":
@@ -73,12 +82,12 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
             share = result["count"].sel(velocity=v, mechanism_name=name).values / total
             panel.bar(values, share, 0.82, bottom, color=colour, label=name.replace("_", " "))
             bottom = bottom + share
-        fell = result.physical.sel(velocity=v).values
-        panel.plot(values, 1.0 - fell, color="0.1", marker="_", markersize=22, linestyle="none", markeredgewidth=1.8)
+        for measure, style in MARKS.items():
+            panel.plot(values, 1.0 - result[measure].sel(velocity=v).values, **BAR, **style)
         panel.set_title(f"V = {v:g}", fontsize=11)
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("starts (above the mark: fell)")
+    panels[0].set_ylabel("starts (above the black mark: fell; above the white one: toppled)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
     figure.suptitle(_title(result), fontsize=10)

@@ -3,7 +3,8 @@
 A planned loss begins when the plan's margin, seen from the body's own centre of mass, is no longer positive.  It is
 over when the plan is stable again, the centre of mass is above the polygon of the feet that really stand, and the
 trunk has been upright, tilted by less than `TIPPED`, for the time constant of an inverted pendulum of the standing
-height, sqrt(h / g); if the trunk touches the ground before that, the loss has led to a fall.
+height, sqrt(h / g).  A fall begins as the trunk tips that has last been upright for so long.  It is told by where the
+trunk has leant since twice that time before, and by the margin of the plan since once that time before.
 """
 
 from collections.abc import Iterator
@@ -26,12 +27,17 @@ MECHANISMS = {
     "too_short": "saved: it left that polygon, and came back before the trunk had tipped",
     "landed_in_time": "saved: the trunk had tipped, and the feet that the plan put down held it",
     "caught": "saved: the trunk came down on a foot that the plan held in the air",
-    "tipped_behind": "fell after a planned loss, leaning back",
-    "tipped_ahead": "fell after a planned loss, leaning ahead",
-    "thrown": "fell after it had been caught: when the catching leg was put down, the trunk tipped to the other side",
-    "unplanned": "fell without a planned loss",
+    "tipped_behind": "fell as the plan lost stability, leaning back",
+    "tipped_ahead": "fell as the plan lost stability, leaning ahead",
+    "thrown": "fell to another side than it had tipped to: a foot met the ground, and its leg threw the trunk",
+    "unplanned": "fell though the margin of the plan was wide",
+    "narrow": "fell though the plan did not lose stability: its margin was narrow",
 }
 """Name of each mechanism and its definition; where several losses were survived, the last of the names that apply."""
+
+NARROW = 0.1
+"""Margin of the plan that is narrow, as a share of the standing height: feet being lifted give a trunk a push, and legs
+that give way move its centre of mass.  Measured are 0 to 0.09."""
 
 SAVED = ("still_standing", "too_short", "landed_in_time", "caught")
 """Mechanisms of the starts that were lost on paper and did not fall."""
@@ -47,21 +53,24 @@ def mechanisms(walk: PhysicalWalk, tipped: float = TIPPED) -> np.ndarray:
         tipped: as `TIPPED` [rad].
     """
     fell, known = np.isfinite(walk.outcomes.fall), np.isfinite(walk.qpos[..., 0]).sum(axis=0)
-    lost = walk_margin(static_plan(walk)) <= 0.0
-    outside = walk_margin(walk.measured) <= 0.0
+    kept, outside = walk_margin(static_plan(walk)), walk_margin(walk.measured) <= 0.0
     leans, tilt = lean(walk.qpos[..., 3:7])
-    recovered = _long_upright(walk, tilt < tipped) & ~outside
+    steps = _time_constant(walk)
+    upright = _long_upright(tilt < tipped, steps)
     caught = _caught(walk)
-    names = np.where(fell, _NUMBER["unplanned"], _NUMBER["never_lost"])
-    for start in np.flatnonzero(lost.any(axis=0)):
-        end = known[start]
-        for begin, over in _losses(lost[:end, start], recovered[:end, start]):
-            steps = slice(begin, over), start
-            if fell[start] and over == end:
-                names[start] = _fall(leans[steps], caught[steps], walk.planned.stance[steps])
-            elif not fell[start]:
-                exposed = tilt[steps][outside[steps]]
-                names[start] = max(names[start], _rescue(exposed, caught[steps], tipped))
+    narrow = NARROW * walk.conditions.path.standing_height
+    names = np.full(len(fell), _NUMBER["never_lost"])
+    for start, end in enumerate(known):
+        one = slice(end), start
+        if fell[start]:
+            tips = min(int(np.flatnonzero(np.append(True, upright[one]))[-1]), end - 1)
+            least = kept[max(tips - steps, 0) : tips + 1, start].min()
+            since = slice(max(tips - 2 * steps, 0), end), start
+            names[start] = _fall(leans[since][tilt[since] >= tipped], leans[end - 1, start], least, narrow)
+            continue
+        for begin, over in _losses(kept[one] <= 0.0, (upright & ~outside)[one]):
+            exposed = tilt[begin:over, start][outside[begin:over, start]]
+            names[start] = max(names[start], _rescue(exposed, caught[begin:over, start], tipped))
     return names
 
 
@@ -77,12 +86,20 @@ def static_plan(walk: PhysicalWalk) -> Walk:
     return replace(walk.planned, x=walk.planned.x - walk.conditions.masses.centre_of_mass)
 
 
-def _fall(lean: np.ndarray, caught: np.ndarray, stance: np.ndarray) -> int:
-    """The mechanism of a loss that led to a fall, from what its steps have shown: (step, 2), (step, leg) twice."""
-    put_down = (np.maximum.accumulate(caught) & stance).any(axis=1)
-    if put_down.any() and lean[np.argmax(put_down) - 1] @ lean[-1] < 0.0:
+def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
+    """The mechanism of a fall.
+
+    Args:
+        tipping: how the trunk has leant where it was tipped, (step, 2).
+        last: how it leans as it falls, (2,).
+        least: least margin of the plan within the time constant before it tipped [mm].
+        narrow: see `NARROW` [mm].
+    """
+    if (tipping @ last < 0.0).any():
         return _NUMBER["thrown"]
-    return _NUMBER["tipped_ahead" if lean[-1, 0] > 0.0 else "tipped_behind"]
+    if least > 0.0:
+        return _NUMBER["narrow" if least <= narrow else "unplanned"]
+    return _NUMBER["tipped_ahead" if last[0] > 0.0 else "tipped_behind"]
 
 
 def _rescue(exposed: np.ndarray, caught: np.ndarray, tipped: float) -> int:
@@ -105,10 +122,14 @@ def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]
         begin = end
 
 
-def _long_upright(walk: PhysicalWalk, upright: np.ndarray) -> np.ndarray:
-    """Where the trunk has been upright for sqrt(h / g), (step, start)."""
-    time_constant = np.sqrt(walk.conditions.path.standing_height / gravity(walk.conditions.body))
-    steps = int(np.ceil(time_constant / walk.conditions.time.seconds(walk.stride)))
+def _time_constant(walk: PhysicalWalk) -> int:
+    """That of an inverted pendulum of the standing height, sqrt(h / g), in steps of the plan."""
+    seconds = np.sqrt(walk.conditions.path.standing_height / gravity(walk.conditions.body))
+    return int(np.ceil(seconds / walk.conditions.time.seconds(walk.stride)))
+
+
+def _long_upright(upright: np.ndarray, steps: int) -> np.ndarray:
+    """Where the trunk has been upright for so many steps, (step, start)."""
     tipped = np.concatenate([np.zeros((steps, upright.shape[1]), dtype=int), np.cumsum(~upright, axis=0)])
     return tipped[steps:] == tipped[:-steps]
 
@@ -116,11 +137,11 @@ def _long_upright(walk: PhysicalWalk, upright: np.ndarray) -> np.ndarray:
 def _caught(walk: PhysicalWalk) -> np.ndarray:
     """Where a foot that the plan holds in the air stands again after it had left the ground, (step, start, leg).
 
-    One that is lowered to its AEP lands.
+    One that is lowered to its AEP lands; where the plan names none, no foot is lowered in the air.
     """
     stance, stands = walk.planned.stance, walk.measured.stance
     landing = walk.conditions.path.landing_distance(walk.conditions.time)
-    held = ~stance & (walk.planned.x < walk.planned.aep - landing)
+    held = ~stance & ~(walk.planned.x >= walk.planned.aep - landing)
     step = np.arange(len(stance), dtype=np.int32)[:, None, None]
     planned_down = np.maximum.accumulate(np.where(stance, step, -1), axis=0)
     off = np.maximum.accumulate(np.where(stands, -1, step), axis=0)
