@@ -48,6 +48,9 @@ class Search(WalkingCommand):
     """Problem 2: velocities drawn uniformly from this range."""
     physical: bool = False
     """Minimise falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    over: Literal["usual", "mean", "worst"] = "usual"
+    """Minimise the FLSS as given (usual), or its mean or worst over variants of constants and rules that the paper does
+    not print (`hexmj variants`)."""
     algorithm: Literal["evolution", "cmaes"] = "evolution"
     """The paper's evolutionary algorithm, or CMA-ES."""
     population: int = 10
@@ -125,7 +128,7 @@ class Search(WalkingCommand):
 
         how = {name: value for name, value in self.walked.items() if name != "seed"}
         conditions = self.conditions if self.physical else None
-        return Problem(self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback)
+        return Problem(self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback, over=self.over)
 
     def _form(self) -> "Form":
         from hexmj.controllers.named import load_controller
@@ -178,6 +181,7 @@ class Search(WalkingCommand):
     def _title(self) -> str:
         low, high = self._range
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
+        at += f", {self.over} of all variants" if self.over != "usual" else ""
         method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
         return literal(f"{self.form}, {self._kind} FLSS at {at}, {method}")
 

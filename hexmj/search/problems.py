@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from hexmj.starts import check_draw, checked_velocities, draw_starts
 from hexmj.sweeps.plain import plain
 from hexmj.threads import thread_count
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
+from hexmj.variants import VARIANTS, varied
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,6 +37,9 @@ MOST = 1e30
 
 REFUSED = 1.0
 """Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
+
+Over = Literal["usual", "mean", "worst"]
+"""What is minimised: the FLSS as given, or the mean or the greatest FLSS over all `VARIANTS`."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class Problem:
     """Of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
     feedback: bool = False
     """Candidates read the legs, see `ReadsLegs`, in physical walks."""
+    over: Over = "usual"
+    """Constants and rules under which a candidate walks, each time from the same starts."""
 
     def __post_init__(self) -> None:
         check_types(self)
@@ -67,8 +73,23 @@ class Problem:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         if self.feedback and not self.conditions:
             raise InputError("feedback without conditions; expected it with physical walks only")
+        if self.over != "usual" and not isinstance(self.form, NetworkForm):
+            raise InputError(
+                f"over = {self.over!r} with {self.form!r:.80}; expected it with the 1998 network, whose rules vary"
+            )
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
         steps_within(observation_time(self.window, ends, self.stride, self.acceleration), self.stride)
+        _ = self.variants
+
+    @property
+    def variants(self) -> "dict[str, Problem]":
+        """The problems over whose FLSS the mean or the greatest is taken, by the names of `VARIANTS`."""
+        if self.over == "usual":
+            return {"usual": self}
+        return {
+            name: replace(self, form=varied(self.form, name), stride=varied(self.stride, name), over="usual")
+            for name in VARIANTS
+        }
 
     @property
     def windows(self) -> list[str | float]:
@@ -108,7 +129,7 @@ class Problem:
 
     def settings(self) -> dict[str, Any]:
         """The problem as plain data."""
-        told = {name: plain(getattr(self, name)) for name in ("form", "low", "high", "window", "feedback")}
+        told = {name: plain(getattr(self, name)) for name in ("form", "low", "high", "window", "feedback", "over")}
         told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
         return told | {"conditions": self.conditions and self.conditions.settings()}
 
@@ -127,6 +148,12 @@ class Sample:
     def __post_init__(self) -> None:
         check_types(self)
         check_draw(self.n_starts, self.seed)
+
+    @cached_property
+    def variants(self) -> "dict[str, Sample]":
+        """The same starts of each of the problem's variants, by their names."""
+        several = self.problem.over != "usual"
+        return {name: replace(self, problem=one) if several else self for name, one in self.problem.variants.items()}
 
     @cached_property
     def starts(self) -> np.ndarray:
@@ -152,6 +179,14 @@ class Sample:
         vectors = numbers("vectors", vectors)
         if vectors.shape[1:] != (len(self.problem.form.names),):
             raise InputError(f"vectors of the shape {vectors.shape}; expected (candidate, parameter)")
+        return self._together([one._costs(vectors, threads) for one in self.variants.values()])
+
+    def _together(self, values: Any) -> np.ndarray:
+        """Of all variants, (variant, ...), what is minimised, (...)."""
+        return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
+
+    def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
+        """FLSS of each candidate, (candidate,), as given."""
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
             try:
@@ -179,15 +214,22 @@ class Sample:
         Raises:
             OutOfReach: it is one.
         """
-        if self.problem.conditions:
-            self._losses(self.problem.controller(vector), [self.problem.window], threads)
+        for one in self.variants.values():
+            if one.problem.conditions:
+                one._losses(one.problem.controller(vector), [one.problem.window], threads)
 
     def verdict(self, controllers: Mapping[str, Controller], threads: int | None = None) -> "xr.Dataset":
-        """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts."""
+        """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
+
+        The interval of a mean over variants is too wide rather than too narrow: as if all lost stability together.
+        """
         import xarray as xr
 
         windows = self.problem.windows
-        lost = np.array([self._losses(one, windows, threads) for one in controllers.values()])
+        lost = self._together([
+            [sample._losses(varied(one, name), windows, threads) for one in controllers.values()]
+            for name, sample in self.variants.items()
+        ])  # fmt: skip
         low, high = wilson_intervals(lost, self.n_starts)
         over, unit = ("controller", "window"), {"units": "1"}
         return xr.Dataset(

@@ -1,0 +1,42 @@
+"""Variants: one constant or rule that the paper leaves open, changed at a time.
+
+A set of weights is worth most if its FLSS is low whichever of them the authors used.
+"""
+
+from dataclasses import fields, replace
+from typing import Any, TypeVar
+
+from hexmj.controllers.cruse1998 import READINGS
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.legs import CENTRED
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "usual": {},
+    "centred": {"geometry": CENTRED},
+    "PEP_min -15": {"pep_min": -15.0},
+    "PEP_min -18": {"pep_min": -18.0},
+    "PEP_min -25": {"pep_min": -25.0},
+    "AEP0 9": {"aep0": 9.0},
+    "AEP0 11": {"aep0": 11.0},
+    "PEP0 -9": {"pep0": -9.0},
+    "PEP0 -9.9": {"pep0": -9.9},
+    "PEP0 -11": {"pep0": -11.0},
+    "dt 0.05": {"dt": 0.05},
+    "dt 0.2": {"dt": 0.2},
+    "undelayed": {"order": "undelayed"},
+    "sequential": {"order": "sequential"},
+    "lasting": {"reading": READINGS["lasting"]},
+}
+"""Name -> which fields of a `Stride` [mm, time units] or of the network it changes, and to what."""
+
+Part = TypeVar("Part")
+
+
+def varied(part: Part, variant: str) -> Part:
+    """A stride, a network or a form of its weights under one of `VARIANTS`; fields that it lacks stand elsewhere."""
+    if isinstance(part, ReadsLegs):
+        return replace(part, controller=varied(part.controller, variant))
+    own: Any = part
+    names = {one.name for one in fields(own)}
+    changes = {name: value for name, value in VARIANTS[variant].items() if name in names}
+    return replace(own, **changes) if changes else part
