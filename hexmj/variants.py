@@ -29,7 +29,15 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """Name -> which fields of a `Stride` [mm, time units] or of the network it changes, and to what."""
 
+UNREACHED = {"AEP0 11"}
+"""Variants that the legs of the stick insect do not reach."""
+
 Part = TypeVar("Part")
+
+
+def variants(physical: bool = False) -> list[str]:
+    """The names of `VARIANTS`, or of those that the insect can walk."""
+    return [name for name in VARIANTS if not (physical and name in UNREACHED)]
 
 
 def varied(part: Part, variant: str) -> Part:

@@ -128,7 +128,9 @@ class Search(WalkingCommand):
 
         how = {name: value for name, value in self.walked.items() if name != "seed"}
         conditions = self.conditions if self.physical else None
-        return Problem(self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback, over=self.over)
+        return Problem(
+            self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback, over=self.over
+        )
 
     def _form(self) -> "Form":
         from hexmj.controllers.named import load_controller

@@ -22,7 +22,7 @@ from hexmj.starts import check_draw, checked_velocities, draw_starts
 from hexmj.sweeps.plain import plain
 from hexmj.threads import thread_count
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
-from hexmj.variants import VARIANTS, varied
+from hexmj.variants import variants, varied
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,7 @@ REFUSED = 1.0
 """Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
 
 Over = Literal["usual", "mean", "worst"]
-"""What is minimised: the FLSS as given, or the mean or the greatest FLSS over all `VARIANTS`."""
+"""What is minimised: the FLSS as given, or the mean or the greatest FLSS over all variants."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ class Problem:
 
     @property
     def variants(self) -> "dict[str, Problem]":
-        """The problems over whose FLSS the mean or the greatest is taken, by the names of `VARIANTS`."""
+        """The problems over whose FLSS the mean or the greatest is taken, by the names of the variants."""
         if self.over == "usual":
             return {"usual": self}
         return {
             name: replace(self, form=varied(self.form, name), stride=varied(self.stride, name), over="usual")
-            for name in VARIANTS
+            for name in variants(physical=self.conditions is not None)
         }
 
     @property

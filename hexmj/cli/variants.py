@@ -1,0 +1,108 @@
+"""`hexmj variants`."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import OmitArgPrefixes, arg
+
+from hexmj.cli.options import CONTROLLER, Controlled, hiding
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import interval, new_table
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.errors import InputError, check_distinct
+from hexmj.studies.variants import study
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from rich.table import Table
+
+OF_EACH = "-V"
+"""What a model's name ends with where each velocity has a set of its own."""
+
+
+@dataclass(frozen=True)
+class _Controlled(Controlled):
+    """Order and reading are varied from what is given here; a variant has no feedback."""
+
+
+@dataclass(frozen=True)
+class Variants(StudyCommand):
+    """Options of `hexmj variants`, which `main.COMMANDS` describes."""
+
+    models: Annotated[
+        tuple[str, ...],
+        arg(help=f"Sets of the 1998 network, each {CONTROLLER}; own-V stands for own-0.1 at V = 0.1, and so on."),
+    ] = ("hws", "ldvs", "own", "own-V")
+    velocities: Sequence[float] = study.Variants.velocities
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    physical: bool = False
+    """Count falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    starts: int | None = None
+    """Number of random starts, the same for every set, variant and velocity; 2000 unless given, 50 if physical."""
+    out: Path = Path("results/variants")
+    """Folder for figure, NetCDF, manifest and finished walks."""
+    controlled: OmitArgPrefixes[Controlled] = field(default_factory=lambda: hiding(_Controlled(), ["feedback"]))
+
+    def study(self) -> study.Variants:
+        """See `StudyCommand.study`."""
+        if not self.physical:
+            self.refuse_physical("without --physical")
+        check_distinct("models", self.models)
+        return study.Variants(
+            {name: tuple(self._network(name, v) for v in self.velocities) for name in self.models},
+            self.velocities,
+            self.starts if self.starts is not None else 50 if self.physical else study.Variants.n_starts,
+            **self.walked,
+            conditions=self.conditions if self.physical else None,
+        )
+
+    def _network(self, name: str, velocity: float) -> Cruse1998:
+        """A set, or that of this velocity."""
+        own = f"{name.removesuffix('V')}{velocity:g}" if name.endswith(OF_EACH) else name
+        found = self.controlled.controller(own)
+        if not isinstance(found, Cruse1998):
+            raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
+        return found
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.variants.figure import variants_figure
+
+        return Outputs("walking every variant", "variants.nc", {"variants.png": variants_figure})
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """All frequencies."""
+        return lists_of(result.drop_vars("lost"))
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """A table for each velocity, what it comes to, and the conditions."""
+        kind = "physical" if self.physical else "kinematic"
+        yield f"{kind} FLSS of {result.sizes['start']} starts, one constant or rule changed at a time"
+        for velocity in result.velocity.values:
+            yield f"V = {velocity:g}"
+            yield _table(result.sel(velocity=velocity))
+        yield "Over all variants, with 95 % intervals"
+        yield _together(result)
+        yield self.conditions_line(self.physical)
+
+
+def _table(one: "xr.Dataset") -> "Table":
+    """A row for each variant, a column for each set."""
+    table = new_table("variant", *one.network.values)
+    for variant in one.variant.values:
+        table.add_row(variant, *(f"{flss:.4f}" for flss in one.flss.sel(variant=variant).values))
+    return table
+
+
+def _together(result: "xr.Dataset") -> "Table":
+    """A row for each set and velocity."""
+    table = new_table("set", "V", "mean", "worst", "which")
+    for name in result.network.values:
+        for velocity in result.velocity.values:
+            one = result.sel(network=name, velocity=velocity)
+            table.add_row(
+                name, f"{velocity:g}", interval(one, "mean"), interval(one, "worst"), one.worst_variant.item()
+            )
+    return table

@@ -1,0 +1,73 @@
+"""Sets under every variant as a figure: what each loses as usual, in the mean and at worst."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.literal import in_figure
+from hexmj.studies.drawing import tidy
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = {
+    "centred": "#6a4c93",
+    "PEP_min": "#b3261e",
+    "AEP0": "#e08e1b",
+    "PEP0": "#d4b106",
+    "dt": "#8a8a8a",
+    "undelayed": "#2a9d8f",
+    "sequential": "#14663a",
+    "lasting": "#1b6ca8",
+}
+"""Of the variants whose names begin so."""
+
+
+def variants_figure(result: "xr.Dataset") -> "Figure":
+    """A panel for each velocity, a row for each set, a dot for each variant, from `Variants`."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    columns = min(2, result.sizes["velocity"])
+    rows = -(-result.sizes["velocity"] // columns)
+    size = 1.4 + 4.6 * columns, 1.5 + rows * (0.9 + 0.36 * result.sizes["network"])
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for panel, velocity in zip(panels, result.velocity.values, strict=False):
+        _panel(panel, result.sel(velocity=velocity))
+        panel.set_title(f"V = {velocity:g}", fontsize=11)
+    for panel in panels[result.sizes["velocity"] :]:
+        panel.set_visible(False)
+    dots = {"marker": "o", "linestyle": "none", "markersize": 6}
+    handles = [Line2D([], [], color=colour, label=name, **dots) for name, colour in COLOURS.items()]
+    marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
+    handles = [Line2D([], [], color="0.1", label=name, **dots | mark) for name, mark in marks.items()] + handles
+    figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
+    figure.suptitle(
+        f"FLSS with one constant or rule changed at a time; {result.sizes['start']} starts,"
+        f" window {result.attrs['window']}",
+        fontsize=11,
+    )
+    return figure
+
+
+def _panel(axes: "Axes", one: "xr.Dataset") -> None:
+    """All sets at one velocity, the first at the top."""
+    names = one.network.values.tolist()
+    for row, name in enumerate(names):
+        here = one.sel(network=name)
+        axes.plot([here.flss.min(), here.flss.max()], [row, row], color="0.85", linewidth=5, solid_capstyle="round")
+        for variant in here.variant.values[::-1]:
+            colour = next((COLOURS[begin] for begin in COLOURS if variant.startswith(begin)), "0.1")
+            style = {"marker": "D", "color": "white", "markeredgecolor": "0.1", "markersize": 6.5, "zorder": 4}
+            if variant != "usual":
+                style = {"marker": "o", "color": colour, "markeredgecolor": "white", "markersize": 7, "alpha": 0.9}
+            axes.plot(here.flss.sel(variant=variant), row, **style)
+        axes.plot(here["mean"], row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
+    tidy(axes)
+    axes.grid(visible=False, axis="y")
+    axes.set(xlim=(0.0, np.ceil(one.worst.max().item() * 10.5) / 10), xlabel="FLSS")
+    axes.set_yticks(range(len(names)), [in_figure(name) for name in names])
+    axes.set_ylim(len(names) - 0.5, -0.5)

@@ -1,0 +1,157 @@
+"""Sets of weights under every variant of what the paper leaves open: which are good whatever the authors used?"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.checks import check_types, given, printable
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.errors import InputError
+from hexmj.intervals import wilson_intervals
+from hexmj.measures.kinematic import first_loss
+from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.starts import check_draw, draw_starts
+from hexmj.sweeps import Cell, over_axes
+from hexmj.sweeps.plain import content, plain
+from hexmj.timing import Acceleration, Stride
+from hexmj.variants import variants, varied
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Variants:
+    """The same random numbers for the starts of every set, variant and velocity; a cell for each."""
+
+    networks: Mapping[str, Sequence[Cruse1998]]
+    """By the names under which they stand in the result, one for each velocity."""
+    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
+    """V_r (when accelerating, its final value), each 0 <= V < 1."""
+    n_starts: int = 2000
+    """Number of starts."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]."""
+    seed: int = 0
+    """Of the starts."""
+    stride: Stride | None = None
+    """Usual step range, lines of the tips and time step."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+    conditions: Conditions | None = None
+    """Of physical walks, whose falls are counted; without it losses on paper are."""
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        check_draw(self.n_starts, self.seed)
+        if not self.networks:
+            raise InputError("no network was given; expected at least one")
+        for name, networks in self.networks.items():
+            printable("a network's name", name)
+            if len(networks) != len(self.velocities):
+                raise InputError(f"{name}: {len(networks)} networks; expected one for each of {self.velocities}")
+        _ = self.times
+
+    @property
+    def variants(self) -> list[str]:
+        """Names of the variants that are walked."""
+        return variants(physical=self.conditions is not None)
+
+    @property
+    def strides(self) -> dict[str, Stride]:
+        """That of each variant."""
+        return {name: varied(given("stride", self.stride, Stride), name) for name in self.variants}
+
+    @property
+    def times(self) -> np.ndarray:
+        """Observation times, (variant, velocity) [time units]."""
+        how = self.velocities, self.window
+        return np.array([observed(*how, stride, self.acceleration)[1] for stride in self.strides.values()])
+
+    def cells(self) -> list[Cell]:
+        """See `sweeps.Study`."""
+        same = {name: getattr(self, name) for name in ("n_starts", "seed", "acceleration", "conditions")}
+        times, velocities = dict(zip(self.variants, self.times.tolist(), strict=True)), list(self.velocities)
+
+        def cell(name: str, variant: str, i: int) -> Cell:
+            time, stride = times[variant][i], self.strides[variant]
+            own = {"network": varied(self.networks[name][i], variant), "velocity": velocities[i], "duration": time}
+            work = time / stride.dt
+            return Cell(f"{name}-{variant}-V-{velocities[i]:g}", losses, same | own | {"stride": stride}, work)
+
+        return [cell(*one) for one in product(self.networks, self.variants, range(len(velocities)))]
+
+    def result(self, data: "Sequence[xr.Dataset]") -> "xr.Dataset":
+        """How often each set loses stability, and what this comes to over all variants.
+
+        Returns:
+            Over (network, variant, velocity): `flss` with its 95 % Wilson interval, over the starts too `lost`.  Over
+            (network, velocity): `mean` and `worst` over the variants with their intervals, that of the mean too wide
+            rather than too narrow: as if all variants lost the same starts; and the name of the worst, `worst_variant`.
+        """
+        sizes = {"network": len(self.networks), "variant": len(self.variants), "velocity": len(self.velocities)}
+        times = {"units": "time unit", "long_name": "observation time t"}
+        table = over_axes(sizes, data).assign_coords(
+            network=list(self.networks),
+            variant=self.variants,
+            velocity=velocity_axis(np.array(self.velocities), self.times[0])["velocity"],
+            duration=(("variant", "velocity"), self.times, times),
+        )
+        lost = table.lost.sum("start")
+        frequencies = {"flss": lost, "mean": lost.mean("variant"), "worst": lost.max("variant")}
+        for name, count in frequencies.items():
+            low, high = wilson_intervals(np.rint(count.values), self.n_starts)
+            for end, values in {"": count.values / self.n_starts, "_low": low, "_high": high}.items():
+                table[name + end] = count.copy(data=values).assign_attrs(units="1")
+        table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
+        told = ("window", "n_starts", "seed", "acceleration", "conditions", "networks")
+        return table.assign_attrs({name: plain(getattr(self, name)) for name in told} | self._stride)
+
+    @property
+    def _stride(self) -> dict[str, object]:
+        return {"stride": plain(self.strides["usual"])}
+
+
+def losses(
+    network: Cruse1998,
+    velocity: float,
+    duration: float,
+    *,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    conditions: Conditions | None = None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Which starts lose static stability on paper, or fall, as `lost`, 0 or 1, over start.
+
+    Args:
+        network: plans the walks.
+        velocity: V_r, or its final value.
+        duration: observation time [time units].
+        n_starts: number of starts.
+        seed: of the starts.
+        stride: step range, lines of the tips and time step.
+        acceleration: the accelerating procedure of Eq. 11.
+        conditions: of physical walks; without it on paper.
+        threads: one per core unless given; the answers do not depend on it.
+    """
+    import xarray as xr
+
+    if conditions:
+        from hexmj.measures.outcome_table import settled_starts
+        from hexmj.measures.physical import physical_outcomes
+
+        settled = settled_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
+        how = {"acceleration": acceleration, "threads": threads}
+        time = physical_outcomes(settled, network, velocity, duration, **how).fall
+    else:
+        starts = draw_starts(n_starts, seed, stride)
+        how = {"stride": stride, "acceleration": acceleration, "threads": threads}
+        time = first_loss(starts, network, velocity, duration, **how)
+    return xr.Dataset({"lost": ("start", np.isfinite(time).astype(np.int8), {"units": "1"})})
