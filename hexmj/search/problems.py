@@ -230,7 +230,7 @@ class Sample:
             [sample._losses(varied(one, name), windows, threads) for one in controllers.values()]
             for name, sample in self.variants.items()
         ])  # fmt: skip
-        low, high = wilson_intervals(lost, self.n_starts)
+        low, high = wilson_intervals(np.rint(lost), self.n_starts)
         over, unit = ("controller", "window"), {"units": "1"}
         return xr.Dataset(
             {

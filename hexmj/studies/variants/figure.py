@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hexmj.literal import in_figure
 from hexmj.studies.drawing import tidy
 
@@ -68,6 +66,6 @@ def _panel(axes: "Axes", one: "xr.Dataset") -> None:
         axes.plot(here["mean"], row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
     tidy(axes)
     axes.grid(visible=False, axis="y")
-    axes.set(xlim=(0.0, np.ceil(one.worst.max().item() * 10.5) / 10), xlabel="FLSS")
+    axes.set(xlim=(0.0, min(1.02, 1.05 * one.worst.max().item() + 1e-3)), xlabel="FLSS")
     axes.set_yticks(range(len(names)), [in_figure(name) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)

@@ -1,0 +1,149 @@
+"""Variants: the usual one is plain FLSS, each changes one thing, and a search over them costs what the study counts."""
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Problem, ReadsLegs, Stride
+from hexmj.controllers import Step, stepwise
+from hexmj.search.problems import Sample
+from hexmj.studies.variants.figure import COLOURS, variants_figure
+from hexmj.studies.variants.study import Variants
+from hexmj.sweeps import Cell, conduct
+from hexmj.variants import VARIANTS, variants, varied
+
+SMALL: dict[str, Any] = {"velocities": (0.5, 0.7), "n_starts": 60, "window": "start", "seed": 4}
+SETS = {"hws": (HWS, HWS), "own-V": (hexmj.PRESETS["own-0.5"], hexmj.PRESETS["own-0.7"])}
+
+
+@dataclass(frozen=True)
+class Stands:
+    """Never moves."""
+
+    pace: float = 1.0
+    name: str = "stands"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        return stepwise(lambda v: Step(starts, np.ones(6, dtype=bool)), starts, velocity, stride, acceleration)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("variants")
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return conduct(Variants(SETS, **SMALL), folder)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_variant_changes_one_thing(variant):
+    changed = [
+        name
+        for usual, other in ((part, varied(part, variant)) for part in (Stride(), LDVS))
+        for name in ("aep0", "pep0", "pep_min", "dt", "geometry", "order", "reading")
+        if getattr(usual, name, None) != getattr(other, name, None)
+    ]
+    assert changed == list(VARIANTS[variant])
+    assert len(changed) == (variant != "usual")
+
+
+def test_a_controller_that_reads_the_legs_is_varied_within():
+    assert varied(ReadsLegs(LDVS), "undelayed") == ReadsLegs(replace(LDVS, order="undelayed"))
+
+
+def test_the_usual_variant_is_plain_flss(result):
+    same = {"flss": "flss", "flss_low": "low", "flss_high": "high", "duration": "duration"}
+    for name, networks in SETS.items():
+        for network, v in zip(networks, SMALL["velocities"], strict=True):
+            plain = hexmj.flss(network, [v], **{key: SMALL[key] for key in ("n_starts", "window", "seed")})
+            one = result.sel(network=name, velocity=v, variant="usual")
+            for ours, theirs in {
+                "flss": "flss",
+                "flss_low": "low",
+                "flss_high": "high",
+                "duration": "duration",
+            }.items():
+                assert one[ours].item() == plain[theirs].item()
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_is_plain_flss_of_what_it_changes(result, variant):
+    how = {key: SMALL[key] for key in ("n_starts", "window", "seed")}
+    expected = hexmj.flss(varied(HWS, variant), [0.7], stride=varied(Stride(), variant), **how).flss.item()
+    assert result.flss.sel(network="hws", velocity=0.7, variant=variant).item() == expected
+
+
+@pytest.mark.parametrize(("over", "name"), [("mean", "mean"), ("worst", "worst")])
+def test_a_search_over_variants_costs_what_the_study_counts(result, over, name):
+    form = NetworkForm("general")
+    sample = Sample(Problem(form, 0.5, 0.5, SMALL["window"], over=over), SMALL["n_starts"], SMALL["seed"])
+    sets = {key: networks[0] for key, networks in SETS.items()}
+    expected = result[name].sel(velocity=0.5)
+    costs = sample.costs(np.array([form.vector(one) for one in sets.values()]))
+    np.testing.assert_allclose(costs, expected.sel(network=list(sets)).values, rtol=1e-12)
+    verdict = sample.verdict(sets).sel(window=SMALL["window"])
+    for ours, theirs in {"flss": name, "flss_low": f"{name}_low", "flss_high": f"{name}_high"}.items():
+        np.testing.assert_allclose(verdict[ours].values, result[theirs].sel(velocity=0.5).values, rtol=1e-12)
+
+
+def test_mean_and_worst_are_of_the_variants(result):
+    np.testing.assert_allclose(result["mean"], result.flss.mean("variant"))
+    assert (result.worst == result.flss.max("variant")).all()
+    for name in SETS:
+        one = result.sel(network=name, velocity=0.5)
+        assert one.flss.sel(variant=one.worst_variant.item()) == one.worst
+    assert (result["mean_low"] <= result["mean"]).all()
+    assert (result["mean"] <= result["mean_high"]).all()
+
+
+def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
+    monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
+    assert conduct(Variants(SETS, **SMALL), folder).identical(result)
+    with pytest.raises(pytest.fail.Exception, match="walked again"):
+        conduct(Variants(SETS, **(SMALL | {"seed": 1})), folder)
+
+
+def test_the_figure_shows_every_set_and_velocity(result):
+    figure = variants_figure(result)
+    assert [axes.get_title() for axes in figure.axes] == ["V = 0.5", "V = 0.7"]
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(SETS)
+    assert all(name == "usual" or any(name.startswith(begin) for begin in COLOURS) for name in VARIANTS)
+
+
+def test_the_insect_walks_the_variants_that_its_legs_reach():
+    """On paper the other one is walked too."""
+    assert set(variants()) - set(variants(physical=True)) == {"AEP0 11"}
+    few: dict[str, Any] = {"velocities": (0.7,), "n_starts": 2, "window": 20.0}
+    walked = conduct(Variants({"ldvs": (LDVS,)}, conditions=Conditions.of(vp=200.0), **few))
+    assert walked.variant.values.tolist() == variants(physical=True)
+    alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, window=20.0, conditions=Conditions.of(vp=200.0))
+    assert walked.flss.sel(variant="usual").item() == alone.flss.item()
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(InputError, match=r"over = 'mean' with .*; expected it with the 1998 network, whose rules vary"):
+        Problem(FieldsForm(Stands()), 0.4, 0.4, over="mean")
+    with pytest.raises(InputError, match=r"over = 'most'; expected"):
+        Problem(NetworkForm(), 0.4, 0.4, over="most")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match=r"pep_min = -15.0, pep0 = -16.0"):
+        Problem(NetworkForm(), 0.4, 0.4, over="mean", stride=Stride(pep0=-16.0))
+    with pytest.raises(InputError, match="ldvs: 1 networks; expected one for each of"):
+        Variants({"ldvs": (LDVS,)}, (0.1, 0.2))
+    with pytest.raises(InputError, match="no network was given"):
+        Variants({})
+
+
+def test_the_command(run, result, tmp_path):
+    words = ["variants", "--models", "hws", "own-V", "--velocities", 0.5, 0.7, "--starts", 60, "--window", "start"]
+    code, out, _ = run(*words, "--seed", 4, "--json", "--out", tmp_path)
+    told = json.loads(out)
+    assert code == 0
+    assert told["flss"] == result.flss.values.tolist()
+    assert told["worst_variant"] == result.worst_variant.values.tolist()
+    assert {path.name for path in tmp_path.iterdir()} >= {"variants.nc", "variants.png", "manifest.json"}
