@@ -100,8 +100,9 @@ def test_mean_and_worst_are_of_the_variants(result):
 def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
     assert conduct(Variants(SETS, **SMALL), folder).identical(result)
+    others: dict[str, Any] = {**SMALL, "seed": 1}
     with pytest.raises(pytest.fail.Exception, match="walked again"):
-        conduct(Variants(SETS, **(SMALL | {"seed": 1})), folder)
+        conduct(Variants(SETS, **others), folder)
 
 
 def test_the_figure_shows_every_set_and_velocity(result):
