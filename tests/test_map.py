@@ -1,7 +1,7 @@
 """Dynamic stability maps: cells are the package's own measures, differences are paired, what is done is not redone."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -173,3 +173,17 @@ def test_command(tmp_path, run):
     assert code == 2 and "vp = 20.0; expected values" in error
     assert run(*words, "--feedback")[0] == 2
     assert run("map", "--over", "wind")[0] == 2
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    name: str = "unfinished"
+
+    def begin(self, starts, velocity, stride, acceleration, threads):
+        assert threads
+        raise IndexError("my bug")
+
+
+def test_a_controller_that_raises_gets_a_sentence():
+    with pytest.raises(InputError, match=r"unfinished, begin: IndexError in .*my bug"):
+        StabilityMap(Unfinished())  # pyright: ignore[reportArgumentType]

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import ReadingPlan
 from hexmj.errors import InputError, check_distinct
 from hexmj.measures.velocities import observed, velocity_axis
@@ -64,7 +65,7 @@ class StabilityMap(SameStarts):
         check_distinct("values", self.chosen)
         _ = self.varied, self.observed
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
-        if isinstance(self.controller.begin(start, v, self.stride, self.acceleration), ReadingPlan):
+        if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), ReadingPlan):
             raise InputError(
                 "a controller that reads the legs; expected another: mechanisms are told from the plan alone"
             )
