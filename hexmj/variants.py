@@ -44,7 +44,8 @@ def varied(part: Part, variant: str) -> Part:
     """A stride, a network or a form of its weights under one of `VARIANTS`; fields that it lacks stand elsewhere."""
     own: Any = part
     names = {one.name for one in fields(own)}
-    if isinstance(part, ReadsLegs):
-        return replace(own, controller=varied(part.controller, variant))
     changes = {name: value for name, value in VARIANTS[variant].items() if name in names}
-    return replace(own, **changes) if changes else part
+    if isinstance(part, ReadsLegs):
+        changes = {"controller": varied(part.controller, variant)}
+    changed: Any = replace(own, **changes) if changes else part
+    return changed
