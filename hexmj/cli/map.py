@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.options import Controlled, ControllerName, hiding
 from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, new_table
-from hexmj.measures.compare import BESIDE, MEASURES
+from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Map(StudyCommand):
             f" FLSS; change: physical FLSS less that at {self.over} = {result.attrs['reference']:g}"
         )
         yield differences
-        yield f"Why they fall or do not, numbers of starts at each {self.over}"
+        yield f"Why they fall or do not, and how many toppled, numbers of starts at each {self.over}"
         yield _reasons(result)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         starts = f"{result.sizes['start']} of {self.starts} starts"
@@ -86,15 +86,15 @@ class Map(StudyCommand):
 
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
     """A row for each value and velocity: the measures, and what differs between them."""
-    measures = new_table("value", "V", *MEASURES, *BESIDE)
-    differences = new_table("value", "V", "Froude", "static", "saved", *DIFFERENCES)
+    measures = new_table("value", "V", "Froude", *MEASURES)
+    differences = new_table("value", "V", "static", "saved", *DIFFERENCES)
     for value in result.value.values:
         for v in result.velocity.values:
             one, at = result.sel(value=value, velocity=v), (f"{value:g}", f"{v:g}")
-            measures.add_row(*at, *(interval(one, name) for name in MEASURES | BESIDE))
+            measures.add_row(*at, f"{one.froude.item():.2g}", *(interval(one, name) for name in MEASURES))
             changes = (_difference(one, name) for name in DIFFERENCES)
             saved = interval(one, "saved") if one.static.item() else "none lost"
-            differences.add_row(*at, f"{one.froude.item():.2g}", f"{one.static.item():.3f}", saved, *changes)
+            differences.add_row(*at, f"{one.static.item():.3f}", saved, *changes)
     return measures, differences
 
 
@@ -105,6 +105,8 @@ def _reasons(result: "xr.Dataset") -> "Table":
         for name in result.mechanism_name.values:
             counts = result["count"].sel(velocity=v, mechanism_name=name).values
             table.add_row(f"{v:g}", name.replace("_", " "), *map(str, counts))
+        toppled = (result.topple.sel(velocity=v) < float("inf")).sum("start")
+        table.add_row(f"{v:g}", "toppled, of all", *map(str, toppled.values))
     return table
 
 

@@ -87,7 +87,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
         panel.set_title(f"V = {v:g}", fontsize=11)
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("starts (above the black mark: fell; above the white one: toppled)")
+    panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
     figure.suptitle(_title(result), fontsize=10)
