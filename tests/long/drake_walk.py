@@ -165,7 +165,8 @@ def main(count: int) -> None:
         apart = np.abs(ours[both] / settled.conditions.time.vp - theirs[both])
         print(
             f"V = {velocity:g}: {fell.sum()} of {count} fall in MuJoCo, {other.sum()} in Drake, the same answer for"
-            f" {agreed} ({low:.2f}-{high:.2f}); of the {both.sum()} that fall in both, half within {np.median(apart):.2g} s",
+            f" {agreed} ({low:.2f}-{high:.2f}); of the {both.sum()} that fall in both, half within"
+            f" {np.median(apart):.2g} s",
             flush=True,
         )
 
