@@ -318,6 +318,10 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
     path = tmp_path / "tall.toml"
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4.0\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0}
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\n')
+    assert repr(settings_of(hexmj.load_controller("tall.toml"))["height"]) == "4.0", "the same setting"
+    path.write_text('controller = "mine_of_a_user.py:Still"\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 0.0}
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = "4.0"\n')
     with pytest.raises(hexmj.InputError, match=r"\[fields\]: height = '4.0'; expected a number"):
         hexmj.load_controller("tall.toml")

@@ -126,6 +126,23 @@ def test_mutation_has_standard_deviation_0_3_i():
     assert (np.abs(change.mean(axis=1)) < 4 * sigma / math.sqrt(size)).all()
 
 
+def test_steps_are_in_units_of_the_parameters():
+    """Of the network's forms, whose units are the paper's, every unit is 1."""
+    individuals, unit = np.random.default_rng(0).normal(size=(5, 6)), np.array([1.0, 0.008, 300.0, 1.0, 2.0, 1e-4])
+    ones, units = (mutated(individuals, np.random.default_rng(1), one) - individuals for one in (1.0, unit))
+    np.testing.assert_allclose(units, unit * ones, rtol=1e-9, atol=1e-12)
+    for form in (HWS, LDVS):
+        assert np.array(Problem(form, 0.5, 0.5).domain(3.0).unit == 1.0).all()
+    tried = []
+
+    def cost(vectors: np.ndarray) -> np.ndarray:
+        tried.extend(vectors)
+        return np.ones(len(vectors))
+
+    refine(np.zeros(6), ~BINARY, cost, 5, unit)
+    np.testing.assert_allclose(np.max(tried, axis=0), 0.1 * unit * ~BINARY, atol=1e-12)
+
+
 @pytest.mark.parametrize("algorithm", [Evolution, CovarianceAdaptation])
 @pytest.mark.parametrize("cost", [mixed_sphere, narrow_valley])
 def test_both_algorithms_and_the_simplex_find_a_known_minimum(algorithm, cost):
@@ -217,6 +234,7 @@ def test_the_fields_of_a_controller_are_searched():
     assert not domain.binary.any()
     assert (domain.low.tolist(), domain.high.tolist()) == ([0.0, -2.0], [8.0, 0.0])
     assert domain.begin is not None and domain.begin.tolist() == [2.0, -0.5]
+    assert np.broadcast_to(domain.unit, 2).tolist() == [2.0, 0.5]
     assert problem.domain(4.0, Pace(good=1.0)).begin.tolist() == [1.0, -0.5]  # pyright: ignore[reportOptionalMemberAccess]
     assert form.controller(np.array([1.5, 0.25])) == Pace(good=1.5, idle=0.25)
     sample = Sample(problem, 50, 0)

@@ -207,7 +207,7 @@ class Search(WalkingCommand):
         if isinstance(controller, Cruse1998):
             return network_toml(controller)
         table = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
-        values = table["fields"] | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
+        values = table.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
         lines = [f"controller = {json.dumps(table['controller'], ensure_ascii=False)}", "", "[fields]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
         return "\n".join(lines) + "\n"

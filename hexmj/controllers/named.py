@@ -29,7 +29,7 @@ def load_controller(name: str) -> Controller:
     Args:
         name: a preset; ``module:object`` or ``file.py:object``, a controller or a class of controllers, which is made
             with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of the 1998
-            network, or with the name of a `controller` and a table of its `fields`.
+            network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
 
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
@@ -50,8 +50,8 @@ def load_controller(name: str) -> Controller:
             " nor module:object or file.py:object"
         )
     table = read_toml(path)
-    if set(table) == {"controller", "fields"} and isinstance(table["fields"], dict):
-        return _with_fields(path, str(table["controller"]), table["fields"])
+    if "controller" in table and set(table) <= {"controller", "fields"} and isinstance(table.get("fields", {}), dict):
+        return _with_fields(path, str(table["controller"]), table.get("fields", {}))
     return read_network(table, name, literal(path.stem))
 
 
@@ -68,9 +68,8 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     found: Any = load_controller(named)
     try:
         wanted = get_type_hints(type(found))
-        for name in [one for one in values if wanted.get(one) in (bool, int, float, str)]:
-            typed(name, values[name], wanted[name])
-        return replace(found, **values)
+        plain = [one for one in values if wanted.get(one) in (bool, int, float, str)]
+        return replace(found, **(values | {name: typed(name, values[name], wanted[name]) for name in plain}))
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 

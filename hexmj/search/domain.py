@@ -17,6 +17,8 @@ class Domain:
     """(parameter,) whether the cost function takes only 0 or 1 there."""
     begin: np.ndarray | None = None
     """(parameter,) a set from which the search begins; each algorithm has a beginning of its own without it."""
+    unit: np.ndarray | float = 1.0
+    """(parameter,) what counts as 1 of each parameter where a step is told without a unit."""
 
     def read(self, individuals: np.ndarray) -> np.ndarray:
         """The parameters of individuals, both (..., parameter): a binary one is 1 where the number is above 1/2."""

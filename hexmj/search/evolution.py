@@ -11,7 +11,7 @@ from hexmj.errors import InputError
 from hexmj.search.domain import Domain
 
 SIGMA = 0.3
-"""Standard deviation of the mutation of individual i is i times this, in the units of the parameters."""
+"""Standard deviation of the mutation of individual i is i times this, in units of `Domain.unit`."""
 
 
 class Evolution:
@@ -36,7 +36,7 @@ class Evolution:
         costs = np.concatenate([self._known, costs])
         fittest = np.argmin(costs)
         others = self._rng.choice(len(costs), len(costs) - 1, p=selection_probabilities(costs))
-        self.individuals = mutated(self.individuals[[fittest, *others]], self._rng)
+        self.individuals = mutated(self.individuals[[fittest, *others]], self._rng, self._domain.unit)
         self._known = costs[[fittest]]
 
 
@@ -49,8 +49,8 @@ def selection_probabilities(costs: np.ndarray) -> np.ndarray:
     return advantage / advantage.sum()
 
 
-def mutated(individuals: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def mutated(individuals: np.ndarray, rng: np.random.Generator, unit: np.ndarray | float = 1.0) -> np.ndarray:
     """Individual i = 2 ... L with a normal component of standard deviation 0.3 i on every number (Section 4.1.2)."""
     sigma = SIGMA * np.arange(1, len(individuals) + 1)[:, None]
     sigma[0] = 0.0
-    return individuals + sigma * rng.standard_normal(individuals.shape)
+    return individuals + unit * sigma * rng.standard_normal(individuals.shape)

@@ -29,7 +29,8 @@ class Form(Protocol):
         ...
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest values of the first population, (parameter,) each."""
+        """Least and greatest values of the first population, (parameter,) each; the greater magnitude of them at a
+        reach of 1 is what counts as 1 of a parameter."""
         ...
 
     def controller(self, vector: np.ndarray) -> Controller:

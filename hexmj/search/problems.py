@@ -112,7 +112,8 @@ class Problem:
         typed("binary of the form", form.binary, np.ndarray)
         if form.binary.shape != (size,) or form.binary.dtype != bool:
             raise InputError(f"the form's binary = {form.binary!r:.80}; expected True or False for {size} parameters")
-        return Domain(box[0], box[1], form.binary, where)
+        unit = np.abs(numbers("box of the form", form.box(1.0))).max(axis=0)
+        return Domain(box[0], box[1], form.binary, where, unit)
 
     def controller(self, vector: np.ndarray) -> Controller:
         """A candidate, from (parameter,)."""

@@ -155,7 +155,7 @@ def _search(
 
     best, cost = run(searcher, partial(costs, "population"), effort.budget)
     if effort.refine_budget:
-        best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget)
+        best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
     asked = history.dataset(problem.form.names)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     replayed = sum(one.replayed for one in kept.values())
@@ -180,11 +180,13 @@ def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, floa
     return _least(tried)
 
 
-def refine(start: np.ndarray, free: np.ndarray, costs: Costs, budget: int) -> tuple[np.ndarray, float]:
+def refine(
+    start: np.ndarray, free: np.ndarray, costs: Costs, budget: int, unit: np.ndarray | float = 1.0
+) -> tuple[np.ndarray, float]:
     """Downhill simplex from `start` over its `free` parameters; the best vector and its cost.
 
     The first simplex is long enough to leave the steps of a frequency: each edge is a tenth of the
-    parameter and 0.1 of its unit.
+    parameter and 0.1 of its `unit`, see `Domain`.
     """
     from scipy.optimize import minimize
 
@@ -196,8 +198,8 @@ def refine(start: np.ndarray, free: np.ndarray, costs: Costs, budget: int) -> tu
         tried.append((vector, costs(vector[None])[0]))
         return tried[-1][1]
 
-    x = start[free]
-    simplex = np.vstack([x, x + np.diag(0.1 * np.abs(x) + 0.1)])
+    x, edge = start[free], (0.1 * np.abs(start) + 0.1 * unit)[free]
+    simplex = np.vstack([x, x + np.diag(edge)])
     minimize(cost, x, method="Nelder-Mead", options={"maxfev": budget, "initial_simplex": simplex, "fatol": 1e-9})
     return _least(tried)
 
