@@ -17,6 +17,7 @@ from hexmj.sweeps import Cell, conduct
 from hexmj.variants import VARIANTS, variants, varied
 
 SMALL: dict[str, Any] = {"velocities": (0.5, 0.7), "n_starts": 60, "window": "start", "seed": 4}
+OTHER_SEED: dict[str, Any] = {"seed": 1}
 SETS = {"hws": (HWS, HWS), "own-V": (hexmj.PRESETS["own-0.5"], hexmj.PRESETS["own-0.7"])}
 
 
