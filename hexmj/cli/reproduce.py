@@ -18,7 +18,7 @@ class Reproduce:
     """Options of `hexmj reproduce`, which `main.COMMANDS` describes."""
 
     quick: bool = False
-    """Fewer starts and velocities, under a minute; the full protocol takes several."""
+    """Fewer starts and velocities, coarser steps of gaits, under a minute; the full protocol takes several."""
     only: tuple[str, ...] | None = None
     """Keys of the claims to judge, without figures; all unless given."""
     beside: tuple[str, ...] = ()

@@ -90,10 +90,11 @@ QUICK = Protocol(
     velocities=(0.1, 0.2, 0.3, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9),
     gait_starts=10,
     gait_velocities=(0.1, 0.25, 0.4, 0.6, 0.8, 0.95),
+    gait_stride=Stride(dt=0.05),
     obstacle_velocities=(0.3, 0.7),
     obstacle_starts=20,
 )
-"""A tenth of the starts, about half of the velocities."""
+"""A tenth of the starts, about half of the velocities, gaits with a coarser time step."""
 
 
 @dataclass(frozen=True)
