@@ -3,7 +3,7 @@
 A set of weights is worth most if its FLSS is low whichever of them the authors used.
 """
 
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from typing import Any, TypeVar
 
 from hexmj.controllers.cruse1998 import READINGS
@@ -27,7 +27,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "sequential": {"order": "sequential"},
     "lasting": {"reading": READINGS["lasting"]},
 }
-"""Name -> which fields of a `Stride` [mm, time units] or of the network it changes, and to what."""
+"""Name -> which fields of a `Stride` [mm, time units] or of the network it changes, and to what; see `varied`."""
 
 UNREACHED = {"AEP0 11"}
 """Variants that the legs of the stick insect do not reach."""
@@ -41,10 +41,14 @@ def variants(physical: bool = False) -> list[str]:
 
 
 def varied(part: Part, variant: str) -> Part:
-    """A stride, a network or a form of its weights under one of `VARIANTS`; fields that it lacks stand elsewhere."""
+    """A stride, a network or a form of its weights under one of `VARIANTS`; fields that it lacks stand elsewhere.
+
+    What has the changed value already gets the default instead: a set of the reading 'lasting' is read as printed.
+    """
     own: Any = part
-    names = {one.name for one in fields(own)}
-    changes = {name: value for name, value in VARIANTS[variant].items() if name in names}
+    usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
+    wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
+    changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
     if isinstance(part, ReadsLegs):
         changes = {"controller": varied(part.controller, variant)}
     changed: Any = replace(own, **changes) if changes else part

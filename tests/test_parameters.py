@@ -1,5 +1,6 @@
 """Weights, symmetric forms, presets and parameter files."""
 
+import re
 import runpy
 import shlex
 import tomllib
@@ -246,11 +247,12 @@ def test_written_rules_are_read_again(order, reading, tmp_path):
     assert load_controller(str(path)) == Cruse1998(LDVS.weights, order, "network", READINGS[reading])
 
 
+@pytest.mark.parametrize("wrong", ["'wrong'", "['lasting']", "1"])
 @pytest.mark.parametrize(("rule", "valid"), [("order", "sequential"), ("reading", "lasting")])
-def test_unknown_rules_are_refused(rule, valid, tmp_path):
+def test_unknown_rules_are_refused(rule, valid, wrong, tmp_path):
     path = tmp_path / "network.toml"
-    path.write_text(f'{rule} = "wrong"\n{network_toml(LDVS)}')
-    with pytest.raises(InputError, match=f"{rule} = 'wrong'.*{valid}"):
+    path.write_text(f"{rule} = {wrong}\n{network_toml(LDVS)}")
+    with pytest.raises(InputError, match=re.escape(f"{rule} = {wrong}") + f".*{valid}"):
         load_controller(str(path))
 
 

@@ -10,6 +10,8 @@ import pytest
 import hexmj
 from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Problem, ReadsLegs, Stride
 from hexmj.controllers import Step, stepwise
+from hexmj.controllers.cruse1998 import Reading
+from hexmj.legs import CENTRED
 from hexmj.search.problems import Sample
 from hexmj.studies.variants.figure import COLOURS, variants_figure
 from hexmj.studies.variants.study import Variants
@@ -51,6 +53,14 @@ def test_a_variant_changes_one_thing(variant):
     ]
     assert changed == list(VARIANTS[variant])
     assert len(changed) == (variant != "usual")
+
+
+def test_what_has_the_changed_value_already_gets_the_usual_one():
+    lasting = hexmj.PRESETS["lasting-0.3"]
+    assert varied(lasting, "lasting").reading == Reading()
+    assert varied(replace(LDVS, order="sequential"), "sequential").order == "printed"
+    assert varied(Stride(pep_min=-15.0), "PEP_min -15") == Stride()
+    assert varied(Stride(geometry=CENTRED), "centred") == Stride()
 
 
 def test_a_controller_that_reads_the_legs_is_varied_within():

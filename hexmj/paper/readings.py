@@ -119,18 +119,21 @@ def agreeing(scores: "xr.Dataset", held_out: bool = True) -> "xr.DataArray":
 def ranking(scores: "xr.Dataset") -> np.ndarray:
     """Places of the readings, (reading,), the best first.
 
-    More held-out claims agree, under the window and with the constants that fit better; among equals, less is missed.
+    More held-out claims agree, with the constants as inferred, in the better window; among equals, less is missed.
     """
-    count = agreeing(scores).max(("constants", "window")).values
-    miss = scores.miss.sum("claim").min(("constants", "window")).values
+    count = agreeing(scores).sel(constants="inferred").max("window").values
+    miss = scores.miss.sel(constants="inferred").sum("claim").min("window").values
     return np.lexsort((miss, -count))
 
 
 def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray":
-    """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, window)."""
+    """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, window).
+
+    The constants are those inferred.
+    """
     import xarray as xr
 
-    count = agreeing(scores).max("constants")
+    count = agreeing(scores).sel(constants="inferred")
     rows = {}
     for name, choices in CHOICES.items():
         of = np.array([choices.index(chosen(one, name)) for one in readings])

@@ -37,8 +37,8 @@ def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str
         "",
         f"{len(held)} held-out and {scores.sizes['claim'] - len(held)} calibrated claims on the printed sets; each"
         f" is judged on {size.samples * size.sample} starts and {size.gait_starts} gaits, seed {size.seed}.  Before the"
-        " slash: constants as inferred; behind it: refined, on calibrated claims alone.  'Missed by' sums how far"
-        " answers lie outside of their rules.",
+        " slash: constants as inferred, by which readings are ranked; behind it: refined, on calibrated claims alone."
+        "  'Calibrated' and 'missed by', how far answers lie outside of their rules in sum, are of the better window.",
         "",
         *_table(HEADS, readings_rows(scores, ranking(scores).tolist()[: scores.sizes["best"]])),
         "",
@@ -58,12 +58,25 @@ def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str
         (choice, *(f"{changed.sel(choice=choice, window=window).item():.1f}" for window in WINDOWS))
         for choice in changed.choice.values
     ]
-    lines += ["", "## What a choice alone changes: held-out claims that agree, mean over all others", ""]
+    lines += [
+        "",
+        "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred",
+        "",
+    ]
     lines += [*_table(("choice", *WINDOWS), rows), "", "## A closer look at the best", ""]
     looked = (scores.aside_agrees == 1).sel(claim=held).sum("claim").max("window")
-    rows = [(name, *map(str, looked.sel(best=name).values.tolist())) for name in scores.best.values]
-    lines += ["Held-out claims that agree with the choices of which only acceleration or the measure knows.", ""]
-    lines += [*_table(("reading", *scores.aside.values), rows), ""]
+    without = agreeing(scores).sel(constants="refined").max("window")
+    rows = [
+        (name, str(without.sel(reading=name).item()), *map(str, looked.sel(best=name).values.tolist()))
+        for name in scores.best.values
+    ]
+    lines += [
+        "Held-out claims that agree with the choices of which only acceleration or the measure knows: refined"
+        " constants, in the better window.",
+        "",
+        *_table(("reading", "none of them", *scores.aside.values), rows),
+        "",
+    ]
     judged = (scores.ideal_agrees == 1).any("window")
     rows = [
         (
@@ -74,7 +87,12 @@ def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str
         for name in scores.best.values
     ]
     heads = ("reading", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
-    lines += ["FLSS of ideal sets that a short search found under each, window walk.", "", *_table(heads, rows), ""]
+    lines += [
+        "FLSS of ideal sets that a short search found under each, window walk, refined constants.",
+        "",
+        *_table(heads, rows),
+        "",
+    ]
     lines += ["## Every reading", "", *_table(HEADS, readings_rows(scores, ranking(scores).tolist()))]
     return "\n".join(lines) + "\n"
 

@@ -41,7 +41,7 @@ def named_reading(name: str) -> Reading:
     Raises:
         InputError: no such name.
     """
-    if name not in READINGS:
+    if not isinstance(name, str) or name not in READINGS:
         raise InputError(f"reading = {name!r}; valid names: {', '.join(READINGS)}")
     return READINGS[name]
 
