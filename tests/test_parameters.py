@@ -98,7 +98,7 @@ def test_files_give_the_same_walk_as_the_preset(tmp_path):
         ("[symmetric]\np1_i = nan", "finite"),
         ("[symmetric]\np2 = 0.5", "expected 0 or 1"),
         ("[symmetric", "cannot be read as TOML"),
-        ("[other]\na = 1", "expected one table"),
+        ("[other]\na = 1", "expected one table, .* and before it order and reading"),
         ("", "holds nothing"),
         ("[weights.p9]\n'1,2' = 1.0", r"unknown table \[weights.p9\]; valid names: p1"),
         ("[weights.p1]\n'1,6' = 1.0", "unknown key '1,6'; valid keys: 1,2"),

@@ -49,7 +49,8 @@ def _weights(table: dict[str, Any], where: str) -> AnyWeights:
         return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{where} [symmetric]"))
     if list(table) != ["weights"] or not isinstance(weights := table["weights"], dict):
         raise InputError(
-            f"{where} holds {', '.join(table) or 'nothing'}; expected one table: [symmetric] or [weights.*]"
+            f"{where} holds {', '.join(table) or 'nothing'}; expected one table, [symmetric] or [weights.*],"
+            " and before it order and reading where they are not the printed ones"
         )
     if unknown := set(weights) - set(NEIGHBOURS):
         raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
