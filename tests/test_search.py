@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
+from hexmj.cli.main import options_of
 from hexmj.controllers import Step, stepwise
+from hexmj.controllers.cruse1998 import READINGS, Cruse1998
+from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.search.convergence import convergence_figure
@@ -500,3 +503,14 @@ def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_al
 def test_nonsense_gets_a_sentence(make, sentence):
     with pytest.raises(InputError, match=sentence):
         make()
+
+
+def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
+    """Unless others are given; what it finds walks by them."""
+    sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--window", "start"]
+    words = ["search", "--form", "mirrored", "--begin", "lasting-0.3", *sizes]
+    for given, expected in ([], "lasting"), (["--reading", "printed"], "printed"):
+        options_of([*words, *given, "--out", str(tmp_path / expected)]).run()
+        found = load_controller(str(tmp_path / expected / "found.toml"))
+        assert isinstance(found, Cruse1998)
+        assert found.reading == READINGS[expected]

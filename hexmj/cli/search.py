@@ -1,7 +1,7 @@
 """`hexmj search`."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Workers
+from hexmj.cli.options import Controlled, Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.files import read_toml
@@ -59,8 +59,9 @@ class Search(WalkingCommand):
     """The first population's shifts [mm] and weights are drawn from 0 to this, neutral positions [mm] from minus this
     to this; not printed in the paper.  Fields of a controller of your own: from 0 to this times the usual value."""
     begin: str | None = None
-    """A controller from which the population begins; without it the paper's '0'-individual (evolution), the middle of
-    the domain (cmaes), or the usual values of a controller of your own."""
+    """A controller from which the population begins, with its order of updates and reading unless they are given;
+    without it the paper's '0'-individual (evolution), the middle of the domain (cmaes), or the usual values of a
+    controller of your own."""
     starts: int | None = None
     """Random starts of each candidate, the same for all; 500 unless given, 50 if physical."""
     budget: int = 1000
@@ -83,6 +84,9 @@ class Search(WalkingCommand):
         from hexmj.search.stages import search
         from hexmj.sweeps.plain import plain
 
+        if (controlled := self._as_begun) != self.controlled:
+            replace(self, controlled=controlled).run()
+            return
         self._check()
         problem, effort = self._problem(), self._effort()
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
@@ -131,6 +135,21 @@ class Search(WalkingCommand):
         return Problem(
             self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback, over=self.over
         )
+
+    @property
+    def _as_begun(self) -> Controlled:
+        """Planning with the order of updates and the reading of the set that the search begins with, unless given."""
+        from hexmj.controllers.cruse1998 import Cruse1998
+        from hexmj.controllers.cruse1998.readings import reading_name
+        from hexmj.controllers.named import load_controller
+        from hexmj.search.network_forms import FORMS
+
+        begun = load_controller(self.begin) if self.begin and self.form in FORMS else None
+        if not isinstance(begun, Cruse1998):
+            return self.controlled
+        rules = {"order": begun.order, "reading": reading_name(begun.reading)}
+        taken = {rule: name for rule, name in rules.items() if name != "printed" and not getattr(self.controlled, rule)}
+        return replace(self.controlled, **taken)
 
     def _form(self) -> "Form":
         from hexmj.controllers.named import load_controller
@@ -222,6 +241,7 @@ class Search(WalkingCommand):
         for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
             parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
         refused = f"; {len(found.refused)} were refused, the first by {found.refused[0]}" if found.refused else ""
+        over = f"{self.over} over {len(problem.variants)} variants of " if self.over != "usual" else ""
         windows = verdict.window.values.tolist()
         judged = new_table("model", *(f"window {window}" for window in windows))
         for name in verdict.controller.values.tolist():
@@ -230,7 +250,7 @@ class Search(WalkingCommand):
         show(
             self._title,
             parameters,
-            f"{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
+            f"{over}{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
             judged,
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
             f" least cost {found.cost:.4g}{refused}",
