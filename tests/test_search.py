@@ -509,8 +509,8 @@ def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
     """Unless others are given; what it finds walks by them."""
     sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--window", "start"]
     words = ["search", "--form", "mirrored", "--begin", "lasting-0.3", *sizes]
-    for given, expected in ([], "lasting"), (["--reading", "printed"], "printed"):
-        options_of([*words, *given, "--out", str(tmp_path / expected)]).run()
+    for added, expected in ([], "lasting"), (["--reading", "printed"], "printed"):
+        options_of([*words, *added, "--out", str(tmp_path / expected)]).run()
         found = load_controller(str(tmp_path / expected / "found.toml"))
         assert isinstance(found, Cruse1998)
         assert found.reading == READINGS[expected]
