@@ -135,7 +135,16 @@ def test_choices_are_read_and_titled():
 
 
 @pytest.mark.parametrize(
-    "words", [["--only", "wrong"], ["--best", "0"], ["--only", "printed", "--best", "2"], ["--only"]]
+    "words",
+    [
+        ["--only", "wrong"],
+        ["--best", "0"],
+        ["--only", "printed", "--best", "2"],
+        ["--only"],
+        ["--starts", "0"],
+        ["--gait-starts", "0"],
+        ["--seed", "-1"],
+    ],
 )
 def test_bad_options_are_refused(words, tmp_path):
     with pytest.raises(InputError, match=r"expected|valid names"):
@@ -146,7 +155,7 @@ def test_command(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", ())
     monkeypatch.setattr("hexmj.paper.scores.IDEAL", replace(IDEAL, budget=12))
     monkeypatch.setattr("hexmj.paper.readings.ASIDE", {"margin": (0.0, 1.0)})
-    sizes = ["--starts", "10", "--gait-starts", "2", "--best", "1", "--only", "printed"]
+    sizes = ["--starts", "10", "--gait-starts", "2", "--only", "printed"]
     options_of(["readings", *sizes, "--out", str(tmp_path)]).run()
     assert "as printed" in capsys.readouterr().out
     assert {"readings.md", "readings.nc", "readings.png", "manifest.json"} <= {one.name for one in tmp_path.iterdir()}

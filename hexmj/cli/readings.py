@@ -5,12 +5,14 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset, save_text
+from hexmj.starts import MOST_DRAWN, check_draw
 
 
 @dataclass(frozen=True)
@@ -19,8 +21,9 @@ class Readings:
 
     only: tuple[str, ...] | None = None
     """Named readings alone ('printed', 'lasting'); every combination of choices unless given."""
-    best: int = 12
-    """How many of them are looked at more closely, with ideal sets searched under each."""
+    best: int | None = None
+    """How many of them are looked at more closely, with ideal sets searched under each; 12, or all of fewer, unless
+    given."""
     starts: int = 300
     """Random starts of each curve."""
     gait_starts: int = 20
@@ -43,25 +46,29 @@ class Readings:
 
         if self.only == ():
             raise InputError("--only without names; expected at least one, or no --only for all")
+        for name in ("starts", "gait_starts"):
+            whole(f"--{name.replace('_', '-')}", getattr(self, name), 1, MOST_DRAWN)
+        check_draw(self.starts, self.seed)
         protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
         readings = list(combinations(protocol))
         if self.only:
             named = [named_reading(name) for name in dict.fromkeys(("printed", *self.only))]
             readings = [replace(protocol, reading=one) for one in named]
-        if not 1 <= self.best <= len(readings):
-            raise InputError(f"--best = {self.best}; expected 1 to {len(readings)}, the number of readings")
+        best = min(12, len(readings)) if self.best is None else self.best
+        if not 1 <= best <= len(readings):
+            raise InputError(f"--best = {best}; expected 1 to {len(readings)}, the number of readings")
         out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
         with progress_bar("reading") as progress, self.sweepers.executor() as executor:
             how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads}
-            scores = compare_readings(readings, self.best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
+            scores = compare_readings(readings, best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
         files = [
             save_text(readings_markdown(scores, readings), out / "readings.md"),
             save_dataset(scores, out / "readings.nc"),
             save_figure(readings_figure(scores, readings), out / "readings.png"),
         ]
-        settings = {"protocol": asdict(protocol), "only": self.only or (), "best": self.best}
+        settings = {"protocol": asdict(protocol), "only": self.only or (), "best": best}
         files.append(save_manifest(self, settings, files, out / MANIFEST))
-        rows = readings_rows(scores, ranking(scores).tolist()[: self.best])
+        rows = readings_rows(scores, ranking(scores).tolist()[:best])
         if self.json:
             print_json({"readings": [dict(zip(HEADS, row, strict=True)) for row in rows], "files": files})
             return
