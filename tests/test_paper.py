@@ -363,3 +363,5 @@ def test_other_readings_stand_beside(tmp_path):
     assert line.count("|") - 2 == head.count("|") - 1
     with pytest.raises(InputError, match="reading = 'wrong'; valid names: printed, lasting"):
         reproduce(tmp_path, TINY, only=keys, beside=("wrong",))
+    with pytest.raises(InputError, match="readings beside"):
+        reproduce(tmp_path, TINY, only=keys, beside=("printed",))

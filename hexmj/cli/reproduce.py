@@ -35,7 +35,7 @@ class Reproduce:
         """Measure, judge, draw, and print the table."""
         from hexmj.paper.protocol import FULL, QUICK
         from hexmj.paper.reproduce import reproduce
-        from hexmj.paper.table import claims_json, heads, summary
+        from hexmj.paper.table import claims_json, heads, summary, summary_beside
 
         if self.only == ():
             raise InputError("--only without keys; expected at least one, or no --only for all")
@@ -59,4 +59,4 @@ class Reproduce:
         table = new_table(*heads(rows))
         for row in rows:
             table.add_row(*row.cells)
-        show("The claims of the 1998 paper", table, *summary(rows), *map(str, files))
+        show("The claims of the 1998 paper", table, *summary(rows), *summary_beside(rows), *map(str, files))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from hexmj import results
 from hexmj.controllers.cruse1998.readings import named_reading
-from hexmj.errors import InputError
+from hexmj.errors import InputError, check_distinct
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
@@ -47,6 +47,7 @@ def reproduce(
     """
     if unknown := [key for key in only if key not in {claim.key for claim in CLAIMS}]:
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
+    check_distinct("readings beside", ["printed", *beside])
     readings = {name: named_reading(name) for name in beside}
     results_folder(out, TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]

@@ -97,7 +97,8 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     head = ["# The claims of the 1998 paper", "", f"{size}; seed {settings['seed']}.  An answer is the number that"]
     head[-1] += " strains the rule most, with its 95 % interval, and where."
     lines = [*head, "", *(f"- {one}" for one in summary(rows)), ""]
-    lines += _beside(rows)
+    beside = summary_beside(rows)
+    lines += [*(f"- {one}" for one in beside), ""] if beside else []
     lines += [line(heads(rows)), line(["---"] * len(heads(rows)))]
     lines += [line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
     lines += ["", "## Rules and commands", "", line(("the paper", "agrees if", "command")), line(["---"] * 3)]
@@ -126,13 +127,10 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
     return {"claims": claims, "summary": summary(rows), "protocol": settings}
 
 
-def _beside(rows: Sequence[Row]) -> list[str]:
+def summary_beside(rows: Sequence[Row]) -> list[str]:
     """Sentences that count the verdicts under the other readings."""
-    lines = []
-    for name in rows[0].beside if rows else ():
-        others = [row.beside[name] for row in rows]
-        lines += [f"- reading {name}, {one}" for one in summary(others)]
-    return [*lines, ""] if lines else []
+    names = rows[0].beside if rows else ()
+    return [f"reading {name}, {one}" for name in names for one in summary([row.beside[name] for row in rows])]
 
 
 def _counts(verdicts: Sequence[str]) -> str:
