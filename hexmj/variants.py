@@ -6,8 +6,6 @@ A set of weights is worth most if its FLSS is low whichever of them the authors 
 from dataclasses import MISSING, fields, replace
 from typing import Any, TypeVar
 
-from hexmj.controllers.cruse1998 import READINGS
-from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.legs import CENTRED
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -25,9 +23,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "dt 0.2": {"dt": 0.2},
     "undelayed": {"order": "undelayed"},
     "sequential": {"order": "sequential"},
-    "lasting": {"reading": READINGS["lasting"]},
+    "lasting": {"ipsilateral": "lasting"},
 }
-"""Name -> which fields of a `Stride` [mm, time units] or of the network it changes, and to what; see `varied`."""
+"""Name -> which fields of a `Stride` [mm, time units], a network or its reading it changes, to what; see `varied`."""
 
 UNREACHED = {"AEP0 11"}
 """Variants that the legs of the stick insect do not reach."""
@@ -49,7 +47,7 @@ def varied(part: Part, variant: str) -> Part:
     usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
     wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
     changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
-    if isinstance(part, ReadsLegs):
-        changes = {"controller": varied(part.controller, variant)}
+    for inner in {"controller", "reading"} & {*usual}:  # what reads the legs, and how the paper is read
+        changes[inner] = varied(getattr(own, inner), variant)
     changed: Any = replace(own, **changes) if changes else part
     return changed

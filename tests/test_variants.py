@@ -47,8 +47,8 @@ def result(folder):
 def test_a_variant_changes_one_thing(variant):
     changed = [
         name
-        for usual, other in ((part, varied(part, variant)) for part in (Stride(), LDVS))
-        for name in ("aep0", "pep0", "pep_min", "dt", "geometry", "order", "reading")
+        for usual, other in ((part, varied(part, variant)) for part in (Stride(), LDVS, Reading()))
+        for name in ("aep0", "pep0", "pep_min", "dt", "geometry", "order", "ipsilateral", "contralateral", "cap")
         if getattr(usual, name, None) != getattr(other, name, None)
     ]
     assert changed == list(VARIANTS[variant])
@@ -58,6 +58,8 @@ def test_a_variant_changes_one_thing(variant):
 def test_what_has_the_changed_value_already_gets_the_usual_one():
     lasting = hexmj.PRESETS["lasting-0.3"]
     assert varied(lasting, "lasting").reading == Reading()
+    summed = Reading(cap="sum")
+    assert varied(replace(LDVS, reading=summed), "lasting").reading == replace(summed, ipsilateral="lasting")
     assert varied(replace(LDVS, order="sequential"), "sequential").order == "printed"
     assert varied(Stride(pep_min=-15.0), "PEP_min -15") == Stride()
     assert varied(Stride(geometry=CENTRED), "centred") == Stride()
