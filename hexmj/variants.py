@@ -47,7 +47,9 @@ def varied(part: Part, variant: str) -> Part:
     usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
     wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
     changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
-    for inner in {"controller", "reading"} & {*usual}:  # what reads the legs, and how the paper is read
+    for inner in [
+        name for name in ("controller", "reading") if name in usual
+    ]:  # what reads the legs, and how the paper is read
         changes[inner] = varied(getattr(own, inner), variant)
     changed: Any = replace(own, **changes) if changes else part
     return changed

@@ -31,7 +31,7 @@ from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, ref
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
 
-SMALL = replace(REFINING, sample=20, gait_starts=2)
+SMALL = replace(SCORING, **REFINING, sample=20, gait_starts=2)
 STRIDE = Stride()
 
 
@@ -83,7 +83,6 @@ def test_a_margin_leaves_out_the_ends_of_s():
 
 
 def test_refined_constants_miss_no_more(monkeypatch):
-    monkeypatch.setattr("hexmj.paper.scores.REFINING", SMALL)
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", (({"aep0": 9.0, "pep0": -9.0},), ({"pep_min": -25.0},)))
     better, claims = refined(SMALL, threads=1), [claim for claim in CLAIMS if claim.key in REFINED_BY]
     before, after = (judged(claims, one, threads=1).miss.sum("claim").min().item() for one in (SMALL, better))
@@ -144,6 +143,7 @@ def test_choices_are_read_and_titled():
         ["--starts", "0"],
         ["--gait-starts", "0"],
         ["--seed", "-1"],
+        ["--seed", "0"],
     ],
 )
 def test_bad_options_are_refused(words, tmp_path):

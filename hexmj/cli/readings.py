@@ -42,13 +42,15 @@ class Readings:
         from hexmj.paper.readings import combinations, compare_readings, ranking
         from hexmj.paper.readings_figure import readings_figure
         from hexmj.paper.readings_table import HEADS, readings_markdown, readings_rows
-        from hexmj.paper.scores import SCORING
+        from hexmj.paper.scores import IDEAL, SCORING
 
         if self.only == ():
             raise InputError("--only without names; expected at least one, or no --only for all")
         for name in ("starts", "gait_starts"):
             whole(f"--{name.replace('_', '-')}", getattr(self, name), 1, MOST_DRAWN)
         check_draw(self.starts, self.seed)
+        if self.seed == IDEAL.seed:
+            raise InputError(f"--seed = {self.seed}; expected another, since ideal sets are searched on its starts")
         protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
         readings = list(combinations(protocol))
         if self.only:

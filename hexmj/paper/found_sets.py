@@ -5,14 +5,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexmj.controllers.cruse1998 import Cruse1998, Reading, Symmetric
+from hexmj.controllers.cruse1998 import READINGS, Cruse1998, Reading, Symmetric
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.timing import WINDOWS
 
 TABLE = Path(__file__).with_name("ideal.toml")
-PRINTED = Reading()
+PRINTED = READINGS["printed"]
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,6 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
         valid = ", ".join(sorted(names))
         raise InputError(f"{where}: {min(unknown)} is no parameter of the {form} form; valid: {valid}")
     weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
-    name, reading = f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}", entry.get("reading")
-    controller = Cruse1998(weights, name=name, reading=named_reading(reading) if reading else PRINTED)
+    name = f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}"
+    controller = Cruse1998(weights, name=name, reading=named_reading(entry.get("reading", "printed")))
     return FoundSet(entry["window"], velocities[0], velocities[-1], controller, entry["command"])

@@ -71,13 +71,12 @@ def losses(
             times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
             durations = np.array(times)
             wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
+            how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
             if looks == "periods":
-                how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
                 lost[rows] = [lost_at_periods(starts, one, velocity, wait, time.item(), **how) for time in times]
             elif late:
                 lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
             else:
-                how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
                 first = first_loss(starts, one, velocity, durations.max(), **how)
                 lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
     return xr.Dataset({"lost": (("window", "start"), lost)}, {"window": list(WINDOWS)})

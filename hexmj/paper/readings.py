@@ -16,7 +16,7 @@ from hexmj.controllers.cruse1998 import Order, Reading
 from hexmj.legs import CENTRED, FIG1
 from hexmj.paper.claims import INFERRED_FROM
 from hexmj.paper.protocol import Protocol
-from hexmj.paper.scores import score, score_as_is, score_of_ideals
+from hexmj.paper.scores import score, score_as_is, score_of_ideals, with_stride
 from hexmj.sweeps import Cell, Execution, run
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def refined_as(protocol: Protocol, scored: "xr.Dataset") -> Protocol:
     """A protocol with the constants that were found for it."""
     lengths = {name: scored[name].item() for name in ("aep0", "pep0", "pep_min")}
     stride = replace(protocol.stride, **lengths, geometry=CENTRED if scored.centred.item() else FIG1)
-    return replace(protocol, stride=stride, gait_stride=replace(stride, dt=protocol.gait_stride.dt))
+    return with_stride(protocol, stride)
 
 
 def agreeing(scores: "xr.Dataset", held_out: bool = True) -> "xr.DataArray":

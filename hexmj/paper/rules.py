@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import comb
 from typing import Literal
 
 import numpy as np
@@ -141,11 +140,11 @@ Rule = Band | Seen | Trend
 
 def fisher(count: int, size: int, other: int, of: int) -> float:
     """p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without a start."""
+    from scipy.stats import fisher_exact
+
     if size == 0 or of == 0:
         return 0.0
-    both = count + other
-    ways = {n: comb(size, n) * comb(of, both - n) for n in range(max(0, both - of), min(size, both) + 1)}
-    return sum(one for one in ways.values() if one <= ways[count]) / sum(ways.values())
+    return float(fisher_exact([[count, size - count], [other, of - other]]).pvalue)
 
 
 def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], agrees: bool) -> Answer:

@@ -43,7 +43,8 @@ REFINED_BY = (
 )  # fmt: skip
 """Claims on which constants are refined: calibrated ones that need neither a search nor the gaits at every V."""
 
-REFINING = replace(SCORING, velocities=(0.1, 0.25, 0.4, 0.5), gait_velocities=(0.1, 0.25, 0.4))
+REFINING: dict[str, Any] = {"velocities": (0.1, 0.25, 0.4, 0.5), "gait_velocities": (0.1, 0.25, 0.4)}
+"""What is simulated for these, of a protocol."""
 
 ROUNDS: tuple[tuple[dict[str, Any], ...], ...] = (
     tuple({"aep0": a, "pep0": -a} for a in (9.0, 9.5, 10.5, 11.0)),
@@ -110,7 +111,7 @@ def refined(protocol: Protocol, threads: int | None = None) -> Protocol:
     claims = [claim for claim in CLAIMS if claim.key in REFINED_BY]
 
     def miss(stride: Stride) -> float:
-        tried = replace(REFINING, stride=stride, gait_stride=stride, order=protocol.order, reading=protocol.reading)
+        tried = replace(with_stride(protocol, stride), **REFINING)
         return judged(claims, tried, threads=threads).miss.sum("claim").min().item()
 
     best, least = protocol.stride, miss(protocol.stride)
@@ -118,7 +119,12 @@ def refined(protocol: Protocol, threads: int | None = None) -> Protocol:
         for one in [replace(best, **constants) for constants in alternatives]:
             if (now := miss(one)) < least:
                 best, least = one, now
-    return replace(protocol, stride=best, gait_stride=best)
+    return with_stride(protocol, best)
+
+
+def with_stride(protocol: Protocol, stride: Stride) -> Protocol:
+    """A protocol with another stride, its gaits with their own time step."""
+    return replace(protocol, stride=stride, gait_stride=replace(stride, dt=protocol.gait_stride.dt))
 
 
 def score(protocol: Protocol, threads: int | None = None) -> "xr.Dataset":
