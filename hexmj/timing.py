@@ -114,15 +114,19 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
 
 
 def commanded_velocities(
-    velocity: np.ndarray, done: int, steps: int, stride: Stride, acceleration: Acceleration | None
+    velocity: np.ndarray, done: int | np.ndarray, steps: int, stride: Stride, acceleration: Acceleration | None
 ) -> np.ndarray:
     """V_r during each of the `steps` after `done`, (step, start): Eq. 11, or V itself without an acceleration.
 
     Args:
         velocity: final V_r, (start,).
+        done: steps for which it has been accelerating, of each start, (start,), or of all.
+        steps: how many are asked for.
+        stride: with the time step.
+        acceleration: Eq. 11.
     """
     if acceleration is None:
         return np.broadcast_to(velocity, (steps, len(velocity)))
-    step = np.arange(done, done + steps)[:, np.newaxis]
+    step = done + np.arange(steps)[:, np.newaxis]
     now, before = (acceleration.start + acceleration.rate * (n * stride.dt) for n in (step, step - 1))
     return np.where(before < velocity, now, velocity)

@@ -14,6 +14,7 @@ from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.rivals import RIVALS
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.literal import literal
@@ -27,15 +28,16 @@ def load_controller(name: str) -> Controller:
     """A controller by its name.
 
     Args:
-        name: a preset; ``module:object`` or ``file.py:object``, a controller or a class of controllers, which is made
-            with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of the 1998
-            network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
+        name: a preset or a rival; ``module:object`` or ``file.py:object``, a controller or a class of controllers,
+            which is made with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of
+            the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
 
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
     """
-    if typed("name", name, str) in PRESETS:
-        return PRESETS[name]
+    for ours in (PRESETS, RIVALS):
+        if typed("name", name, str) in ours:
+            return ours[name]
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():
         return _found(where, what, name)
@@ -56,8 +58,9 @@ def load_controller(name: str) -> Controller:
 
 
 def known_names() -> Iterator[str]:
-    """Names of the presets and entry points."""
+    """Names of the presets, the rivals and the entry points."""
     yield from PRESETS
+    yield from RIVALS
     yield from (point.name for point in entry_points(group=ENTRY_POINTS))
 
 

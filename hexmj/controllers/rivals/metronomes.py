@@ -1,0 +1,72 @@
+"""Metronomes: legs lifted by a clock that senses nothing, in two gaits of insects (paper, Section 5.3).
+
+Wilson's metachronal wave: on each side swings follow each other from hind to front without delay, and last as long at
+every velocity, so that each leg lags V / (1 + V) of a period behind the one behind it; the two sides move in
+anti-phase.  Graham's Gait I: the tripod at every velocity.
+
+How they map: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p.  Fitted by us:
+nothing.  Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg that should be swinging
+then is lifted at once.  From `ideal_start` every leg is where the clock has it.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.timing import Stride
+
+BEHIND = np.array([2.0, 1.0, 0.0, 2.0, 1.0, 0.0])
+"""Swings before a leg's own on its side, (leg,)."""
+
+RIGHT = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.5])
+"""Lag of the right side [periods], (leg,)."""
+
+
+class Clock(NamedTuple):
+    """What a metronome remembers."""
+
+    time: np.ndarray
+    """(start, 1) [periods]."""
+    swings: np.ndarray
+    """(start, leg) number of the last swing that has begun."""
+
+
+@dataclass(frozen=True)
+class Metronome(Lifted):
+    """A clock, and how far each leg lags behind it."""
+
+    wave: Literal["wilson", "graham"] = "wilson"
+    """Swings run from hind to front, or in two tripods."""
+    name: str = "wilson"
+
+    def at_start(self, legs: Legs) -> Clock:
+        """See `LiftingRule`."""
+        phase = -self._lag(legs.v)
+        swings = phase % 1.0 < _swing_part(legs.v)
+        return Clock(np.zeros_like(legs.v), np.floor(phase) - swings)
+
+    def lifts(self, state: Clock, legs: Legs) -> tuple[Clock, np.ndarray]:
+        """See `LiftingRule`."""
+        span = legs.stride.aep0 - legs.stride.pep0
+        time = state.time + legs.stride.dt / span * _swing_part(legs.v)
+        swings = np.floor(time - self._lag(legs.v))
+        return Clock(time, np.maximum(swings, state.swings)), swings > state.swings
+
+    def ideal_start(self, velocity: float, stride: Stride) -> np.ndarray:
+        """Tips, (1, leg) [mm], where the clock has them at time 0; a leg that swings is on the ground there."""
+        v = np.array([[velocity]])
+        phase, swing = -self._lag(v) % 1.0, _swing_part(v)
+        part = np.where(phase < swing, phase / swing, (1.0 - phase) / (1.0 - swing))  # of the way from PEP_0 to AEP_0
+        return stride.pep0 + (stride.aep0 - stride.pep0) * part
+
+    def _lag(self, v: np.ndarray) -> np.ndarray:
+        """(start, leg) behind the clock [periods]."""
+        behind = np.full_like(v, 0.5) if self.wave == "graham" else _swing_part(v)
+        return BEHIND * behind + RIGHT
+
+
+def _swing_part(v: np.ndarray) -> np.ndarray:
+    """Part of the period for which a leg swings."""
+    return v / (1.0 + v)

@@ -1,0 +1,50 @@
+"""What all rivals share: the protocol, the legs, and being found by name."""
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.rivals import RIVALS
+from hexmj.controllers.rivals.lifted import Lifted
+from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, gait, wilson_phase
+from hexmj.measures.kinematic import walk
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PLANNED
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
+    assert hexmj.load_controller(name) is RIVALS[name]
+    check_controller(RIVALS[name])
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
+    rival, starts, stride = RIVALS[name], hexmj.draw_starts(6, 3), Stride()
+    assert isinstance(rival, Lifted)
+    velocity, eq11 = np.full(6, 0.5), Acceleration(rate=0.005)
+    plan, other = (Lifted.begin(rival, starts, velocity, stride, eq11) for _ in range(2))
+    plan.advance(300)
+    plan.see(plan.tips, plan.standing)
+    plan.restart(np.ones(6, dtype=bool), starts)
+    again, first = plan.advance(300), other.advance(300)
+    for one in PLANNED:
+        assert np.array_equal(getattr(again, one), getattr(first, one), equal_nan=True)
+    assert np.array_equal(again.velocity, first.velocity)
+
+
+@pytest.mark.parametrize(("wave", "name"), [("wilson", "wilson"), ("graham", "graham")])
+@pytest.mark.parametrize("velocity", [0.1, 0.35, 0.8])
+def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_one(wave, name, velocity) -> None:
+    metronome, stride = RIVALS[name], Stride()
+    assert isinstance(metronome, Metronome)
+    ideal = metronome.ideal_start(velocity, stride)
+    starts = np.concatenate([ideal, hexmj.draw_starts(5, 1)])
+    found = gait(walk(starts, metronome, velocity, 20 * stride.periods(velocity)))
+    along = wilson_phase(velocity) if wave == "wilson" else 0.5
+    assert found.periodic.all()
+    assert np.allclose(circular_mean(found.phase[:, IPSILATERAL] - along + 0.5, axis=1), 0.5, atol=0.005)
+    assert np.allclose(found.phase[:, CONTRALATERAL], 0.5, atol=0.005)
+    assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.01)
