@@ -54,6 +54,8 @@ COMMANDS = {
     f" buy.{AGAIN.format('run')}",
     "biology": "Forces, torques, gait, posture and work of the walking insect beside those of measured"
     f" insects.{AGAIN.format('run')}",
+    "league": "Controllers from the literature and your own, judged by the same starts on paper, in physics and in"
+    f" trials: tables, figure, film.{AGAIN.format('run')}",
     "rerun": "Makes a result again from its manifest: is every number equal to the last bit?  If not, exit code 1 and"
     " a sentence on what else is not as it was.",
     "check-controller": "Does a controller keep the protocol?  A check that fails says in a sentence what is wrong;"

@@ -15,7 +15,7 @@ from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
 from hexmj.progress import progress_bar
-from hexmj.replay.film.film import Film
+from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.results import results_folder
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class Render(WalkingCommand):
     """Options of `hexmj render`, which `main.COMMANDS` describes."""
 
     recordings: Positional[tuple[Path, ...]] = ()
-    """One recording, or two for side by side (recording.nc of `hexmj walk`); none: record a physical walk first, to
+    """One recording, or up to six side by side (recording.nc of `hexmj walk`); none: record a physical walk first, to
     which all options but the film's belong."""
     model: ControllerName = "ldvs"
     velocity: float = 0.3
@@ -74,12 +74,12 @@ class Render(WalkingCommand):
     def _check(self) -> None:
         """Refuse options that would not be obeyed."""
         self.film.check_camera(STICK_INSECT)
-        if len(self.recordings) > 2:
-            raise InputError(f"{len(self.recordings)} recordings were given; expected one, or two for side by side")
+        if len(self.recordings) > MOST_PANELS:
+            raise InputError(f"{len(self.recordings)} recordings were given; expected 1 to {MOST_PANELS}")
         obeyed = Render(recordings=self.recordings, out=self.out, json=self.json, film=self.film)
         if self.recordings and (names := list(changed(self, obeyed))):
             raise InputError(
-                f"--{names[0].replace('_', '-')} was given with recordings; expected a second recording for side by"
+                f"--{names[0].replace('_', '-')} was given with recordings; expected more recordings for side by"
                 " side, and options of walks only where one is recorded first"
             )
 

@@ -7,6 +7,9 @@ from hexmj.bodies.description import Body
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 
+MOST_PANELS = 6
+"""Recordings in one film, at most."""
+
 
 @dataclass(frozen=True)
 class Film:

@@ -19,7 +19,7 @@ from hexmj.files import replacing
 from hexmj.progress import Progress
 from hexmj.replay.film import gl
 from hexmj.replay.film.encoder import encoder
-from hexmj.replay.film.film import Film
+from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.schema import check_recording
@@ -28,6 +28,9 @@ from hexmj.stability import support_polygon
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
+
+IN_A_ROW = 3
+"""Recordings in one row, at most."""
 
 GROUND = "ground"
 """The ground's texture, where an MJCF has it."""
@@ -41,27 +44,27 @@ def render(
     *,
     body: Body = STICK_INSECT,
 ) -> int:
-    """Film one recording, or two side by side with one clock; a body that fell stays as it was last seen.
+    """Film one recording, or up to six side by side with one clock; a body that fell stays as it was last seen.
 
     Args:
-        recordings: one or two.
+        recordings: one to six; from four on they stand in two rows.
         path: of the film, an MP4 file; it appears whole or not at all.
         film: how it is filmed.
         progress: told the fraction done since it was last called.
         body: the description of what was recorded.
 
     Returns:
-        The number of frames: the walk's duration, the longer one's of two, at `Film.fps`.
+        The number of frames: the duration of the longest walk, at `Film.fps`.
 
     Raises:
-        InputError: not one or two recordings, no MP4 file in a folder that exists, a recording without a pose, or a
+        InputError: no recording or too many, no MP4 file in a folder that exists, a recording without a pose, or a
             film that cannot be written.
         RenderingError: nothing can be rendered here; says what brings it.
     """
     film, path = given("film", film, Film), path_of(path)
     recordings = typed("recordings", recordings, tuple[xr.Dataset, ...])
-    if len(recordings) not in (1, 2):
-        raise InputError(f"{len(recordings)} recordings were given; expected one, or two for side by side")
+    if not 1 <= len(recordings) <= MOST_PANELS:
+        raise InputError(f"{len(recordings)} recordings were given; expected 1 to {MOST_PANELS}")
     film.check_camera(typed("body", body, Body))
     if path.suffix != ".mp4" or not path.parent.is_dir():
         raise InputError(f"the film cannot be written to {path}; expected a name with .mp4 in a folder that exists")
@@ -83,8 +86,10 @@ def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress:
     """Film the takes side by side."""
     duration = max(take.duration for take in takes)
     overlays = [Overlay(take, film.width, film.height, duration) for take in takes]
-    picture = np.empty((film.height, film.width * len(takes), 3), dtype=np.uint8)
-    panels = np.split(picture, len(takes), axis=1)
+    rows = 1 if len(takes) <= IN_A_ROW else 2
+    columns = -(-len(takes) // rows)
+    picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
+    panels = [one for row in np.split(picture, rows) for one in np.split(row, columns, axis=1)][: len(takes)]
     with ExitStack() as opened:
         worlds = {take.conditions: _filmed_insect(film, take.conditions) for take in takes}
         stages = {

@@ -29,6 +29,10 @@ CHUNK = 50
 """Steps planned at a time while a leg that protracts is looked for."""
 
 
+class TooFewStable(InputError):
+    """Not so many starts keep static stability until they are disturbed."""
+
+
 @dataclass(frozen=True, eq=False)
 class Disturbance:
     """One disturbance of every start."""
@@ -85,7 +89,7 @@ def find_stable_starts(
             `SETTLED` of them.
 
     Raises:
-        InputError: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
+        TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
     """
     period = stride.periods(velocity) / stride.dt
     drawn = n_starts
@@ -98,7 +102,7 @@ def find_stable_starts(
             found = found[:n_starts]
             return StableStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
         drawn *= 2
-    raise InputError(
+    raise TooFewStable(
         f"starts = {n_starts}; at V = {velocity:g} not so many of {MOST_DRAWN} keep static stability until they are"
         " disturbed; expected fewer starts or a lower velocity"
     )

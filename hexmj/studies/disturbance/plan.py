@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj.controllers.protocol import ReadingPlan, SteerableController, SteerablePlan, check_controller_type
+from hexmj.controllers.protocol import ReadingPlan, Sensed, SteerableController, SteerablePlan, check_controller_type
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance
 from hexmj.studies.disturbance.strategies import Postures, Rest, reorganise, stand
@@ -49,17 +49,13 @@ class Disturbed:
         """See `protocol.Controller.begin`.
 
         Raises:
-            InputError: a controller whose plans cannot be steered, or read the legs; a disturbance of other starts.
+            InputError: a controller whose plans cannot be steered; a disturbance of other starts.
         """
         check_steerable(self.controller)
         if (count := len(self.disturbance.step)) != len(starts):
             raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
         plan = self.controller.begin_at_speed(starts, velocity, stride, acceleration, threads)
-        if isinstance(plan, ReadingPlan):
-            raise InputError(
-                f"{self.controller.name} reads the legs by itself; expected one that ReadsLegs can be put around"
-            )
-        return DisturbedPlan(self, plan)
+        return DisturbedReadingPlan(self, plan) if isinstance(plan, ReadingPlan) else DisturbedPlan(self, plan)
 
 
 def check_steerable(controller: object) -> None:
@@ -168,3 +164,11 @@ class DisturbedPlan:
                 walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
                 walk.aep[:, start] = np.where(rest.moves_back[rows], np.nan, self.stride.aep0)
         return walk
+
+
+class DisturbedReadingPlan(DisturbedPlan):
+    """The same of a `protocol.ReadingPlan`."""
+
+    def sense(self, sensed: Sensed) -> None:
+        """Hand on what the legs tell."""
+        self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]

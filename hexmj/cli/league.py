@@ -1,0 +1,143 @@
+"""`hexmj league`."""
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import OmitArgPrefixes, arg
+
+from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, hiding
+from hexmj.cli.recorded import recorded
+from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.tables import new_table
+from hexmj.conditions import Conditions
+from hexmj.errors import RenderingError, check_distinct
+from hexmj.progress import progress_bar
+from hexmj.replay.film.film import Film
+from hexmj.results import save_text
+from hexmj.studies.league import study
+from hexmj.studies.league.entrants import EVERYONE, FOUR, entrants
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TABLE, FILM = "league.md", "league.mp4"
+"""Files for all tables, and for the best side by side."""
+
+BEST = 6
+"""Who are filmed, at most."""
+
+QUICK = {"velocities": (0.1, 0.5, 0.9), "starts": 200, "physical_starts": 8, "trial_starts": 4}
+"""Sizes of a quick look."""
+
+
+@dataclass(frozen=True)
+class League(StudyCommand):
+    """Options of `hexmj league`, which `main.COMMANDS` describes."""
+
+    controllers: Annotated[
+        tuple[str, ...],
+        arg(help=f"Who takes part, each {CONTROLLER}; wilson-ideal begins at its ideal start.  All unless given."),
+    ] = ()
+    velocities: Sequence[float] = study.League.velocities
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
+    starts: int = study.League.n_starts
+    """Number of random starts on paper, the same for all."""
+    physical_starts: int = study.League.n_physical
+    """Of these, number of starts that walk in physics at every velocity."""
+    trial_starts: int = study.League.n_tried
+    """Number of starts in each trial."""
+    trial_velocity: float = study.League.tried_at
+    """V_r of the trials."""
+    quick: bool = False
+    """A quick look: four controllers, three velocities and few starts, unless others are given."""
+    no_video: bool = False
+    """Leave the film out."""
+    out: Path = Path("results/league")
+    """Folder for tables, figure, film, NetCDF, manifest and finished walks."""
+    accelerating: OmitArgPrefixes[Accelerating] = STEADY
+    controlled: OmitArgPrefixes[Controlled] = field(
+        default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
+    )
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["ground", "load"]))
+
+    @property
+    def sized(self) -> "League":
+        """These options with the sizes of a quick look where it is asked for and no others are."""
+        few = {name: value for name, value in QUICK.items() if getattr(self, name) == getattr(League, name)}
+        return replace(self, **few, quick=False) if self.quick else self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Who takes part."""
+        return self.controllers or (FOUR if self.quick else EVERYONE)
+
+    def study(self) -> study.League:
+        """See `StudyCommand.study`."""
+        check_distinct("controllers", self.names)
+        sized = self.sized
+        return study.League(
+            entrants(self.names),
+            sized.velocities,
+            sized.starts,
+            sized.physical_starts,
+            sized.trial_starts,
+            sized.trial_velocity,
+            window=self.walks.time,
+            seed=self.walks.seed,
+            conditions=self.conditions,
+            stride=self.walks.stride,
+        )
+
+    def outputs(self) -> Outputs:
+        """See `StudyCommand.outputs`."""
+        from hexmj.studies.league.figure import league_figure
+
+        others = (TABLE,) if self.no_video else (TABLE, FILM)
+        return Outputs("walking the league", "league.nc", {"league.png": league_figure}, others=others)
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """All frequencies, costs and ranks."""
+        return lists_of(result)
+
+    def shown(self, result: "xr.Dataset") -> Iterable[Any]:
+        """All tables, and the conditions."""
+        from hexmj.studies.league.table import tables
+
+        for one in tables(result):
+            table = new_table(*one.head)
+            for row in one.rows:
+                table.add_row(*row)
+            yield one.title
+            yield table
+        yield self.conditions_line()
+
+    def write_others(self, result: "xr.Dataset") -> list[Path]:
+        """The tables as Markdown, and the film unless it is left out or cannot be made."""
+        from hexmj.studies.league.table import league_markdown
+
+        table = save_text(league_markdown(result), self.out / TABLE)
+        if self.no_video:
+            return [table]
+        try:
+            return [table, self._filmed(result)]
+        except RenderingError as error:
+            print(f"hexmj: no video: {error}", file=sys.stderr)
+            return [table]
+
+    def _filmed(self, result: "xr.Dataset") -> Path:
+        """The best in physics side by side, from the first of the random starts."""
+        from hexmj.replay.film import gl
+        from hexmj.replay.film.video import render
+        from hexmj.studies.league.table import by_rank
+
+        if sentence := gl.missing():
+            raise RenderingError(sentence)
+        takes_part, v = entrants(self.names), result.attrs["tried_at"]
+        best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]
+        shown = [recorded(self, takes_part[name].controller, v, 0, title=name) for name in best]
+        with progress_bar("rendering") as progress:
+            render(shown, self.out / FILM, Film(width=480, height=360), progress)
+        return self.out / FILM

@@ -1,0 +1,76 @@
+"""A controller that has lost a leg and does not know: the leg is held up, whatever it is told, and never stands."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexmj.checks import whole
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk
+
+HELD = 12.0
+"""Height at which the lost leg is held [mm]."""
+
+RAISED = 4.0
+"""Time in which it is raised there as the walk begins [time units]."""
+
+
+@dataclass(frozen=True)
+class LegLost:
+    """A controller without one of its legs."""
+
+    controller: Controller
+    """Plans for six."""
+    leg: int
+    """Index of the lost leg."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
+        whole("leg", self.leg, 0, 5)
+
+    @property
+    def name(self) -> str:
+        """That of the controller that plans, and what is different."""
+        return f"{self.controller.name}, leg {self.leg + 1} lost"
+
+    def begin(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> "LamePlan":
+        """See `protocol.Controller.begin`."""
+        plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+        return LameReadingPlan(plan, self.leg) if isinstance(plan, ReadingPlan) else LamePlan(plan, self.leg)
+
+
+class LamePlan:
+    """A `protocol.Plan` of which one leg is held up."""
+
+    def __init__(self, plan: Plan, leg: int) -> None:
+        """Around a plan at time 0."""
+        self.starts, self.stride, self._plan, self._leg = plan.starts, plan.stride, plan, leg
+
+    @property
+    def done(self) -> int:
+        """See `protocol.Plan`."""
+        return self._plan.done
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """The next steps; the lost leg is moved to and fro in the air."""
+        walk = self._plan.advance(steps)
+        stance, height = walk.stance.copy(), walk.height.copy()
+        stance[..., self._leg] = False
+        height[..., self._leg] = HELD * np.minimum(walk.time / RAISED, 1.0)[:, None]
+        return replace(walk, stance=stance, height=height)
+
+
+class LameReadingPlan(LamePlan):
+    """The same of a `protocol.ReadingPlan`."""
+
+    def sense(self, sensed: Sensed) -> None:
+        """Hand on what the legs tell, the lost one included, whose foot never meets the ground."""
+        self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,0 +1,98 @@
+"""What the league asks of a plan: losses of static stability, and the limit regime."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.controllers.leg_lost import LegLost
+from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, limit_gait
+from hexmj.measures.kinematic import first_loss
+from hexmj.starts import draw_starts
+from hexmj.studies.league.entrants import Entrant
+from hexmj.timing import Acceleration, Stride, observation_time
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PERIODS = 40
+"""Cycles that every leg has time for until its regime is looked at."""
+
+
+def losses(
+    entrant: Entrant,
+    velocity: float,
+    window: str | float,
+    *,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    leg_lost: int | None = None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Whether each start loses static stability on paper, `lost`, over start.
+
+    Args:
+        entrant: who walks.
+        velocity: V_r, or its final value.
+        window: 'walk', 'start' or the observation time [time units].
+        n_starts: number of starts.
+        seed: of the starts.
+        stride: step range, lines of the tips and time step.
+        acceleration: Eq. 11.
+        leg_lost: index of a leg that is lost.
+        threads: one per core unless given; the answers do not depend on it.
+    """
+    controller = entrant.controller if leg_lost is None else LegLost(entrant.controller, leg_lost)
+    starts = entrant.starts(n_starts, seed, velocity, stride)
+    duration = float(observation_time(window, velocity, stride, acceleration))
+    how = {"stride": stride, "acceleration": acceleration, "threads": threads}
+    return _lost(first_loss(starts, controller, velocity, duration, **how))
+
+
+def losses_over_range(
+    entrant: Entrant,
+    low: float,
+    high: float,
+    window: str | float,
+    *,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """The same where every start has a velocity of its own, uniform from `low` to `high` (Eq. 10)."""
+    velocity = np.random.default_rng([seed, 1]).uniform(low, high, n_starts)
+    duration = observation_time(window, velocity, stride)
+    starts = draw_starts(n_starts, seed, stride)
+    return _lost(first_loss(starts, entrant.controller, velocity, duration, stride=stride, threads=threads))
+
+
+def regimes(
+    entrant: Entrant, velocity: float, *, n_starts: int, seed: int, stride: Stride, threads: int | None = None
+) -> "xr.Dataset":
+    """The limit regime of each start, over start.
+
+    Returns:
+        `reached`, from when on it lasts [time units], inf where there is none; whether it is `stable`; and, NaN where
+        there is none, the `duty_factor` and the phases `ipsilateral` and `contralateral`, circular means over legs and
+        pairs.
+    """
+    import xarray as xr
+
+    how = {"seed": seed, "stride": stride, "periods": PERIODS, "threads": threads}
+    gait = limit_gait(entrant.controller, velocity, n_starts=n_starts, **how)
+    columns = {
+        "reached": (gait.reached, "time unit"),
+        "stable": (gait.stable.astype(np.int8), "1"),
+        "duty_factor": (gait.duty_factor.mean(axis=1), "1"),
+        "ipsilateral": (circular_mean(gait.phase[:, IPSILATERAL], axis=1), "1"),
+        "contralateral": (circular_mean(gait.phase[:, CONTRALATERAL], axis=1), "1"),
+    }
+    return xr.Dataset({name: ("start", values, {"units": units}) for name, (values, units) in columns.items()})
+
+
+def _lost(time: np.ndarray) -> "xr.Dataset":
+    import xarray as xr
+
+    return xr.Dataset({"lost": ("start", np.isfinite(time).astype(np.int8), {"units": "1"})})

@@ -1,0 +1,139 @@
+"""What the league's cells come to: frequencies with their intervals, differences to one entrant, ranks."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.gaits import circular_mean
+from hexmj.intervals import wilson_intervals
+from hexmj.studies.league.ranks import difference, ranks
+from hexmj.studies.league.trials import TRIALS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.studies.league.study import League
+
+Data = Mapping[tuple[str, str], "xr.Dataset"]
+"""Of every cell, by its entrant and what it was asked."""
+
+Rows = Sequence[Sequence["xr.Dataset | None"]]
+"""Cells by (row, column); None where there is none."""
+
+OVER_VELOCITY = ("entrant", "velocity")
+
+REFERENCE = "ldvs"
+"""Whom all are compared with; the first entrant where it does not take part."""
+
+
+def standings(league: "League", data: Data) -> "xr.Dataset":
+    """The whole league as one dataset.
+
+    Returns:
+        Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
+        how far they are above those of the `reference` on the same starts, `_above`, with its interval; of walks
+        without a fall the `speed` over that commanded, `slip` [mm/s], `cost` of transport, and the greatest `torque`
+        of a joint over its limit; of limit regimes the share that is `periodic` and `stable`, the median `reached`
+        [time units], `duty_factor` and the phases `ipsilateral` and `contralateral`.
+        Over entrant: `range`, J_N, and `accelerated`, with intervals; over (entrant, measure) the `best` and `worst`
+        rank, by the mean over velocities.  Over (entrant, trial): `fell`, and on paper `lost`, with intervals.
+        All frequencies have the number of their `_starts`.
+    """
+    import xarray as xr
+
+    names, v = list(league.entrants), [f"{one:g}" for one in league.observed[0]]
+    on_paper, walked, regimes = (
+        [[data.get((name, f"{kind} {one}")) for one in v] for name in names] for kind in ("paper", "physics", "regime")
+    )
+    happened = {
+        "kinematic": _each(on_paper, lambda one: one.lost),
+        "measured": _each(walked, lambda one: np.isfinite(one.measured_loss)),
+        "physical": _each(walked, lambda one: np.isfinite(one.fall)),
+    }
+    reference = names.index(REFERENCE) if REFERENCE in names else 0
+    table: dict[str, Any] = {}
+    for measure, values in happened.items():
+        table |= _frequencies(measure, values, OVER_VELOCITY) | _above(measure, values, values[reference])
+    for asked in ("range", "accelerated"):
+        table |= _frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
+    over_trials = "entrant", "trial"
+    tried, lamed = ([[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "paper, "))
+    table |= _frequencies("fell", _each(tried, _fell), over_trials)
+    table |= _frequencies("lost", _each(lamed, _lost), over_trials)
+    best, worst = np.array([ranks(values.mean(axis=1)) for values in happened.values()]).transpose(1, 2, 0)
+    table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
+    table |= {name: _over(walked, find) for name, find in COSTS.items()}
+    table |= {name: _over(regimes, find) for name, find in REGIMES.items()}
+    velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
+    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
+    return xr.Dataset(table, axes, {"reference": names[reference]})
+
+
+def _lost(one: "xr.Dataset") -> "xr.DataArray":
+    return one.lost
+
+
+def _fell(one: "xr.Dataset") -> "xr.DataArray":
+    """Of a disturbance, or of walks from the start on."""
+    return one.fell if "fell" in one else np.isfinite(one.fall)
+
+
+def _upright(one: "xr.Dataset") -> "xr.Dataset":
+    """The walks without a fall."""
+    return one.isel(start=np.isinf(one.fall.values))
+
+
+COSTS = {
+    "speed": lambda one: _upright(one).speed.mean(),
+    "slip": lambda one: _upright(one).slip.mean(),
+    "cost": lambda one: _upright(one).work.sum() / _upright(one).way.sum(),
+    "torque": lambda one: _upright(one).torque.max() if _upright(one).start.size else np.nan,
+}
+"""Of the walks at one velocity; NaN where all fell."""
+
+REGIMES = {
+    "periodic": lambda one: np.isfinite(one.reached).mean(),
+    "stable": lambda one: one.stable.mean(),
+    "reached": lambda one: one.reached.median(),
+    "duty_factor": lambda one: one.duty_factor.mean(),
+    "ipsilateral": lambda one: _phase(one.ipsilateral),
+    "contralateral": lambda one: _phase(one.contralateral),
+}
+"""Of the limit regimes at one velocity; duty factor and phases are NaN where none was reached."""
+
+
+def _phase(values: "xr.DataArray") -> float:
+    """Circular mean of those that are known."""
+    known = values.values[np.isfinite(values.values)]
+    return float(circular_mean(known)) if len(known) else np.nan
+
+
+def _over(rows: Rows, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, ...], np.ndarray]:
+    """One number of each cell, (entrant, velocity); NaN where there is none."""
+    return OVER_VELOCITY, np.array([[np.nan if one is None else float(find(one)) for one in row] for row in rows])
+
+
+def _each(rows: Rows, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
+    """What happened to each start of each cell, (row, column, start), 0 or 1; NaN beyond its starts."""
+    found = [[np.empty(0) if one is None else np.asarray(find(one), dtype=float) for one in row] for row in rows]
+    whole = np.full((len(found), len(found[0]), max(len(one) for row in found for one in row)), np.nan)
+    for i, row in enumerate(found):
+        for j, one in enumerate(row):
+            whole[i, j, : len(one)] = one
+    return whole
+
+
+def _frequencies(name: str, values: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
+    """How often it happened, with the 95 % Wilson interval, and of how many starts."""
+    known = np.isfinite(values).sum(axis=-1)
+    count = np.nansum(values, axis=-1)
+    with np.errstate(invalid="ignore"):
+        columns = dict(zip(("", "_low", "_high"), (count / known, *wilson_intervals(count, known)), strict=True))
+    return {name + end: (dims, column, {"units": "1"}) for end, column in (columns | {"_starts": known}).items()}
+
+
+def _above(measure: str, values: np.ndarray, reference: np.ndarray) -> dict[str, Any]:
+    """How much more often it happened than to the reference on the same starts, with its interval."""
+    ends = np.array([[difference(*pair) for pair in zip(row, reference, strict=True)] for row in values])
+    return {f"{measure}_above{end}": (OVER_VELOCITY, ends[..., i]) for i, end in enumerate(("", "_low", "_high"))}

@@ -1,0 +1,139 @@
+"""The league as tables: each a title, a head and rows of texts, for the terminal and as Markdown."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.studies.league.trials import LEGS_LOST, TOLD
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LESS, MORE = "-", "+"
+"""Beside a frequency that is below, or above, that of the reference for sure."""
+
+MEASURES = {"kinematic": "Kinematic FLSS", "measured": "Measured FLSS", "physical": "Physical FLSS"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def tables(result: "xr.Dataset") -> Iterator[Table]:
+    """Everything that is told of a result of `League`."""
+    yield _ranks(result)
+    for measure, title in MEASURES.items():
+        yield _over_velocity(result, measure, title)
+    yield _regimes(result)
+    yield _trials(result)
+    yield _costs(result)
+
+
+def league_markdown(result: "xr.Dataset") -> str:
+    """All tables as Markdown."""
+    parts = []
+    for table in tables(result):
+        lines = [table.head, ["---"] * len(table.head), *table.rows]
+        parts += [f"### {table.title}", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
+    return "\n\n".join(parts) + "\n"
+
+
+def by_rank(result: "xr.Dataset") -> "xr.Dataset":
+    """The entrants from best to worst in physics, then on paper; those from ideal starts last."""
+    falls, losses = (result[measure].mean("velocity").values for measure in ("physical", "kinematic"))
+    unranked = result.best.sel(measure="physical").values == 0
+    return result.isel(entrant=np.lexsort((losses, falls, unranked)))
+
+
+def frequency(one: "xr.Dataset", name: str) -> str:
+    """A frequency with its interval; "-" where it is not known."""
+    middle, low, high = (one[name + end].item() for end in ("", "_low", "_high"))
+    return "-" if np.isnan(middle) else f"{_short(middle)} ({_short(low)}-{_short(high)})"
+
+
+def _ranks(result: "xr.Dataset") -> Table:
+    rows = []
+    for name in (shown := by_rank(result)).entrant.values:
+        one = shown.sel(entrant=name)
+        places = [f"{one[measure].mean().item():.3f}{_place(one.sel(measure=measure))}" for measure in MEASURES]
+        rows.append((name, *places, frequency(one, "range"), frequency(one, "accelerated")))
+    title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
+    return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
+
+
+def _place(one: "xr.Dataset") -> str:
+    """Rank in brackets: '(2)', '(=3-6)', nothing where there is none."""
+    best, worst = one.best.item(), one.worst.item()
+    return "" if best == 0 else f" ({best})" if best == worst else f" (={best}-{worst})"
+
+
+def _over_velocity(result: "xr.Dataset", measure: str, title: str) -> Table:
+    rows = []
+    for name in (shown := by_rank(result)).entrant.values:
+        cells = (shown.sel(entrant=name).isel(velocity=i) for i in range(result.sizes["velocity"]))
+        rows.append((name, *(frequency(one, measure) + _against(one, measure) for one in cells)))
+    reference, starts = result.attrs["reference"], result[f"{measure}_starts"].max().item()
+    told = f"{title} of {starts} starts; {LESS} below {reference} on the same starts, {MORE} above"
+    return Table(told, ("controller", *(f"V = {v:g}" for v in result.velocity.values)), rows)
+
+
+def _against(one: "xr.Dataset", measure: str) -> str:
+    low, high = one[f"{measure}_above_low"].item(), one[f"{measure}_above_high"].item()
+    return f" {LESS}" if high < 0 else f" {MORE}" if low > 0 else ""
+
+
+def _regimes(result: "xr.Dataset") -> Table:
+    at = _at_trials(result)
+    rows = []
+    for name in at.entrant.values:
+        one = at.sel(entrant=name)
+        shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
+        angles = (f"{one[key].item():.2f}" for key in ("ipsilateral", "contralateral", "duty_factor"))
+        rows.append(tuple(_known(text) for text in (name, *shares, f"{one.reached.item():.0f}", *angles)))
+    head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
+    return Table(f"Limit regimes at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows)
+
+
+def _trials(result: "xr.Dataset") -> Table:
+    rows = []
+    for name in (shown := by_rank(result)).entrant.values:
+        one = shown.sel(entrant=name)
+        falls = (_known(f"{fell:.2f}") for fell in one.fell.values)
+        rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
+    starts, v = result.fell_starts.max().item(), result.attrs["tried_at"]
+    title = f"Falls at V = {v:g} in {starts} starts; at last losses on paper without a leg.  {TOLD}"
+    return Table(title, ("controller", *result.trial.values, "paper"), rows)
+
+
+def _costs(result: "xr.Dataset") -> Table:
+    at = _at_trials(result)
+    rows = []
+    for name in at.entrant.values:
+        one = at.sel(entrant=name)
+        cells = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
+        rows.append((name, *map(_known, cells)))
+    head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque")
+    return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
+
+
+def _at_trials(result: "xr.Dataset") -> "xr.Dataset":
+    """The entrants in their order at the velocity of the trials, or that nearest to it."""
+    return by_rank(result).isel(velocity=int(np.abs(result.velocity.values - result.attrs["tried_at"]).argmin()))
+
+
+def _short(value: float) -> str:
+    """Two digits after the point, three where they matter, without a leading zero."""
+    text = f"{value:.2f}" if value >= 0.1 else f"{value:.3f}".rstrip("0").rstrip(".")
+    return text.replace("0.", ".", 1)
+
+
+def _known(text: str) -> str:
+    """The text of a number, "-" for none."""
+    return {"nan": "-", "inf": "never"}.get(text, text)

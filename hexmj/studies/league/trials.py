@@ -1,0 +1,81 @@
+"""What walks meet in the league, at one velocity: what disturbs them, and what a robot meets."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.leg_lost import LegLost
+from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.protocol import Controller
+from hexmj.studies.disturbance.cases import Case
+from hexmj.studies.league.entrants import Entrant
+
+IMPULSE = 40.0
+"""Of the push, in multiples of m V_p."""
+
+DELAY = 0.02
+"""How late legs are read [s]."""
+
+NOISE = 0.1
+"""Standard deviation of the error of sensed tips, as a part of AEP_0 - PEP_0."""
+
+LOST = (0, 1, 2)
+"""Legs that are lost, one at a time: front, middle, hind."""
+
+DISTURBED: dict[str, Case] = {
+    "halt": Case("halt", "none"),
+    "leg": Case("leg", "none"),
+    "push": Case("push", "none", IMPULSE),
+}
+"""Disturbances of walks whose plan is stable until then; each begins at a moment of its own."""
+
+MET: dict[str, dict[str, Any]] = {
+    "step": {"ground": "step", "ground_height": 3.0},
+    "rough": {"ground": "rough", "ground_height": 3.0},
+    "load": {"load": 1.0},
+}
+"""Conditions that are met by all starts."""
+
+LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
+"""Name of a trial -> index of the lost leg."""
+
+READING: tuple[str, ...] = ("reads", "noise", "late")
+"""Controllers that can read the legs do so, then inexactly, then late."""
+
+TRIALS = (*DISTURBED, *MET, *LEGS_LOST, *READING)
+"""All of them, by name."""
+
+TOLD = (
+    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
+    " until then; step and rough ground of 3 mm; load: twice the weight; lost: one leg, from the front; reads: the legs"
+    " are read; noise, late: with errors of 10 % of the step range, 20 ms late"
+)
+"""What they are."""
+
+
+@dataclass(frozen=True)
+class Walking:
+    """A trial in which a controller walks from the start on."""
+
+    controller: Controller
+    conditions: Conditions
+
+
+def walking(name: str, entrant: Entrant, conditions: Conditions) -> Walking | None:
+    """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs.
+
+    Args:
+        name: of the trial.
+        entrant: whose controller it is.
+        conditions: all others.
+    """
+    controller, reading = entrant.controller, entrant.reading if name in READING else None
+    if name in MET:
+        return Walking(controller, conditions.but(**MET[name]))
+    if name in LEGS_LOST:
+        return Walking(LegLost(controller, LEGS_LOST[name]), conditions)
+    if reading is None:
+        return None
+    late = DELAY * conditions.time.vp
+    senses = (reading, PoorSenses(reading, noise=NOISE), PoorSenses(reading, delay=late))
+    return Walking(dict(zip(READING, senses, strict=True))[name], conditions)

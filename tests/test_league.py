@@ -1,0 +1,221 @@
+"""The league: who takes part, what is asked of them, and what it comes to."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.conditions import Conditions
+from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
+from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.stepwise import Step, stepwise
+from hexmj.errors import InputError
+from hexmj.intervals import paired_difference
+from hexmj.measures.kinematic import first_loss, flss, flss_over_range, walk
+from hexmj.measures.physical import physical_walk
+from hexmj.physics.drive import drive
+from hexmj.physics.effort import EffortSoFar
+from hexmj.physics.settling import settle
+from hexmj.studies.league.entrants import EVERYONE, Entrant, entrants
+from hexmj.studies.league.figure import league_figure
+from hexmj.studies.league.ranks import difference, ranks
+from hexmj.studies.league.study import League
+from hexmj.studies.league.table import by_rank, league_markdown, tables
+from hexmj.studies.league.trials import DISTURBED, TRIALS, walking
+from hexmj.sweeps import conduct
+from hexmj.timing import Stride
+
+SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --window 20 --no-video --out here"
+NAMES = ("wilson", "ldvs", "graham-ideal")
+
+
+@dataclass(frozen=True)
+class Still:
+    """A controller of one's own that can neither be steered nor reads its legs: it stands."""
+
+    name: str = "still"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """All feet recede to PEP_min and stay there."""
+        x = starts
+
+        def step(v):
+            nonlocal x
+            x = np.maximum(x - v[:, None] * stride.dt, stride.pep_min)
+            return Step(x, np.ones(x.shape, dtype=bool))
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+@pytest.fixture(scope="module")
+def league() -> League:
+    takes_part = {**entrants(NAMES), "still": Entrant(Still())}
+    return League(takes_part, (0.3, 0.6), n_starts=12, n_physical=2, n_tried=2, window=40.0, accelerating=False)
+
+
+@pytest.fixture(scope="module")
+def result(league: League, tmp_path_factory: pytest.TempPathFactory):
+    return conduct(league, tmp_path_factory.mktemp("league"))
+
+
+def test_everyone_is_found_and_can_be_asked_everything() -> None:
+    takes_part = entrants(EVERYONE)
+    assert len(takes_part) == len(EVERYONE)
+    named = League(takes_part).named_cells()
+    for name, entrant in takes_part.items():
+        asked = {what for one, what in named if one == name}
+        assert "physics 0.5" in asked and "paper 0.5" in asked
+        assert entrant.ideal != ({*TRIALS} <= asked)
+    with pytest.raises(InputError, match="ideal start of ldvs"):
+        entrants(("ldvs-ideal",))
+
+
+def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
+    table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=40.0)
+    assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)
+    assert np.array_equal(result.kinematic_low.sel(entrant="ldvs"), table.low)
+    j_n, _ = flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=12, window=40.0)
+    assert result.range.sel(entrant="ldvs") == j_n
+    falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, window=40.0)
+    assert np.array_equal(result.physical.sel(entrant="wilson"), falls.flss)
+
+
+def test_differences_are_those_on_the_same_starts(result) -> None:
+    assert result.attrs["reference"] == "ldvs"
+    assert not result.kinematic_above.sel(entrant="ldvs").any()
+    starts, v = hexmj.draw_starts(12, 0), 0.3
+    lost, of_ldvs = (
+        np.isfinite(first_loss(starts, one, v, 40.0)) for one in (hexmj.load_controller("wilson"), hexmj.LDVS)
+    )
+    one = result.sel(entrant="wilson", velocity=v)
+    ends = [one[f"kinematic_above{end}"].item() for end in ("", "_low", "_high")]
+    assert np.allclose(ends, paired_difference(lost, of_ldvs))
+
+
+def test_what_cannot_be_asked_is_not_known(result) -> None:
+    still, ideal = (result.sel(entrant=name) for name in ("still", "graham-ideal"))
+    assert np.isnan(still.fell.sel(trial=["halt", "leg", "push", "reads", "noise", "late"])).all()
+    assert np.isfinite(still.fell.sel(trial=["step", "rough", "load", "lost 1"])).all()
+    assert np.isnan(ideal.fell).all() and np.isnan(ideal.range) and (ideal.kinematic_starts == 1).all()
+    assert (ideal.best == 0).all()
+    assert by_rank(result).entrant.values[-1] == "graham-ideal"
+
+
+def test_tables_and_figure_show_every_entrant(result) -> None:
+    text = league_markdown(result)
+    for table in tables(result):
+        assert {row[0] for row in table.rows} == {*NAMES, "still"}
+        assert all(len(row) == len(table.head) for row in table.rows)
+        assert f"### {table.title}" in text
+    assert "nan" not in text
+    assert len(league_figure(result).axes) == 8
+
+
+def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, result) -> None:
+    alone = replace(league, entrants={"wilson": league.entrants["wilson"]})
+    other = alone.result([cell.compute(threads=1) for cell in alone.cells()])
+    for name in ("kinematic", "measured", "physical", "fell", "cost", "torque", "slip", "stable", "ipsilateral"):
+        assert np.array_equal(other[name].sel(entrant="wilson"), result[name].sel(entrant="wilson"), equal_nan=True)
+
+
+def test_ranks_are_given_only_where_intervals_separate() -> None:
+    rng = np.random.default_rng(0)
+    often, rarely, seldom = (rng.uniform(size=200) < p for p in (0.8, 0.2, 0.22))
+    best, worst = ranks(np.array([often, rarely, seldom, np.full(200, np.nan)], dtype=float))
+    assert best.tolist() == [3, 1, 1, 0]
+    assert worst.tolist() == [3, 2, 2, 0]
+    few = np.array([[0.0, 0.0], [1.0, 1.0]])  # two starts separate nobody
+    assert [one.tolist() for one in ranks(few)] == [[1, 1], [2, 2]]
+
+
+def test_a_difference_of_zeros_and_ones_is_that_of_agresti_and_min() -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.uniform(size=(2, 50)) < [[0.3], [0.5]]
+    assert np.allclose(difference(one.astype(float), other.astype(float)), paired_difference(one, other))
+
+
+@pytest.mark.parametrize("leg", [0, 4])
+def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
+    starts, lame = hexmj.draw_starts(3, 1), LegLost(hexmj.LDVS, leg)
+    planned = walk(starts, lame, 0.3, 30.0)
+    assert not planned.stance[..., leg].any()
+    whole = walk(starts, hexmj.LDVS, 0.3, 30.0)
+    others = np.arange(6) != leg
+    assert np.array_equal(planned.stance[..., others], whole.stance[..., others])
+    assert np.array_equal(planned.x, whole.x)
+    walked = physical_walk(starts, lame, 0.3, 30.0)
+    held = walked.measured.time > 2 * RAISED
+    upright = np.isfinite(walked.height[held][..., leg])
+    assert not walked.measured.stance[held][..., leg].any()
+    assert (walked.height[held][..., leg][upright] > HELD / 3).mean() > 0.9
+
+
+def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:
+    check_controller(LegLost(hexmj.LDVS, 2))
+    check_controller(LegLost(ReadsLegs(hexmj.LDVS), 2))
+    check_controller(PoorSenses(ReadsLegs(hexmj.HWS), 0.1, 1.6))
+    with pytest.raises(InputError, match="poor senses of ldvs"):
+        hexmj.flss(PoorSenses(hexmj.LDVS, 0.1), [0.5], n_starts=2)
+    with pytest.raises(InputError, match="noise = -1"):
+        PoorSenses(hexmj.LDVS, -1.0)
+
+
+def test_poor_senses_that_are_perfect_change_nothing_and_errors_are_a_starts_own() -> None:
+    starts, reading = hexmj.draw_starts(3, 2), ReadsLegs(hexmj.LDVS)
+    plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (reading, PoorSenses(reading)))
+    assert np.array_equal(plain, perfect, equal_nan=True)
+    noisy = PoorSenses(reading, noise=0.1)
+    together, alone = (physical_walk(some, noisy, 0.5, 40.0).qpos for some in (starts, starts[2:]))
+    assert np.array_equal(together[:, 2:], alone, equal_nan=True)
+    assert not np.array_equal(together, plain, equal_nan=True)
+    late = physical_walk(starts, PoorSenses(reading, delay=2.0), 0.5, 40.0).qpos
+    assert not np.array_equal(late, plain, equal_nan=True)
+
+
+def test_work_and_torque_do_not_depend_on_chunks_and_are_those_of_the_strides() -> None:
+    settled = settle(hexmj.draw_starts(2, 0), Conditions(), Stride())
+    efforts = []
+    for parts in (1, 3):
+        plan = hexmj.LDVS.begin(settled.starts, np.full(2, 0.3), settled.stride)
+        effort, chunks = EffortSoFar(settled), [*drive(settled, plan, 30.0)]
+        for chunk in chunks:
+            for part in np.array_split(np.arange(chunk.qpos.shape[1]), parts):
+                shown = {name: getattr(chunk, name)[:, part] for name in ("qpos", "force")}
+                valid = np.clip(chunk.valid - part[0], 0, len(part))
+                effort.add(replace(chunk, **shown, valid=valid))
+        efforts.append((effort.work, effort.torque))
+    assert np.allclose(efforts[0][0], efforts[1][0], rtol=1e-12)
+    assert np.array_equal(efforts[0][1], efforts[1][1])
+    q = np.concatenate([chunk.qpos for chunk in chunks], axis=1)[..., settled.compiled.columns.qpos]
+    force = np.concatenate([chunk.force for chunk in chunks], axis=1)
+    h, damping = settled.compiled.model.opt.timestep, -settled.compiled.model.actuator_biasprm[:18, 2]
+    turning = np.diff(q, axis=1) / h
+    torque = force[:, 1:-1] - damping * np.diff(turning, axis=1)
+    work = np.maximum(torque * turning[:, 1:], 0).sum(axis=(1, 2)) * h
+    assert np.allclose(efforts[0][0], work, rtol=1e-12)
+
+
+def test_trials_are_what_they_say() -> None:
+    entrant, usual = Entrant(hexmj.LDVS), Conditions()
+    walked = [name for name in TRIALS if name not in DISTURBED]
+    found = {name: one for name in walked if (one := walking(name, entrant, usual))}
+    assert list(found) == walked
+    assert found["load"].conditions.masses.load == 1.0
+    assert found["step"].conditions.ground.ground_height == 3.0
+    assert found["lost 2"].controller == LegLost(hexmj.LDVS, 1)
+    assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
+
+
+def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    from hexmj.cli.main import options_of
+
+    monkeypatch.chdir(tmp_path)
+    example = Path(__file__).parents[1] / "examples" / "tripod.py"
+    options_of(["league", "--controllers", f"{example}:Tripod", "ldvs", *SMALL.split()]).run()
+    shown = capsys.readouterr().out
+    assert "Standings" in shown and "tripod.py" in shown
+    assert {"league.nc", "league.png", "league.md", "manifest.json"} <= {one.name for one in Path("here").iterdir()}
