@@ -23,7 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
 
 BEHIND, AHEAD = ([near[0] if near else leg for leg, near in enumerate(table)] for table in (N2, N4))
@@ -140,7 +142,9 @@ M = 1.0 / 0.16
 REACOG = Reading(
     step_length=0.16,
     swing_speed=0.151,
-    rule1=Links(behind=(-0.2 * M, -0.2 * M, 0.0), ahead=(0.0, -0.065 * M, -0.13 * M), across=(-0.13 * M, 0, -0.13 * M)),
+    rule1=Links(
+        behind=(-0.2 * M, -0.2 * M, 0.0), ahead=(0.0, -0.065 * M, -0.13 * M), across=(-0.13 * M, 0.0, -0.13 * M)
+    ),
     rule1_rest=0.25,
     rule1_delay=Lines((0.0, 0.03, 0.03 + 0.2 / 18), (0.2 + 6 * 0.03, 0.2, 0.0)),
     rule2=Links(behind=(0.08 * M, 0.08 * M, 0.0), across=(0.02 * M, 0.02 * M, 0.02 * M)),
@@ -153,8 +157,10 @@ REACOG = Reading(
     rule3_across_for=0.03 * M,
     least_step=0.05 * M,
 )
-"""reaCog.  Its stretches of rule 3 end where 0.236 + 2 v (0.079 + 4 v up to 0.01 m/s) and 0.5 + 6 v of the way from PEP
-to AEP are left; a foot goes from PEP to the highest point and on to AEP, 0.296 m, at 0.28 m/s.
+"""reaCog.  Having no rule 5, it lets rule 1 act on hind legs too.
+
+A stretch of rule 3 begins 0.236 + 2 v (0.079 + 4 v up to 0.01 m/s) or 0.5 + 6 v of the way ahead of PEP, and goes to
+the rear.  A foot takes 0.296 m / (0.28 m/s) from PEP over the highest point to AEP, 0.16 m ahead.
 """
 
 RULE5 = Links(behind=(-0.2, -0.2, 0.0), ahead=(0.0, -0.2, -0.2), across=(-0.1, -0.1, 0.0))
@@ -164,9 +170,9 @@ RULE5 = Links(behind=(-0.2, -0.2, 0.0), ahead=(0.0, -0.2, -0.2), across=(-0.1, -
 def sent_load(load: np.ndarray) -> np.ndarray:
     """What a leg sends by rule 5, 0 to 0.6, when it carries a part `load` of the weight.
 
-    In neuro_walknet the effort of the leg's retractor, 0 to 50 mV, less a threshold of 20 mV, strengthens the retractors
-    of its neighbours that stand.  Here a third of the weight, a leg's part in a tripod, is an effort of 50 mV, and the
-    neighbour's stance is prolonged: 50 mV times a weight of 1 are a step length.
+    In neuro_walknet the effort of the leg's retractor, 0 to 50 mV, less a threshold of 20 mV, strengthens the
+    retractors of its neighbours that stand.  Here a third of the weight, a leg's part in a tripod, is an effort of
+    50 mV, and the neighbour's stance is prolonged: 50 mV times a weight of 1 are a step length.
     """
     return np.maximum(np.minimum(3.0 * load, 1.0) - 20.0 / 50.0, 0.0)
 
@@ -190,6 +196,11 @@ class Walknet(Lifted):
     """Whether no leg is lifted while three or more swing, as in `CURVE`; of those lifted at one step all are."""
 
     mirrored = True
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        if not set(self.rules) <= {1, 2, 3, 5}:
+            raise InputError(f"rules = {self.rules}; expected some of 1, 2, 3 and 5")
 
     @property
     def reads_load(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -230,10 +241,8 @@ class Walknet(Lifted):
                 along = _within(legs, own.rule3_along_from.at(v), own.rule3_along_for)
                 across = _within(legs, own.rule3_across_from.at(v), own.rule3_across_for)
                 return own.rule3_along.shift(along) + own.rule3_across.shift(across)
-            case 5:
-                return RULE5.shift(sent_load(legs.load))
             case _:
-                raise ValueError(f"rule {rule}; expected 1, 2, 3 or 5")
+                return RULE5.shift(sent_load(legs.load))
 
 
 def _within(legs: Legs, begin: np.ndarray, length: float) -> np.ndarray:
