@@ -1,6 +1,7 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -23,12 +24,16 @@ from hexmj.loaded import importable
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points by which other packages bring controllers: a name and `module:object`."""
 
+VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
+"""Names of controllers of which one mechanism or rule is left out, or switched on."""
+
 
 def load_controller(name: str) -> Controller:
     """A controller by its name.
 
     Args:
-        name: a preset or a rival; ``module:object`` or ``file.py:object``, a controller or a class of controllers,
+        name: a preset or a rival, also without one of its mechanisms or rules (``ldvs-without-3``), or with mechanism 2
+            or 4 (``ldvs-with-2``); ``module:object`` or ``file.py:object``, a controller or a class of controllers,
             which is made with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of
             the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
 
@@ -38,6 +43,8 @@ def load_controller(name: str) -> Controller:
     for ours in (PRESETS, RIVALS):
         if typed("name", name, str) in ours:
             return ours[name]
+    if varied := VARIED.fullmatch(name):
+        return _varied(varied["name"], varied["how"], int(varied["which"]))
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():
         return _found(where, what, name)
@@ -62,6 +69,15 @@ def known_names() -> Iterator[str]:
     yield from PRESETS
     yield from RIVALS
     yield from (point.name for point in entry_points(group=ENTRY_POINTS))
+
+
+def _varied(name: str, how: str, which: int) -> Controller:
+    """A controller with one mechanism or rule more or less."""
+    found: Any = load_controller(name)
+    change = getattr(found, "without" if how == "without" else "having", None)
+    if change is None:
+        raise InputError(f"controller {name}-{how}-{which}: {name} has no mechanisms or rules that can be switched")
+    return change(which)
 
 
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:

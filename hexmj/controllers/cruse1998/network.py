@@ -5,7 +5,7 @@ AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent
 `kernel`, compiled; ``tests/plain_network.py`` holds them in their readable form.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, get_args, get_type_hints
 
@@ -14,7 +14,8 @@ import numpy as np
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.controllers.cruse1998.readings import Reading
-from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, general
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
+from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
@@ -57,6 +58,39 @@ class Cruse1998:
         w = general(self.weights)
         matrices = [getattr(w, kind) for kind in NEIGHBOURS]
         return self.order != "sequential" and all(np.array_equal(one, one[MIRROR, :][:, MIRROR]) for one in matrices)
+
+    def without(self, mechanism: int) -> "Cruse1998":
+        """The same set without one of the mechanisms 1 to 4, and named so.
+
+        Raises:
+            InputError: no such mechanism, or one that the set has not got.
+        """
+        return self._having(mechanism, 0.0, f"{self.name}-without-{mechanism}")
+
+    def having(self, mechanism: int) -> "Cruse1998":
+        """The same set with mechanism 2 or 4, which are on or off, and named so.
+
+        Raises:
+            InputError: another mechanism, or one that the set has already.
+        """
+        if mechanism not in (2, 4):
+            raise InputError(f"{self.name} with mechanism {mechanism}; expected 2 or 4, which are on or off")
+        return self._having(mechanism, 1.0, f"{self.name}-with-{mechanism}")
+
+    def _having(self, mechanism: int, value: float, name: str) -> "Cruse1998":
+        """Every weight of a mechanism set to a value."""
+        kinds = [kind for kind in NEIGHBOURS if kind[1] == str(mechanism)]
+        if not kinds:
+            raise InputError(f"mechanism = {mechanism}; expected one of 1, 2, 3, 4")
+        one: Any = self.weights
+        if isinstance(one, Symmetric):
+            changed = replace(one, **{key: value for key in asdict(one) if key.partition("_")[0] in kinds})
+        else:
+            given = {(kind, pair): getattr(one, kind)[pair] for kind in NEIGHBOURS for pair in pairs(kind)}
+            changed = Weights.of({key: value if key[0] in kinds else old for key, old in given.items()})
+        if np.array_equal(general(changed).to_vector(), general(one).to_vector()):
+            raise InputError(f"{name} is {self.name}: expected a mechanism that makes a difference")
+        return replace(self, weights=changed, name=name)
 
     def begin(
         self,

@@ -208,7 +208,13 @@ class Walknet(Lifted):
         return 5 in self.rules
 
     def without(self, rule: int) -> "Walknet":
-        """The same without a rule, and named so."""
+        """The same without a rule, and named so.
+
+        Raises:
+            InputError: a rule that does not act.
+        """
+        if rule not in self.rules:
+            raise InputError(f"{self.name} without rule {rule}; expected one of {', '.join(map(str, self.rules))}")
         return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(one for one in self.rules if one != rule))
 
     def at_start(self, legs: Legs) -> Stances:
