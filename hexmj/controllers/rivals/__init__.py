@@ -2,12 +2,18 @@
 
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
+from hexmj.controllers.rivals.scores import Scores
 
 RIVALS: dict[str, Controller] = {
     one.name: one
     for one in (
         Metronome("wilson", "wilson"),
         Metronome("graham", "graham"),
+        PhaseOscillators("tripod", name="cpg-tripod"),
+        PhaseOscillators("tetrapod", name="cpg-tetrapod"),
+        PhaseOscillators("wave", name="cpg-wave"),
+        Scores(),
     )
 }
 """By the names under which they are found."""
