@@ -3,7 +3,9 @@
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
+from hexmj.controllers.rivals.righetti import Righetti
 from hexmj.controllers.rivals.scores import Scores
+from hexmj.controllers.rivals.tegotae import Tegotae
 
 RIVALS: dict[str, Controller] = {
     one.name: one
@@ -14,6 +16,8 @@ RIVALS: dict[str, Controller] = {
         PhaseOscillators("tetrapod", name="cpg-tetrapod"),
         PhaseOscillators("wave", name="cpg-wave"),
         Scores(),
+        Righetti(),
+        Tegotae(),
     )
 }
 """By the names under which they are found."""
