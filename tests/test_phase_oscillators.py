@@ -37,8 +37,8 @@ def test_legs_come_to_swing_as_the_table_says_and_for_the_usual_time(name: str, 
 def test_oscillators_that_are_not_coupled_step_a_whole_range_each_by_itself(velocity: float) -> None:
     stride, alone = Stride(), PhaseOscillators(coupling=0.0)
     found = walk(hexmj.draw_starts(6, 2), alone, velocity, 5 * stride.periods(velocity))
-    assert np.abs(found.x.min(axis=0) - stride.pep0).max() < 2 * stride.dt
-    assert np.abs(found.x.max(axis=0) - stride.aep0).max() < 2 * stride.dt
+    assert np.abs(found.x.min(axis=0) - stride.pep0).max() < 0.5  # mm
+    assert np.abs(found.x.max(axis=0) - stride.aep0).max() < 0.1
 
 
 def test_two_tripods_in_phase_are_driven_apart_at_the_rate_of_equation_1() -> None:
