@@ -9,6 +9,9 @@ How it maps: a stance goes from AEP_0 to PEP_0, and beyond PEP_0 a leg waits; wa
 rule but the first, as in the source.  Fitted by us: nothing.  Two things differ: of equal scores the rearmost tip
 steps, and not one drawn by lot; the source's first step of a front or middle leg, drawn by lot because all its legs
 wait at time 0, falls away because ours stand anywhere.  Sensed: where the tips are and which legs stand.
+
+The source's waiting legs hold still, as long as need be; ours recede.  They wait so long that from about V = 0.5 on
+most of them come to PEP_min, where they swing without being selected and the rules lose their hold on the gait.
 """
 
 from dataclasses import dataclass
