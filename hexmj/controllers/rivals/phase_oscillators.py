@@ -1,0 +1,113 @@
+"""Coupled phase oscillators, one a leg, that hear of no leg: flygym's central pattern generator (CPG).
+
+Source: flygym 1.2.1, examples/locomotion/cpg_controller.py (`calculate_ddt`) and preprogrammed.py (`get_cpg_biases`):
+    d theta_i / dt = 2 pi nu + sum_j r_j w_ij sin(theta_j - theta_i - phi_ij)     (1)
+    d r_i / dt = alpha (R - r_i)                                                  (2)
+
+How it maps: nu is one period (AEP_0 - PEP_0) (1 + 1/V) of a leg, and w and alpha keep their ratio to nu.  The swing is
+the first V / (1 + V) of the phase, so that at the phase's own rate it lasts (AEP_0 - PEP_0) / V_p and a stance
+(AEP_0 - PEP_0) / V_r; a leg is lifted as its phase gets there.  In the source r is the size of the step too; here legs
+step the whole range, and r only scales the coupling.  Fitted by us: nothing.  Sensed: the tips at time 0, which set the
+phases (in the source they are drawn); nothing afterwards.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hexmj.controllers.rivals.lifted import Legs, Lifted
+
+NU = 12.0
+"""The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
+
+BIASES: dict[str, np.ndarray] = {
+    "tripod": np.array(
+        [
+            [0, 1, 0, 1, 0, 1],
+            [1, 0, 1, 0, 1, 0],
+            [0, 1, 0, 1, 0, 1],
+            [1, 0, 1, 0, 1, 0],
+            [0, 1, 0, 1, 0, 1],
+            [1, 0, 1, 0, 1, 0],
+        ]
+    )
+    / 2,
+    "tetrapod": np.array(
+        [
+            [0, 1, 2, 2, 0, 1],
+            [2, 0, 1, 1, 2, 0],
+            [1, 2, 0, 0, 1, 2],
+            [1, 2, 0, 0, 1, 2],
+            [0, 1, 2, 2, 0, 1],
+            [2, 0, 1, 1, 2, 0],
+        ]
+    )
+    / 3,
+    "wave": np.array(
+        [
+            [0, 1, 2, 3, 4, 5],
+            [5, 0, 1, 2, 3, 4],
+            [4, 5, 0, 1, 2, 3],
+            [3, 4, 5, 0, 1, 2],
+            [2, 3, 4, 5, 0, 1],
+            [1, 2, 3, 4, 5, 0],
+        ]
+    )
+    / 6,
+}
+"""phi_ij / 2 pi, how far leg j is to be ahead of leg i [periods], (leg i, leg j)."""
+
+
+class Oscillators(NamedTuple):
+    """What the network remembers."""
+
+    phase: np.ndarray
+    """(start, leg) theta / 2 pi [periods]; a swing begins at each whole number."""
+    amplitude: np.ndarray
+    """(start, 1) r, the same of all legs since they begin alike."""
+
+
+@dataclass(frozen=True)
+class PhaseOscillators(Lifted):
+    """Eqs. 1 and 2 with the source's constants."""
+
+    gait: Literal["tripod", "tetrapod", "wave"] = "tripod"
+    """Which table of `BIASES`."""
+    coupling: float = 10.0
+    """w_ij [1/s at `NU`] where phi_ij > 0, and 0 elsewhere; source."""
+    convergence: float = 20.0
+    """alpha [1/s at `NU`]; source."""
+    amplitude: float = 1.0
+    """R; source."""
+    amplitude_at_start: float = 0.0
+    """r at time 0; source."""
+    name: str = "cpg-tripod"
+
+    @property
+    def mirrored(self) -> bool:
+        """Only the tripod's table is the same for both sides."""
+        return self.gait == "tripod"
+
+    def at_start(self, legs: Legs) -> Oscillators:
+        """See `LiftingRule`."""
+        swing = 1.0 - legs.stance_part
+        phase = swing + legs.stance_part * np.clip(legs.travel, 0.0, 1.0)
+        return Oscillators(phase, np.full_like(legs.v, self.amplitude_at_start))
+
+    def lifts(self, state: Oscillators, legs: Legs) -> tuple[Oscillators, np.ndarray]:
+        """See `LiftingRule`."""
+        span = legs.stride.aep0 - legs.stride.pep0
+        periods = legs.stride.dt / span * (1.0 - legs.stance_part)  # nu dt
+        phase, r = state
+        pull = r * self.coupling / NU * self._pulls(phase) / (2.0 * np.pi)
+        after = phase + periods * (1.0 + pull)  # Eq. 1, Euler as in the source
+        r = r + periods * self.convergence / NU * (self.amplitude - r)  # Eq. 2
+        return Oscillators(after, r), np.ceil(after) > np.ceil(phase)
+
+    def _pulls(self, phase: np.ndarray) -> np.ndarray:
+        """(start, leg) sum of the sines of Eq. 1; each side by itself, so that mirrored starts give mirrored bits."""
+        bias = BIASES[self.gait]
+        ahead = phase[:, None, :] - phase[:, :, None] - bias  # (start, leg i, leg j)
+        sines = np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0)
+        return (sines[..., 0] + sines[..., 1] + sines[..., 2]) + (sines[..., 3] + sines[..., 4] + sines[..., 5])

@@ -1,0 +1,86 @@
+"""Six scores, and the leg with the highest one begins a step: flygym's rule-based controller.
+
+Source: flygym 1.2.1, examples/locomotion/rule_based_controller.py.  A leg that has begun a step goes through swing and
+stance and then waits until it is selected; one leg at most is selected in a time step.  Rule 1: a leg is held while
+the one behind it swings.  Rule 2: it is urged on by the one behind it and the one across early in their stance.
+Rule 3: and by the one in front of it and the one across late in their stance.
+
+How it maps: a stance goes from AEP_0 to PEP_0, and beyond PEP_0 a leg waits; waiting and swinging legs count for no
+rule but the first, as in the source.  Fitted by us: nothing.  Two things differ: of equal scores the rearmost tip
+steps, and not one drawn by lot; the source's first step of a front or middle leg, drawn by lot because all its legs
+wait at time 0, falls away because ours stand anywhere.  Sensed: where the tips are and which legs stand.
+
+The source's waiting legs hold still, as long as need be; ours recede.  They wait so long that from about V = 0.5 on
+most of them come to PEP_min, where they swing without being selected and the rules lose their hold on the gait.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hexmj.controllers.rivals.lifted import Legs, Lifted
+
+BEHIND = (1, 2, None, 4, 5, None)
+"""Ipsilateral leg behind each leg: sender of rules 1 and 2."""
+
+IN_FRONT = (None, 0, 1, None, 3, 4)
+"""Ipsilateral leg in front of each leg: sender of rule 3."""
+
+ACROSS = (3, 4, 5, 0, 1, 2)
+"""Contralateral leg of each leg: sender of rules 2 and 3."""
+
+
+class Nothing(NamedTuple):
+    """What the rules remember from step to step: the legs' own states say all."""
+
+
+@dataclass(frozen=True)
+class Scores(Lifted):
+    """The three rules with the source's weights."""
+
+    rule1: float = -10.0
+    """Score while the leg behind swings; source."""
+    rule2_ipsilateral: float = 2.5
+    """Score as the leg behind begins its stance, falling to 0 at its end; source."""
+    rule2_contralateral: float = 1.0
+    """The same of the leg across; source."""
+    rule3_ipsilateral: float = 3.0
+    """Score as the leg in front ends its stance, growing from 0 at its beginning; source."""
+    rule3_contralateral: float = 2.0
+    """The same of the leg across; source."""
+    margin: float = 0.001
+    """Part of the highest score by which a score may be lower and still count as equal; source."""
+    name: str = "flygym-rules"
+
+    def at_start(self, legs: Legs) -> Nothing:
+        """See `LiftingRule`."""
+        return Nothing()
+
+    def lifts(self, state: Nothing, legs: Legs) -> tuple[Nothing, np.ndarray]:
+        """See `LiftingRule`."""
+        scores, waits = self.scores(legs), legs.stands & (legs.travel >= 1.0)
+        highest = scores.max(axis=1, keepdims=True)  # also of legs that do not wait, as in the source
+        eligible = waits & (scores > 0) & (scores >= highest - self.margin * np.abs(highest))
+        rearmost = np.argmax(np.where(eligible, legs.travel, -np.inf), axis=1)
+        return state, eligible & (np.arange(6) == rearmost[:, None])
+
+    def scores(self, legs: Legs) -> np.ndarray:
+        """(start, leg) what all rules together give each leg."""
+        in_stance = legs.stands & (legs.travel > 0.0) & (legs.travel < 1.0)
+        late = np.where(in_stance, legs.travel, 0.0)
+        early = np.where(in_stance, 1.0 - legs.travel, 0.0)
+        return (
+            self.rule1 * _from(BEHIND, ~legs.stands)
+            + (self.rule2_ipsilateral * _from(BEHIND, early) + self.rule2_contralateral * _from(ACROSS, early))
+            + (self.rule3_ipsilateral * _from(IN_FRONT, late) + self.rule3_contralateral * _from(ACROSS, late))
+        )
+
+
+def _from(senders: tuple[int | None, ...], signal: np.ndarray) -> np.ndarray:
+    """(start, leg) each leg's sender's signal, 0 without a sender."""
+    heard = np.zeros(signal.shape)
+    for leg, sender in enumerate(senders):
+        if sender is not None:
+            heard[:, leg] = signal[:, sender]
+    return heard

@@ -1,0 +1,69 @@
+"""Uncoupled phase oscillators that hold a loaded leg on the ground: Tegotae-based control.
+
+Source: D. Owaki, M. Goda, S. Miyazawa, A. Ishiguro, A minimal model describing hexapedal interlimb coordination: the
+Tegotae-based approach, Front. Neurorobot. 11:29, 2017:
+    d phi_i / dt = omega - sigma_1 N_i cos phi_i + sigma_2 (1 / n_i sum_j K_ij N_j) cos phi_i      (1)
+with the swing at 0 < phi < pi, and N the load on a foot.  The paper could not be had.  The first feedback, with its
+sign, is that of its first author's public code; that the second has the opposite sign, and neighbours for j, is from
+memory, and without it hardly any start (at most 13 %) ends in a stable regime; values of sigma and K were not found.
+
+How it maps: a leg's own rate is pi V_p / (AEP_0 - PEP_0) while it swings and pi V_r / (AEP_0 - PEP_0) while it stands,
+and a phase does not run backward.  The tips at time 0 set the phases; a leg is lifted as its phase passes 2 pi.  Ours:
+the neighbours are the legs in front, behind and across, K_ij = 1; sigma_1 = sigma_2, so that six legs that carry equal
+parts do not hold each other; sigma W / 6 is half of omega, at which a leg that carries a third of the weight, and its
+neighbours nothing, is just brought to a halt at the end of its stance.  From 0.3 to 1 (200 starts) greater gains lose
+static stability from fewer starts up to V = 0.5, and let all legs of fast walks wait until PEP_min: from V = 0.9 on at
+0.5, from 0.7 on at 0.7; at 0.3 none.  A public code for modular robots takes half of omega too.
+Sensed: the load on each foot.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hexmj.controllers.rivals.lifted import Legs, Lifted
+
+
+class Phases(NamedTuple):
+    """What the oscillators remember."""
+
+    phase: np.ndarray
+    """(start, leg) phi / 2 pi [periods]; a swing begins at each whole number."""
+
+
+@dataclass(frozen=True)
+class Tegotae(Lifted):
+    """Eq. 1."""
+
+    own: float = 0.5
+    """sigma_1 W / (6 omega), feedback of a leg that carries a sixth of the weight W over its own rate; ours."""
+    neighbours: float = 0.5
+    """sigma_2 W / (6 omega), the same of its neighbours; ours."""
+    name: str = "tegotae"
+
+    reads_load = True
+    mirrored = True
+
+    def at_start(self, legs: Legs) -> Phases:
+        """See `LiftingRule`."""
+        return Phases(0.5 + 0.5 * np.clip(legs.travel, 0.0, 1.0))
+
+    def lifts(self, state: Phases, legs: Legs) -> tuple[Phases, np.ndarray]:
+        """See `LiftingRule`."""
+        phase = state.phase
+        span = legs.stride.aep0 - legs.stride.pep0
+        omega = 0.5 * legs.stride.dt / span * np.where(legs.stands, legs.v, 1.0)  # omega dt [periods]
+        load = 6.0 * legs.load
+        feedback = self.neighbours * _mean_of_neighbours(load) - self.own * load
+        after = phase + omega * np.maximum(1.0 + feedback * np.cos(2.0 * np.pi * phase), 0.0)  # Eq. 1
+        return Phases(after), np.ceil(after) > np.ceil(phase)
+
+
+def _mean_of_neighbours(load: np.ndarray) -> np.ndarray:
+    """(start, leg) of the legs in front, behind and across."""
+    side = load.reshape(-1, 2, 3)
+    front, middle, hind = side[..., 0], side[..., 1], side[..., 2]
+    ipsilateral = np.stack([middle, front + hind, middle], axis=-1)
+    total = ipsilateral + side[:, ::-1]
+    return (total / np.array([2.0, 3.0, 2.0])).reshape(load.shape)
