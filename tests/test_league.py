@@ -20,7 +20,8 @@ from hexmj.measures.physical import physical_walk
 from hexmj.physics.drive import drive
 from hexmj.physics.effort import EffortSoFar
 from hexmj.physics.settling import settle
-from hexmj.studies.league.entrants import EVERYONE, Entrant, entrants
+from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.entrants import EVERYONE, entrants
 from hexmj.studies.league.figure import league_figure
 from hexmj.studies.league.ranks import difference, ranks
 from hexmj.studies.league.study import League

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals import RIVALS
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.controllers.rivals.righetti import Hopf, Righetti
+from hexmj.controllers.rivals.table import RIVALS
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Stride

@@ -5,9 +5,9 @@ import pytest
 
 import hexmj
 from hexmj.controllers.conformance import check_controller
-from hexmj.controllers.rivals import RIVALS
 from hexmj.controllers.rivals.lifted import Lifted
 from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.table import RIVALS
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, gait, wilson_phase
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Acceleration, Stride

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals import RIVALS
 from hexmj.controllers.rivals.lifted import Legs
+from hexmj.controllers.rivals.table import RIVALS
 from hexmj.controllers.rivals.tegotae import Phases, Tegotae
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk

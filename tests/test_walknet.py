@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals import RIVALS
 from hexmj.controllers.rivals.lifted import Legs
+from hexmj.controllers.rivals.table import RIVALS
 from hexmj.controllers.rivals.walknet import CURVE, REACOG, Reading, Walknet, sent_load
 from hexmj.errors import InputError
 from hexmj.gaits import IPSILATERAL, gait

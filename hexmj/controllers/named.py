@@ -15,7 +15,7 @@ from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.controllers.rivals import RIVALS
+from hexmj.controllers.rivals.table import RIVALS
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.literal import literal

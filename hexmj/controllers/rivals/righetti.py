@@ -7,8 +7,8 @@ that names it:
     dy_i/dt = beta (mu - r_i^2) y_i + omega_i x_i + sum_j k_ij y_j + u_i           (2)
     omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1)    (3)
     u_i = -omega_i x_i - sum_j k_ij y_j  stops a transition, -sign(y_i) F hastens one, else 0    (4)
-A leg stands while y > 0 and x falls, and swings while y < 0.  That code has no load; that Eq. 4 stops the end of a stance
-while the foot is loaded and hastens transitions otherwise is from memory.
+A leg stands while y > 0 and x falls, and swings while y < 0.  That code has no load; that Eq. 4 stops the end of
+a stance while the foot is loaded, and hastens transitions otherwise, is from memory.
 
 How it maps: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where
 the tip is between PEP_0 and AEP_0; a leg is lifted as y becomes negative.  Ours, since the source is about quadrupeds

@@ -8,7 +8,7 @@ from hexmj.controllers.leg_lost import LegLost
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, limit_gait
 from hexmj.measures.kinematic import first_loss
 from hexmj.starts import draw_starts
-from hexmj.studies.league.entrants import Entrant
+from hexmj.studies.league.entrant import Entrant
 from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:

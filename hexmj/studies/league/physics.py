@@ -17,7 +17,7 @@ from hexmj.physics.settling import settle
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
-from hexmj.studies.league.entrants import Entrant
+from hexmj.studies.league.entrant import Entrant
 from hexmj.timing import Stride, observation_time
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from hexmj.errors import InputError
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
-from hexmj.studies.league.entrants import Entrant
+from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.trials import DISTURBED, LEGS_LOST, TRIALS, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
@@ -48,7 +48,7 @@ class League:
     """Of these, number of starts that walk in physics at every velocity."""
     n_tried: int = 50
     """Number of starts in each trial."""
-    tried_at: float = 0.5
+    tried_at: float = 0.3
     """V_r of the trials."""
     accelerating: bool = True
     """Whether walks on paper accelerate to V_r = 0.9, too, which takes as long as everything else on paper."""

@@ -8,7 +8,7 @@ from hexmj.controllers.leg_lost import LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.protocol import Controller
 from hexmj.studies.disturbance.cases import Case
-from hexmj.studies.league.entrants import Entrant
+from hexmj.studies.league.entrant import Entrant
 
 IMPULSE = 40.0
 """Of the push, in multiples of m V_p."""
@@ -30,11 +30,11 @@ DISTURBED: dict[str, Case] = {
 """Disturbances of walks whose plan is stable until then; each begins at a moment of its own."""
 
 MET: dict[str, dict[str, Any]] = {
-    "step": {"ground": "step", "ground_height": 3.0},
-    "rough": {"ground": "rough", "ground_height": 3.0},
+    "step": {"ground": "step", "ground_height": 3.0, "ground_at": 40.0},
+    "rough": {"ground": "rough", "ground_height": 3.0, "ground_at": 40.0},
     "load": {"load": 1.0},
 }
-"""Conditions that are met by all starts."""
+"""Conditions that are met by all starts; the ground begins where even slow walks come to it with all legs."""
 
 LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
 """Name of a trial -> index of the lost leg."""

@@ -1,0 +1,55 @@
+"""One who takes part: any controller, from the random starts S or, as metronomes may, from a start of its own."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from hexmj.controllers.asking import begin
+from hexmj.controllers.protocol import Controller, ReadingPlan, SteerableController, check_controller_type
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.errors import InputError
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
+
+
+@runtime_checkable
+class HasIdealStart(Protocol):
+    """A controller with a gait that it walks from some start on."""
+
+    def ideal_start(self, velocity: float, stride: Stride) -> np.ndarray:
+        """Tips at time 0, (1, leg) [mm]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A controller, and how it begins."""
+
+    controller: Controller
+    """Plans the walks."""
+    ideal: bool = False
+    """Whether it begins at its `ideal_start`, the same for all walks."""
+
+    def __post_init__(self) -> None:
+        check_controller_type(self.controller)
+        if self.ideal and not isinstance(self.controller, HasIdealStart):
+            raise InputError(f"an ideal start of {self.controller.name}; expected a controller with ideal_start")
+
+    def starts(self, n_starts: int, seed: int, velocity: float, stride: Stride) -> np.ndarray:
+        """Random starts, (start, leg) [mm], or the ideal one alone."""
+        if self.ideal and isinstance(self.controller, HasIdealStart):
+            return self.controller.ideal_start(velocity, stride)
+        return draw_starts(n_starts, seed, stride)
+
+    @property
+    def reading(self) -> Controller | None:
+        """The same controller reading the legs, if it can: by itself, or because its plans can be steered."""
+        if isinstance(begin(self.controller, draw_starts(1, 0), 0.5, Stride()), ReadingPlan):
+            return self.controller
+        return ReadsLegs(self.controller) if self.steerable else None
+
+    @property
+    def steerable(self) -> bool:
+        """Whether it can be halted, and a leg of it stopped."""
+        return isinstance(self.controller, SteerableController)
