@@ -30,8 +30,8 @@ DISTURBED: dict[str, Case] = {
 """Disturbances of walks whose plan is stable until then; each begins at a moment of its own."""
 
 MET: dict[str, dict[str, Any]] = {
-    "step": {"ground": "step", "ground_height": 3.0, "ground_at": 40.0},
-    "rough": {"ground": "rough", "ground_height": 3.0, "ground_at": 40.0},
+    "step": {"ground": "step", "ground_height": 3.0, "ground_at": 45.0},
+    "rough": {"ground": "rough", "ground_height": 3.0, "ground_at": 45.0},
     "load": {"load": 1.0},
 }
 """Conditions that are met by all starts; the ground begins where even slow walks come to it with all legs."""
