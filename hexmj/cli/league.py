@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, hiding
+from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import new_table
@@ -57,6 +57,7 @@ class League(StudyCommand):
     """Leave the film out."""
     out: Path = Path("results/league")
     """Folder for tables, figure, film, NetCDF, manifest and finished walks."""
+    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: Walks(seed=study.FRESH))
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     controlled: OmitArgPrefixes[Controlled] = field(
         default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])

@@ -30,6 +30,9 @@ FINAL = 0.9
 PAPER = 0.05
 """What a time unit costs on paper, where one in physics costs 1."""
 
+FRESH = 17
+"""A seed on which no set of ours was searched."""
+
 REGIMES = 50
 """Starts whose limit regime is looked at, at most."""
 
@@ -54,7 +57,7 @@ class League:
     """Whether walks on paper accelerate to V_r = 0.9, too, which takes as long as everything else on paper."""
     window: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
-    seed: int = 0
+    seed: int = FRESH
     """Of the starts."""
     conditions: Conditions = field(default_factory=Conditions)
     """Of physical walks."""
