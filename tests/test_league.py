@@ -23,7 +23,8 @@ from hexmj.physics.settling import settle
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import EVERYONE, entrants
 from hexmj.studies.league.figure import league_figure
-from hexmj.studies.league.ranks import difference, ranks
+from hexmj.studies.league.frequencies import difference
+from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
 from hexmj.studies.league.trials import DISTURBED, TRIALS, walking
@@ -55,7 +56,17 @@ class Still:
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(takes_part, (0.3, 0.6), n_starts=12, n_physical=2, n_tried=2, window=40.0, accelerating=False, seed=0)
+    return League(
+        takes_part,
+        (0.3, 0.6),
+        n_starts=12,
+        n_physical=2,
+        n_tried=2,
+        window=40.0,
+        accelerating=False,
+        periods=12,
+        seed=0,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,8 @@ COMMANDS = {
     f" insects.{AGAIN.format('run')}",
     "league": "Controllers from the literature and your own, judged by the same starts on paper, in physics and in"
     f" trials: tables, figure, film.{AGAIN.format('run')}",
+    "ablate": "What each mechanism of the network or rule of Walknet buys: the same starts without it, on paper, in the"
+    f" limit and in physics.{AGAIN.format('run')}",
     "rerun": "Makes a result again from its manifest: is every number equal to the last bit?  If not, exit code 1 and"
     " a sentence on what else is not as it was.",
     "check-controller": "Does a controller keep the protocol?  A check that fails says in a sentence what is wrong;"

@@ -14,9 +14,6 @@ from hexmj.timing import Acceleration, Stride, observation_time
 if TYPE_CHECKING:
     import xarray as xr
 
-PERIODS = 40
-"""Cycles that every leg has time for until its regime is looked at."""
-
 
 def losses(
     entrant: Entrant,
@@ -69,9 +66,16 @@ def losses_over_range(
 
 
 def regimes(
-    entrant: Entrant, velocity: float, *, n_starts: int, seed: int, stride: Stride, threads: int | None = None
+    entrant: Entrant,
+    velocity: float,
+    *,
+    n_starts: int,
+    periods: int,
+    seed: int,
+    stride: Stride,
+    threads: int | None = None,
 ) -> "xr.Dataset":
-    """The limit regime of each start, over start.
+    """The limit regime of each start, over start; arguments as of `gaits.limit_gait`.
 
     Returns:
         `reached`, from when on it lasts [time units], inf where there is none; whether it is `stable`; and, NaN where
@@ -80,7 +84,7 @@ def regimes(
     """
     import xarray as xr
 
-    how = {"seed": seed, "stride": stride, "periods": PERIODS, "threads": threads}
+    how = {"seed": seed, "stride": stride, "periods": periods, "threads": threads}
     gait = limit_gait(entrant.controller, velocity, n_starts=n_starts, **how)
     columns = {
         "reached": (gait.reached, "time unit"),

@@ -2,21 +2,7 @@
 
 import numpy as np
 
-from hexmj.intervals import WILSON_Z
-
-
-def difference(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
-    """Mean difference of what happened to the same starts, each (start,) from 0 to 1, and its 95 % interval.
-
-    As `intervals.paired_difference`, also for frequencies over several velocities; starts that are NaN are left out.
-    """
-    apart = (one - other)[np.isfinite(one - other)]
-    size = len(apart)
-    if size < 2:
-        return np.nan, np.nan, np.nan
-    middle = apart.sum() / (size + 2)
-    half = WILSON_Z * np.sqrt((apart @ apart + 1) / (size + 2) - middle**2) / np.sqrt(size + 2)
-    return apart.mean(), max(middle - half, -1.0), min(middle + half, 1.0)
+from hexmj.studies.league.frequencies import difference
 
 
 def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

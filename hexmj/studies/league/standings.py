@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.gaits import circular_mean
-from hexmj.intervals import wilson_intervals
-from hexmj.studies.league.ranks import difference, ranks
+from hexmj.studies.league.frequencies import differences, frequencies, padded
+from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
 
 if TYPE_CHECKING:
@@ -54,13 +54,14 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     reference = names.index(REFERENCE) if REFERENCE in names else 0
     table: dict[str, Any] = {}
     for measure, values in happened.items():
-        table |= _frequencies(measure, values, OVER_VELOCITY) | _above(measure, values, values[reference])
+        table |= frequencies(measure, values, OVER_VELOCITY)
+        table |= differences(f"{measure}_above", values, values[reference], OVER_VELOCITY)
     for asked in ("range", "accelerated"):
-        table |= _frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
+        table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
     over_trials = "entrant", "trial"
     tried, lamed = ([[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "paper, "))
-    table |= _frequencies("fell", _each(tried, _fell), over_trials)
-    table |= _frequencies("lost", _each(lamed, _lost), over_trials)
+    table |= frequencies("fell", _each(tried, _fell), over_trials)
+    table |= frequencies("lost", _each(lamed, _lost), over_trials)
     best, worst = np.array([ranks(values.mean(axis=1)) for values in happened.values()]).transpose(1, 2, 0)
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
     table |= {name: _over(walked, find) for name, find in COSTS.items()}
@@ -115,25 +116,5 @@ def _over(rows: Rows, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, .
 
 
 def _each(rows: Rows, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
-    """What happened to each start of each cell, (row, column, start), 0 or 1; NaN beyond its starts."""
-    found = [[np.empty(0) if one is None else np.asarray(find(one), dtype=float) for one in row] for row in rows]
-    whole = np.full((len(found), len(found[0]), max(len(one) for row in found for one in row)), np.nan)
-    for i, row in enumerate(found):
-        for j, one in enumerate(row):
-            whole[i, j, : len(one)] = one
-    return whole
-
-
-def _frequencies(name: str, values: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
-    """How often it happened, with the 95 % Wilson interval, and of how many starts."""
-    known = np.isfinite(values).sum(axis=-1)
-    count = np.nansum(values, axis=-1)
-    with np.errstate(invalid="ignore"):
-        columns = dict(zip(("", "_low", "_high"), (count / known, *wilson_intervals(count, known)), strict=True))
-    return {name + end: (dims, column, {"units": "1"}) for end, column in (columns | {"_starts": known}).items()}
-
-
-def _above(measure: str, values: np.ndarray, reference: np.ndarray) -> dict[str, Any]:
-    """How much more often it happened than to the reference on the same starts, with its interval."""
-    ends = np.array([[difference(*pair) for pair in zip(row, reference, strict=True)] for row in values])
-    return {f"{measure}_above{end}": (OVER_VELOCITY, ends[..., i]) for i, end in enumerate(("", "_low", "_high"))}
+    """What happened to each start of each cell, (row, column, start); NaN where there is no cell."""
+    return padded([[[] if one is None else find(one) for one in row] for row in rows])

@@ -33,6 +33,9 @@ PAPER = 0.05
 FRESH = 17
 """A seed on which no set of ours was searched."""
 
+PERIODS = 40
+"""Cycles until a limit regime is looked at."""
+
 REGIMES = 50
 """Starts whose limit regime is looked at, at most."""
 
@@ -57,6 +60,8 @@ class League:
     """Whether walks on paper accelerate to V_r = 0.9, too, which takes as long as everything else on paper."""
     window: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
+    periods: int = PERIODS
+    """Cycles that every leg has time for until its limit regime is looked at."""
     seed: int = FRESH
     """Of the starts."""
     conditions: Conditions = field(default_factory=Conditions)
@@ -94,7 +99,17 @@ class League:
         """All that the table, the figures and the ranks are made of; see `standings.standings`."""
         from hexmj.studies.league.standings import standings
 
-        told = ("velocities", "n_starts", "n_physical", "n_tried", "tried_at", "window", "seed", "accelerating")
+        told = (
+            "velocities",
+            "n_starts",
+            "n_physical",
+            "n_tried",
+            "tried_at",
+            "window",
+            "periods",
+            "seed",
+            "accelerating",
+        )
         settings = {name: plain(getattr(self, name)) for name in told}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
         settings["controllers"] = {name: plain(entrant) for name, entrant in self.entrants.items()}
@@ -122,7 +137,8 @@ class League:
 
     def _random(self, entrant: Entrant) -> dict[str, Cell]:
         """What random starts alone are asked."""
-        few, window = {"n_starts": min(self.n_starts, REGIMES)}, {"window": self.window}
+        window = {"window": self.window}
+        few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
         found = {
             f"regime {v:g}": self._cell(
                 f"regime-V-{v:g}", paper.regimes, 20 * time * PAPER, entrant, few | {"velocity": v}

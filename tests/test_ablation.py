@@ -1,0 +1,80 @@
+"""Ablation: controllers without one of their parts."""
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.cruse1998.weights import general
+from hexmj.errors import InputError
+from hexmj.measures.kinematic import first_loss
+from hexmj.studies.ablation.figure import ablation_figure
+from hexmj.studies.ablation.study import Ablation, switched
+from hexmj.sweeps import conduct
+
+
+def test_what_can_be_switched_is_what_makes_a_difference() -> None:
+    assert list(switched("ldvs")) == [
+        "ldvs",
+        *(f"ldvs-{how}" for how in ("without-1", "without-3", "without-4", "with-2")),
+    ]
+    assert list(switched("walknet")) == ["walknet", *(f"walknet-without-{rule}" for rule in (1, 2, 3))]
+    assert "walknet-load-without-5" in switched("walknet-load")
+    with pytest.raises(InputError, match="graham has no mechanisms"):
+        switched("graham")
+
+
+@pytest.mark.parametrize("name", ["ldvs", "own-0.3"])
+def test_a_mechanism_that_is_switched_off_has_no_weights_and_the_others_keep_theirs(name: str) -> None:
+    whole = general(hexmj.PRESETS[name].weights)
+    for varied, controller in switched(name).items():
+        assert isinstance(controller, hexmj.Cruse1998)
+        how, _, which = varied.removeprefix(f"{name}-").rpartition("-")
+        for kind in ("p1", "p2", "p31", "p32", "p33", "p34", "p4"):
+            now, before = getattr(general(controller.weights), kind), getattr(whole, kind)
+            if how == "without" and kind[1] == which:
+                assert not now.any()
+            elif not (how == "with" and kind[1] == which):
+                assert np.array_equal(now, before)
+
+
+def test_without_all_mechanisms_the_network_is_uncoordinated() -> None:
+    nothing = hexmj.LDVS.without(1).without(3).without(4)
+    starts = hexmj.draw_starts(50, 0)
+    one, other = (first_loss(starts, controller, 0.3, 100.0) for controller in (nothing, hexmj.UNCOORDINATED))
+    assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("ldvs-without-2", "ldvs-without-2 is ldvs: expected a mechanism that makes a difference"),
+        ("ldvs-without-7", "mechanism = 7; expected one of 1, 2, 3, 4"),
+        ("ldvs-with-3", "ldvs with mechanism 3; expected 2 or 4"),
+        ("walknet-without-5", "walknet without rule 5; expected one of 1, 2, 3"),
+        ("graham-without-1", "graham has no mechanisms or rules that can be switched"),
+        ("nobody-without-1", "'nobody' is neither one of"),
+    ],
+)
+def test_what_cannot_be_switched_is_refused_in_a_sentence(name: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        hexmj.load_controller(name)
+
+
+def test_without_a_part_is_a_controller_like_any_other() -> None:
+    check_controller(hexmj.load_controller("walknet-without-2"))
+
+
+def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
+    study = Ablation({"walknet": switched("walknet")}, (0.5,), n_starts=20, n_physical=2, periods=12)
+    result = conduct(study)
+    assert not result.more.sel(controller="walknet").any()
+    starts = hexmj.draw_starts(20, study.seed)
+    lost = [
+        np.isfinite(first_loss(starts, hexmj.load_controller(name), 0.5, 40.0)).mean()
+        for name in ("walknet-without-1", "walknet")
+    ]
+    one = result.sel(controller="walknet-without-1", measure="start", velocity=0.5)
+    assert one.frequency == lost[0] and np.isclose(one.more, lost[0] - lost[1])
+    assert one.more_low < one.more < one.more_high
+    assert len(ablation_figure(result).axes) == 4
