@@ -428,7 +428,7 @@ def test_a_finished_search_is_reported_without_an_evaluation(tmp_path, monkeypat
     def never(*_: object) -> None:
         raise AssertionError("walked again")
 
-    monkeypatch.setattr(Sample, "_losses", never)
+    monkeypatch.setattr(Sample, "_times", never)
     again = search(PROBLEM, EFFORT, folder=tmp_path)
     assert again.history.identical(whole.history)
     assert again.replayed > 0
