@@ -135,7 +135,8 @@ class Problem:
 
     def settings(self) -> dict[str, Any]:
         """The problem as plain data."""
-        told = {name: plain(getattr(self, name)) for name in ("form", "low", "high", "window", "feedback", "over", "ties")}
+        names = "form", "low", "high", "window", "feedback", "over", "ties"
+        told = {name: plain(getattr(self, name)) for name in names}
         told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
         return told | {"conditions": self.conditions and self.conditions.settings()}
 
