@@ -11,6 +11,7 @@ from hexmj.cli.main import options_of
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.files import read_toml
+from hexmj.gaits import gait
 from hexmj.search.problems import Sample
 from hexmj.timing import Stride
 
@@ -66,6 +67,15 @@ def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     assert problem.controller(problem.form.vector(EVOLVED)) == EVOLVED
     few = found["fresh_few"]
     verdict = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED, "alone": Evolved()})
-    fell = dict(zip(verdict.controller.values.tolist(), verdict.flss.sel(window="walk").values.tolist(), strict=True))
-    assert fell["evolved"] == pytest.approx(few["flss"], abs=1.5 / few["starts"])
-    assert fell["evolved"] < 0.5 < fell["alone"]
+    falls, alone = few["starts"] * verdict.flss.sel(window=problem.window).values
+    assert falls == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
+    assert falls < few["starts"] / 3 < few["starts"] * 0.9 <= alone
+
+
+def test_it_walks_a_tripod_with_short_steps():
+    """Nobody told it; at V = 0.5 its period is less than two thirds of a single leg's."""
+    found = gait(hexmj.walk(hexmj.draw_starts(10, 1), EVOLVED, 0.5, 20 * Stride().periods(0.5)))
+    assert found.periodic.all()
+    assert np.allclose(found.phase, 0.5, atol=0.03)
+    assert np.allclose(found.duty_factor, 1 / (1 + 0.5), atol=0.01)
+    assert (found.period < 0.65 * Stride().periods(0.5)).all()
