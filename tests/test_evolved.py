@@ -76,6 +76,6 @@ def test_it_walks_a_tripod_with_short_steps():
     """Nobody told it; at V = 0.5 its period is less than two thirds of a single leg's."""
     found = gait(hexmj.walk(hexmj.draw_starts(10, 1), EVOLVED, 0.5, 20 * Stride().periods(0.5)))
     assert found.periodic.all()
-    assert np.allclose(found.phase, 0.5, atol=0.03)
+    assert np.allclose(found.phase, 0.5, atol=0.05)
     assert np.allclose(found.duty_factor, 1 / (1 + 0.5), atol=0.01)
     assert (found.period < 0.65 * Stride().periods(0.5)).all()

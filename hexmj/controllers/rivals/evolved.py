@@ -7,12 +7,13 @@ Each leg has a continuous-time neuron, whose potential is y_i and whose output i
 When its output rises through 1/2, it lifts the leg.  As there, neurons are joined to those of neighbouring legs, sense
 the position of their own leg, and have the same constants in every leg; an evolutionary search chooses the constants by
 walks from random starts.  Otherwise than there, a leg has one neuron and not five, since how it swings is given; the
-weights along the body have a direction; and the neuron is told V_r, for one network shall walk at every velocity.
+weights along the body have a direction; and the neuron is told V_r, for one network shall walk at every velocity.  We
+know their network from the paper of 1998 and from code by others, not from its own paper.
 
 How it maps: a leg's position is 0 at AEP_0 and 1 at PEP_0.  Sensed: that of the own leg, and V_r.  Fitted by us: all
 eight constants, on falls of our insect at V = 0.3 to 0.7 (`evolved.toml`, with the command), from legs that step by
-themselves.  What came out is a tripod with steps of 12 mm instead of 20 (V = 0.5), which in physics falls less often
-than LDVS does, and on paper loses stability more often than that up to V = 0.3.
+themselves.  What came out is a tripod with steps of 12 mm instead of 20 (at V = 0.5).  At these velocities it falls
+less often than LDVS; on paper it loses stability more often than LDVS up to V = 0.3.
 """
 
 from dataclasses import dataclass
