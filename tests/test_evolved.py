@@ -66,10 +66,8 @@ def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     problem = options_of(shlex.split(found["command"])[1:])._problem()
     assert problem.controller(problem.form.vector(EVOLVED)) == EVOLVED
     few = found["fresh_few"]
-    verdict = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED, "alone": Evolved()})
-    falls, alone = few["starts"] * verdict.flss.sel(window=problem.window).values
-    assert falls == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
-    assert falls < few["starts"] / 3 < few["starts"] * 0.9 <= alone
+    (flss,) = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED}).flss.sel(window=problem.window)
+    assert flss * few["starts"] == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
 
 
 def test_it_walks_a_tripod_with_short_steps():
