@@ -56,17 +56,8 @@ class Still:
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(
-        takes_part,
-        (0.3, 0.6),
-        n_starts=12,
-        n_physical=2,
-        n_tried=2,
-        window=40.0,
-        accelerating=False,
-        periods=12,
-        seed=0,
-    )
+    sizes = {"n_starts": 12, "n_physical": 2, "n_tried": 2, "periods": 12}
+    return League(takes_part, (0.3, 0.6), **sizes, window=40.0, accelerating=False, seed=0)
 
 
 @pytest.fixture(scope="module")

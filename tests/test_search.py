@@ -287,6 +287,20 @@ class Picky(Pace):
             raise ValueError(f"good = {self.good} is out of the range that I allow")
 
 
+def test_ties_are_broken_by_later_losses_and_nothing_else_is():
+    """Of equal counts the one with later losses costs less; a count more costs more, whenever it is lost."""
+    form, n = FieldsForm(Pace()), 30
+    plain, later = (Sample(Problem(form, 0.4, 0.4, 20.0, ties=ties), n, 0) for ties in ("equal", "later"))
+    vectors = np.array([[good, 0.0] for good in np.linspace(0.0, 6.0, 13)])
+    times = [hexmj.first_loss(plain.starts, Pace(*one), 0.4, 20.0) for one in vectors.tolist()]
+    part = np.array([np.mean(1 - np.minimum(one, 20.0) / 20.0) for one in times])
+    flss, costs = plain.costs(vectors), later.costs(vectors)
+    np.testing.assert_allclose(costs, (n * flss + part) / (n + 1), rtol=1e-6)
+    assert len(set(flss)) > 3
+    assert ((costs >= 0) & (costs <= 1)).all()
+    assert (costs[np.lexsort((part, flss))] == np.sort(costs)).all()
+
+
 def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
     problem = Problem(FieldsForm(Picky()), 0.4, 0.4, window=5.0)
     found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
@@ -428,7 +442,7 @@ def test_a_finished_search_is_reported_without_an_evaluation(tmp_path, monkeypat
     def never(*_: object) -> None:
         raise AssertionError("walked again")
 
-    monkeypatch.setattr(Sample, "_losses", never)
+    monkeypatch.setattr(Sample, "_times", never)
     again = search(PROBLEM, EFFORT, folder=tmp_path)
     assert again.history.identical(whole.history)
     assert again.replayed > 0

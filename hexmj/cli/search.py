@@ -51,6 +51,8 @@ class Search(WalkingCommand):
     over: Literal["usual", "mean", "worst"] = "usual"
     """Minimise the FLSS as given (usual), or its mean or worst over variants of constants and rules that the paper does
     not print (`hexmj variants`)."""
+    ties: Literal["equal", "later"] = "equal"
+    """Of candidates that lose equally many starts none is better (equal), or that which loses them later."""
     algorithm: Literal["evolution", "cmaes"] = "evolution"
     """The paper's evolutionary algorithm, or CMA-ES."""
     population: int = 10
@@ -132,9 +134,8 @@ class Search(WalkingCommand):
 
         how = {name: value for name, value in self.walked.items() if name != "seed"}
         conditions = self.conditions if self.physical else None
-        return Problem(
-            self._form(), *self._range, **how, conditions=conditions, feedback=self.controlled.feedback, over=self.over
-        )
+        chosen = {"feedback": self.controlled.feedback, "over": self.over, "ties": self.ties}
+        return Problem(self._form(), *self._range, **how, conditions=conditions, **chosen)
 
     @property
     def _as_begun(self) -> Controlled:

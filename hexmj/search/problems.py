@@ -41,6 +41,9 @@ REFUSED = 1.0
 Over = Literal["usual", "mean", "worst"]
 """What is minimised: the FLSS as given, or the mean or the greatest FLSS over all variants."""
 
+Ties = Literal["equal", "later"]
+"""Of candidates that lose equally many starts none is better, or that which loses them later."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -64,6 +67,8 @@ class Problem:
     """Candidates read the legs, see `ReadsLegs`, in physical walks."""
     over: Over = "usual"
     """Constants and rules under which a candidate walks, each time from the same starts."""
+    ties: Ties = "equal"
+    """What counts among candidates of the same FLSS; 'later' shows a way where all starts lose stability."""
 
     def __post_init__(self) -> None:
         check_types(self)
@@ -130,7 +135,8 @@ class Problem:
 
     def settings(self) -> dict[str, Any]:
         """The problem as plain data."""
-        told = {name: plain(getattr(self, name)) for name in ("form", "low", "high", "window", "feedback", "over")}
+        names = "form", "low", "high", "window", "feedback", "over", "ties"
+        told = {name: plain(getattr(self, name)) for name in names}
         told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
         return told | {"conditions": self.conditions and self.conditions.settings()}
 
@@ -187,7 +193,7 @@ class Sample:
         return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
 
     def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
-        """FLSS of each candidate, (candidate,), as given."""
+        """G of each candidate, (candidate,), of this one variant."""
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
             try:
@@ -199,7 +205,7 @@ class Sample:
                     f"{self.problem.form!r:.80} makes no controller of {vector}: {error!r:.200}"
                 ) from error
             try:
-                return self._losses(candidate, [self.problem.window], threads)[0] / self.n_starts
+                return self._cost(candidate, threads)
             except OutOfReach:
                 return REFUSED
 
@@ -209,6 +215,14 @@ class Sample:
         with ThreadPoolExecutor(thread_count(threads)) as pool:
             return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
 
+    def _cost(self, candidate: Controller, threads: int | None) -> float:
+        """FLSS; where ties are broken, with one start more that counts for the part of the time lost on average."""
+        times, (ends,) = self._times(candidate, [self.problem.window], threads)
+        lost = (times <= ends).sum().item()
+        if self.problem.ties == "equal":
+            return lost / self.n_starts
+        return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
+
     def check_reach(self, vector: np.ndarray, threads: int | None = None) -> None:
         """Refuse a candidate, (parameter,), whose tips no leg reaches in physics.
 
@@ -217,7 +231,7 @@ class Sample:
         """
         for one in self.variants.values():
             if one.problem.conditions:
-                one._losses(one.problem.controller(vector), [one.problem.window], threads)
+                one._times(one.problem.controller(vector), [one.problem.window], threads)
 
     def verdict(self, controllers: Mapping[str, Controller], threads: int | None = None) -> "xr.Dataset":
         """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
@@ -244,6 +258,14 @@ class Sample:
 
     def _losses(self, controller: Controller, windows: list[str | float], threads: int | None) -> np.ndarray:
         """Number of starts that lose stability, or fall, within each window, (window,)."""
+        times, ends = self._times(controller, windows, threads)
+        return (times <= ends).sum(axis=1)
+
+    def _times(
+        self, controller: Controller, windows: list[str | float], threads: int | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """When each start loses stability, or falls, (start,), and the ends of its windows, (window, start), both
+        [time units]; an end is a millionth of a step late, so that what happens in its step is within."""
         p, dt = self.problem, self.problem.stride.dt
         times = [observation_time(window, self.velocity, p.stride, p.acceleration) for window in windows]
         ends = np.array([steps_within(time, p.stride) for time in times]) * dt
@@ -255,7 +277,7 @@ class Sample:
                 self.starts, controller, self.velocity, longest,
                 stride=p.stride, acceleration=p.acceleration, threads=threads,
             )  # fmt: skip
-        return (lost <= ends + 1e-6 * dt).sum(axis=1)
+        return lost, ends + 1e-6 * dt
 
     def _falls(self, controller: Controller, time: float, conditions: Conditions, threads: int | None) -> np.ndarray:
         """When each start falls in a physical walk, (start,) [time units]; the starts settle once for all walks."""

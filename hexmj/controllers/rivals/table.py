@@ -1,6 +1,7 @@
 """All rivals by name."""
 
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.rivals.evolved import EVOLVED
 from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
 from hexmj.controllers.rivals.righetti import Righetti
@@ -22,6 +23,7 @@ RIVALS: dict[str, Controller] = {
         Scores(),
         Righetti(),
         Tegotae(),
+        EVOLVED,
     )
 }
 """By the names under which they are found."""
