@@ -15,7 +15,7 @@ from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.frequencies import differences, frequencies, padded
+from hexmj.studies.league.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.study import FRESH, PERIODS, REGIMES
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
@@ -139,7 +139,7 @@ class Ablation:
 
 
 def _happened(one: "xr.Dataset") -> np.ndarray:
-    """What a cell counts, (start,), 0 or 1."""
+    """What a cell counts, (start,), 0 or 1; NaN where a walk was refused."""
     if "lost" in one:
         return one.lost.values.astype(float)
-    return np.isfinite(one.fall.values).astype(float) if "fall" in one else 1.0 - one.stable.values
+    return came(one.fall).values if "fall" in one else 1.0 - one.stable.values

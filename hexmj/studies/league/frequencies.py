@@ -1,11 +1,19 @@
 """How often something happened to starts, and how much more often than to others of the same starts."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.intervals import WILSON_Z, wilson_intervals
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def came(time: "xr.DataArray") -> "xr.DataArray":
+    """Whether a time came, 1 or 0; NaN where the walk was refused."""
+    return np.isfinite(time).where(time.notnull())
 
 
 def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:

@@ -1,13 +1,15 @@
 """What the league asks of a body: falls, what a walk costs, and how walks go on that meet something."""
 
+from contextlib import suppress
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller
+from hexmj.errors import OutOfReach, SimulationError
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.outcome_table import UNITS
 from hexmj.physics.drive import drive
@@ -22,6 +24,9 @@ from hexmj.timing import Stride, observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
+
+REFUSALS = OutOfReach, SimulationError
+"""Why a walk is no outcome."""
 
 
 def walks(
@@ -51,12 +56,47 @@ def walks(
 
     Returns:
         Over start all `Outcomes`; of the joints the `work` over the insect's weight [mm] and the greatest `torque` over
-        its limit, see `EffortSoFar`; and the `way` walked ahead [mm].
+        its limit, see `EffortSoFar`; and the `way` walked ahead [mm].  A start whose walk is refused, since it diverged
+        or its tips are out of reach, is NaN throughout and no outcome.
+
+    Raises:
+        OutOfReach, SimulationError: every walk is refused.
     """
     import xarray as xr
 
     starts = entrant.starts(n_starts, seed, velocity, stride)
-    duration = float(observation_time(window, velocity, stride))
+    how: Any = {"conditions": conditions, "stride": stride, "threads": threads}
+    walked = controller, velocity, float(observation_time(window, velocity, stride))
+    try:
+        return _outcomes(starts, *walked, **how)
+    except REFUSALS:
+        alone = [_unless_refused(start[None], *walked, **how) for start in starts]
+    if not (known := [one for one in alone if one is not None]):
+        raise
+    nothing = xr.full_like(known[0], np.nan, dtype=float)
+    return xr.concat([nothing if one is None else one for one in alone], "start")
+
+
+def _unless_refused(start: np.ndarray, *walked: Any, **how: Any) -> "xr.Dataset | None":
+    """The outcome of one start, (1, leg); None where its walk is refused."""
+    with suppress(*REFUSALS):
+        return _outcomes(start, *walked, **how)
+    return None
+
+
+def _outcomes(
+    starts: np.ndarray,
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    *,
+    conditions: Conditions,
+    stride: Stride,
+    threads: int | None,
+) -> "xr.Dataset":
+    """Of all starts, (start, leg); see `walks`."""
+    import xarray as xr
+
     settled = settle(starts, conditions, stride, threads)
     lost = first_loss(starts, controller, velocity, duration, stride=stride, threads=threads)
     so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.gaits import circular_mean
-from hexmj.studies.league.frequencies import differences, frequencies, padded
+from hexmj.studies.league.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
 
@@ -48,8 +48,8 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     )
     happened = {
         "kinematic": _each(on_paper, lambda one: one.lost),
-        "measured": _each(walked, lambda one: np.isfinite(one.measured_loss)),
-        "physical": _each(walked, lambda one: np.isfinite(one.fall)),
+        "measured": _each(walked, lambda one: came(one.measured_loss)),
+        "physical": _each(walked, lambda one: came(one.fall)),
     }
     reference = names.index(REFERENCE) if REFERENCE in names else 0
     table: dict[str, Any] = {}
@@ -77,7 +77,7 @@ def _lost(one: "xr.Dataset") -> "xr.DataArray":
 
 def _fell(one: "xr.Dataset") -> "xr.DataArray":
     """Of a disturbance, or of walks from the start on."""
-    return one.fell if "fell" in one else np.isfinite(one.fall)
+    return one.fell if "fell" in one else came(one.fall)
 
 
 def _upright(one: "xr.Dataset") -> "xr.Dataset":
