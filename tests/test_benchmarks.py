@@ -75,7 +75,8 @@ def test_a_small_bench_prints_its_table(tmp_path):
     assert re.search(r"does \d{3} arithmetic operations for each start and step, [248] at a time", text)
 
 
-def test_solver_settings_of_a_few_starts(tmp_path, capsys):
+def test_solver_settings_of_a_few_starts(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(solver_settings, "ROUNDS", 1)
     solver_settings.main(str(tmp_path), "4")
     results = json.loads((tmp_path / "solver_settings.json").read_text(encoding="utf-8"))
     assert results["pairs searched for"]["flss"] == results["as shipped"]["flss"]

@@ -374,5 +374,6 @@ def test_comparison_holds_every_answer():
 def test_halving_the_physics_step_hardly_changes_physical_flss(hundred):
     """Measured with 200 starts at V = 0.3, 0.5, 0.7: 0.155, 0.365, 0.690 became 0.160, 0.365, 0.695."""
     assert Conditions().numerics.longest_substep == 0.625
-    fine = physical_flss(LDVS, [0.5], n_starts=100, conditions=Conditions.of(longest_substep=0.3125))
-    assert abs(hundred.physical.item() - fine.flss.item()) <= 0.02
+    fine = physical_flss(LDVS, [0.5], n_starts=50, conditions=Conditions.of(longest_substep=0.3125))
+    usual = np.isfinite(hundred.fall.values.squeeze()[:50]).mean()
+    assert abs(usual - fine.flss.item()) <= 0.02

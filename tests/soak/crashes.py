@@ -70,9 +70,10 @@ class Nursery:
             assert (whole.code, whole.told.strip()) == (0, ""), whole.told
         return self._unbroken[job]
 
-    def points(self, job: str) -> int:
-        """How many calls of a job's unbroken life may go wrong."""
-        return int(Path(f"{self.unbroken(job).log}.calls").read_text())
+    def points(self, job: str, kind: str) -> list[int]:
+        """Which calls of a job's unbroken life may go wrong in this way: all, but only a write can be short."""
+        told = json.loads(Path(f"{self.unbroken(job).log}.calls").read_text())
+        return told["writes"] if kind == "short" else [*range(told["calls"])]
 
     def broken(self, job: str, *ends: dict[str, Any]) -> list[str]:
         """What is amiss where a job ends in these ways, one after the other, and then comes to its end.

@@ -5,7 +5,7 @@ import io
 import os
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ class Disk:
     again: bool = False
     """It stays so: all later ones are spoilt too."""
     calls: int = 0
+    writes: list[int] = field(default_factory=list)
+    """Which of the calls were writes; only these can be short."""
 
     def install(self) -> None:
         """Take the place of the calls by which files are written: mkdir, opening, write, fsync, replace."""
@@ -82,6 +84,7 @@ class Disk:
 
     def write(self, usual: Callable[[bytes], int], content: bytes) -> int:
         """One that may do half."""
+        self.writes.append(self.calls)
         if not self._spoils():
             return usual(content)
         self._refuse("EIO", "ENOSPC", "EROFS")

@@ -29,7 +29,7 @@ def live(job: str, folder: str, log: str, fault: dict[str, Any] | None) -> int:
     disk.install()
     try:
         JOBS[job].work(Path(folder))
-        Path(f"{log}.calls").write_text(str(disk.calls))
+        Path(f"{log}.calls").write_text(json.dumps({"calls": disk.calls, "writes": disk.writes}))
     except InputError as error:
         print(f"hexmj: {error}", file=sys.stderr)
         return 2
