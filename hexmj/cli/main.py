@@ -20,6 +20,7 @@ from hexmj.cli.words import checked, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
+from hexmj.signals import of_stop
 
 NUMBA = (
     "numba cannot find or keep compiled code; delete its files (*.nbi, *.nbc, beside the modules or in"
@@ -82,6 +83,10 @@ def main() -> None:
             options = options_of(words := checked(sys.argv[1:]))
             with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
+        except BaseException as error:
+            if of_stop(error):
+                raise KeyboardInterrupt from None
+            raise
         finally:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()

@@ -25,7 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.signals import unheard_by_children
+from hexmj.signals import of_stop, unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -182,10 +182,11 @@ class Sweepers:
                     for _ in range(self.processes):
                         executor.submit(os.getpid)  # begins one
                 yield executor
-            except KeyboardInterrupt:  # nobody waits for cells that are stopped
-                threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
-                for worker in active_children():
-                    worker.terminate()
+            except BaseException as error:
+                if of_stop(error):  # nobody waits for cells that are stopped
+                    threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
+                    for worker in active_children():
+                        worker.terminate()
                 raise
 
 
