@@ -422,6 +422,7 @@ NONSENSE = [
     (["search", "--over", "mean", "--pep0", "-16"], "pep_min = -15.0, pep0 = -16.0"),
     (["variants", "--models", "own-V", "--velocities", "0.15"], "own-0.15"),
     (["variants", "--friction", "0.5"], "--friction without --physical"),
+    (["variants", "--physical", "--contact-gap", "0.01"], "--contact-gap = 0.01 with falls only"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
     (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
