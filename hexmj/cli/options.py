@@ -47,7 +47,7 @@ class Walks:
     window: str = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (40 time units) or a number [time units]."""
     seed: int = 0
-    """Seed of the random starts."""
+    """Seed of the random starts; those of 0 are the ones on which our own presets were searched."""
     stride: OmitArgPrefixes[Stride] = field(default_factory=Stride)
 
     @property
@@ -125,6 +125,20 @@ class Controlled:
 
         given = {"order": self.order, "reading": self.reading and named_reading(self.reading)}
         return {name: value for name, value in given.items() if value is not None}
+
+    def brought(self, name: str) -> str:
+        """Order of updates and reading that a set brings along, where it does not walk as printed; else nothing."""
+        from hexmj.controllers.cruse1998 import Cruse1998
+        from hexmj.controllers.cruse1998.readings import in_words
+        from hexmj.controllers.named import load_controller
+
+        found = load_controller(name)
+        if not isinstance(found, Cruse1998):
+            return ""
+        rules = {"order": found.order, "reading": in_words(found.reading)}
+        return ", ".join(
+            f"{rule} {told}" for rule, told in rules.items() if told != "printed" and rule not in self.rules
+        )
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

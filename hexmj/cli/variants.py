@@ -61,10 +61,14 @@ class Variants(StudyCommand):
             conditions=self.conditions if self.physical else None,
         )
 
+    @property
+    def names(self) -> Sequence[str]:
+        """See `WalkingCommand.names`."""
+        return list(dict.fromkeys(_own(name, v) for name in self.models for v in self.velocities))
+
     def _network(self, name: str, velocity: float) -> Cruse1998:
         """A set, or that of this velocity."""
-        own = f"{name.removesuffix('V')}{velocity:g}" if name.endswith(OF_EACH) else name
-        found = self.controlled.controller(own)
+        found = self.controlled.controller(_own(name, velocity))
         if not isinstance(found, Cruse1998):
             raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
         return found
@@ -90,6 +94,11 @@ class Variants(StudyCommand):
         yield _together(result)
         yield from study.notes(result)
         yield self.conditions_line(self.physical)
+
+
+def _own(name: str, velocity: float) -> str:
+    """A set's name, that of this velocity's where each has its own."""
+    return f"{name.removesuffix('V')}{velocity:g}" if name.endswith(OF_EACH) else name
 
 
 def _table(one: "xr.Dataset") -> "Table":
