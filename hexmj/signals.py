@@ -1,13 +1,44 @@
-"""Ctrl-C reaches every program of a terminal; those that this one starts leave it to this one."""
+"""What stops a program: each is a KeyboardInterrupt, of which code that it falls into may make another exception."""
 
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Timer
+from typing import Any
+
+STOPS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+"""Ctrl-C, a polite end, and a terminal that closes."""
+
+_HEARD: list[int] = []
+
+
+def hear_stops() -> None:
+    """Each of `STOPS` is a KeyboardInterrupt from now on, but for those that are ignored, as under `nohup`."""
+    sys.unraisablehook = _unheard
+    for one in STOPS:
+        if signal.getsignal(one) != signal.SIG_IGN:
+            signal.signal(one, _stop)
+
+
+def ignore_stops() -> None:
+    """None of `STOPS` has any effect from now on."""
+    for one in STOPS:
+        signal.signal(one, signal.SIG_IGN)
+
+
+def of_stop(error: BaseException) -> bool:
+    """Whether an exception comes of a stop: C code, imports and classes that are being made raise others instead."""
+    return bool(_HEARD) or isinstance(error, KeyboardInterrupt)
 
 
 @contextmanager
 def unheard_by_children() -> Iterator[None]:
-    """Programs that are started meanwhile take no Ctrl-C, where the system has such masks; this one does afterwards."""
+    """Programs that are started meanwhile take no Ctrl-C, where the system has such masks; this one does afterwards.
+
+    Ctrl-C reaches every program of a terminal.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -16,3 +47,16 @@ def unheard_by_children() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+
+
+def _stop(number: int, frame: Any) -> None:
+    _HEARD.append(number)
+    raise KeyboardInterrupt
+
+
+def _unheard(ignored: Any) -> None:
+    """A stop that C code swallows, as while numba loads what it has compiled, comes once more."""
+    if _HEARD and ignored.exc_type is KeyboardInterrupt:
+        Timer(0.1, os.kill, (os.getpid(), _HEARD[-1])).start()
+    else:
+        sys.__unraisablehook__(ignored)

@@ -3,9 +3,12 @@
 A set of weights is worth most if its FLSS is low whichever of them the authors used.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import MISSING, fields, replace
 from typing import Any, TypeVar
 
+from hexmj.errors import InputError
 from hexmj.legs import CENTRED
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -30,6 +33,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
 UNREACHED = {"AEP0 11"}
 """Variants that the legs of the stick insect do not reach."""
 
+INNER = ("controller", "reading")
+"""Fields that are varied within: what reads the legs, and how the paper is read."""
+
 Part = TypeVar("Part")
 
 
@@ -41,15 +47,43 @@ def variants(physical: bool = False) -> list[str]:
 def varied(part: Part, variant: str) -> Part:
     """A stride, a network or a form of its weights under one of `VARIANTS`; fields that it lacks stand elsewhere.
 
-    What has the changed value already gets the default instead: a set of the reading 'lasting' is read as printed.
+    What has the changed value already gets the default instead, see `instead`.
+
+    Raises:
+        InputError: no such variant, or its value makes no sense with the part's others.
     """
+    if variant not in VARIANTS:
+        raise InputError(f"variant {variant!r:.80}; valid names: {', '.join(VARIANTS)}")
     own: Any = part
     usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
     wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
     changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
-    for inner in [
-        name for name in ("controller", "reading") if name in usual
-    ]:  # what reads the legs, and how the paper is read
-        changes[inner] = varied(getattr(own, inner), variant)
-    changed: Any = replace(own, **changes) if changes else part
-    return changed
+    inner = {name: varied(getattr(own, name), variant) for name in INNER if name in usual}
+    with naming(variant):
+        return replace(own, **changes | inner)
+
+
+def instead(part: Any, variant: str) -> dict[str, Any]:
+    """Fields of a part that have the value of a variant already, and the defaults that `varied` gives them instead.
+
+    A set of the reading 'lasting' is read as printed under the variant of that name.
+    """
+    changed = varied(part, variant)
+    own = {
+        name: getattr(changed, name)
+        for name, value in VARIANTS[variant].items()
+        if getattr(part, name, MISSING) == value
+    }
+    inner = [instead(getattr(part, name), variant) for name in INNER if hasattr(part, name)]
+    return own | dict(pair for one in inner for pair in one.items())
+
+
+@contextmanager
+def naming(variant: str) -> Iterator[None]:
+    """A sentence on a value that nobody gave names the variant that has it."""
+    try:
+        yield
+    except InputError as error:
+        if variant == "usual":
+            raise
+        raise InputError(f"variant {variant}: {error}") from None

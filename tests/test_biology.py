@@ -21,6 +21,7 @@ from hexmj.studies.biology.names import SEGMENTS, UNITS
 from hexmj.studies.biology.quantities import quantities
 from hexmj.studies.biology.strides import Strides, last_strides, onsets, strides_between
 from hexmj.studies.biology.study import Biology
+from hexmj.studies.biology.table import rows
 from hexmj.sweeps import conduct
 
 WEIGHT = STICK_INSECT.mass * 9810.0
@@ -139,6 +140,13 @@ def test_starts_that_fall_count_nowhere(falling):
     assert row["mean"].item() == pytest.approx(some.mean().item()) or (some.size == 0 and math.isnan(row["mean"]))
 
 
+def test_a_row_without_walks_has_no_number(falling):
+    nothing = falling.copy(deep=True)
+    for name in ("mean", "low", "high"):
+        nothing[name][:] = np.nan
+    assert {ours for _, ours, *_ in rows(nothing)} == {"-"}
+
+
 def test_threads_change_no_bit(falling):
     assert conduct(Biology(UNCOORDINATED, 4, n_starts=5), threads=2).identical(falling)
 
@@ -169,6 +177,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     code, text, _ = run(*words)
     assert code == 0
     table = (tmp_path / "biology.md").read_text()
+    assert "starts that walked: 2 of 2 at" in text
     assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
     assert table.count("\n| ") >= len(ANIMALS)
     assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)

@@ -422,6 +422,7 @@ NONSENSE = [
     (["search", "--over", "mean", "--pep0", "-16"], "pep_min = -15.0, pep0 = -16.0"),
     (["variants", "--models", "own-V", "--velocities", "0.15"], "own-0.15"),
     (["variants", "--friction", "0.5"], "--friction without --physical"),
+    (["variants", "--physical", "--contact-gap", "0.01"], "--contact-gap = 0.01 with falls only"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
     (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
@@ -567,3 +568,37 @@ def test_reproduce_judges_chosen_claims(run, tmp_path):
     assert set(claim["ours"]) == {"walk", "start"}
     assert claim["command"].endswith("--only ldvs-accelerated")
     assert (tmp_path / "claims.md").is_file()
+
+
+SUMS = "from dataclasses import replace\nfrom hexmj import LDVS\nfrom hexmj.controllers.cruse1998 import Reading\n"
+SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--model", "lasting-0.1"], "; lasting-0.1: reading lasting"),
+        (["--model", "sums.py:X"], "; sums.py:X: order sequential, reading cap sum"),
+        (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
+        (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+    ],
+)
+def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    Path("sums.py").write_text(SUMS)
+    short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
+    assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")
+
+
+@pytest.mark.parametrize("words", [["--model", "ldvs"], ["--model", "own-0.1"], ["--model", "own", "--seed", 1998]])
+def test_the_last_line_is_silent_on_what_is_as_printed_and_fresh(run, words):
+    out = run("flss", *words, "--velocities", 0.4, "--starts", 2, "--window", 3)[1]
+    assert "found" not in out
+    assert "reading" not in out
+
+
+def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
+    words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]
+    out = run(*words, "--out", tmp_path)[1].replace("\n", " ").replace("  ", " ")
+    assert "a search found lasting-0.3, lasting-0.5 (others: --seed 1998)" in out
+    assert "; lasting-0.3: reading lasting; lasting-0.5: reading lasting" in out

@@ -77,6 +77,44 @@ def test_while_c_code_calls_back():
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 
+@pytest.mark.parametrize("other", ["SystemError", "RuntimeError", "OSError", "MemoryError", "SystemExit"])
+def test_while_something_makes_another_exception_of_it(tmp_path, other):
+    """As C code that is being called does, and a class that is being made; in a sweep, too, whose workers end."""
+    script = (
+        "import os, sys\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'hexmj.physics.chunks':\n"
+        "            try: os.kill(os.getpid(), 15)\n"
+        f"            except KeyboardInterrupt: raise {other}('of a stop')\n"
+        "from hexmj.__main__ import main\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "main()"
+    )
+    words = ["map", "--velocities", "0.1", "--starts", "2", "--over", "friction", "--values", "1", "--window", "2"]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words, "--out", str(tmp_path)], env=ENVIRONMENT, capture_output=True, timeout=60
+    )
+    said = b"hexmj: stopped; what is finished is kept. Repeat the command to go on\n"
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", said)
+
+
+@pytest.mark.parametrize(("words", "code"), [(["doctor", "--help"], 0), (["flss", "--starts", "0"], 2)])
+def test_after_all_is_said(words, code):
+    """In the interpreter's own end a stop changes nothing: what was said holds."""
+    script = (
+        "import os, signal, sys\n"
+        "class End:\n"
+        "    def __del__(self, kill=os.kill, own=os.getpid()): kill(own, 15)\n"
+        "sys.kept_to_the_end = End()\n"
+        "from hexmj.__main__ import main\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", script, *words], env=ENVIRONMENT, capture_output=True, timeout=60)
+    assert done.returncode == code, done.stderr
+    assert b"stopped" not in done.stderr
+
+
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
 def test_while_a_film_is_written(tmp_path, by, group):
     stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)

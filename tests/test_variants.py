@@ -14,9 +14,9 @@ from hexmj.controllers.cruse1998 import Reading
 from hexmj.legs import CENTRED
 from hexmj.search.problems import Sample
 from hexmj.studies.variants.figure import COLOURS, variants_figure
-from hexmj.studies.variants.study import Variants
+from hexmj.studies.variants.study import Variants, notes
 from hexmj.sweeps import Cell, conduct
-from hexmj.variants import VARIANTS, variants, varied
+from hexmj.variants import VARIANTS, instead, variants, varied
 
 SMALL: dict[str, Any] = {"velocities": (0.5, 0.7), "n_starts": 60, "window": "start", "seed": 4}
 SETS = {"hws": (HWS, HWS), "own-V": (hexmj.PRESETS["own-0.5"], hexmj.PRESETS["own-0.7"])}
@@ -63,6 +63,31 @@ def test_what_has_the_changed_value_already_gets_the_usual_one():
     assert varied(replace(LDVS, order="sequential"), "sequential").order == "printed"
     assert varied(Stride(pep_min=-15.0), "PEP_min -15") == Stride()
     assert varied(Stride(geometry=CENTRED), "centred") == Stride()
+
+
+def test_a_row_says_what_is_walked_where_a_set_has_the_variant_anyway():
+    assert instead(LDVS, "lasting") == instead(Stride(), "dt 0.2") == {}
+    lasting, sums = hexmj.PRESETS["lasting"], replace(LDVS, reading=Reading(ipsilateral="lasting", cap="sum"))
+    assert instead(ReadsLegs(sums), "lasting") == {"ipsilateral": "standing"}
+    few: dict[str, Any] = {"n_starts": 2, "window": 3.0, "stride": Stride(dt=0.05, geometry=CENTRED)}
+    walked = conduct(Variants({"ldvs": (LDVS, LDVS), "own": (LDVS, lasting)}, (0.3, 0.5), **few))
+    told = {
+        (name, variant, v): note
+        for name in ("ldvs", "own")
+        for variant in VARIANTS
+        for v in (0.3, 0.5)
+        if (note := walked.instead.sel(network=name, variant=variant, velocity=v).item())
+    }
+    both = {(name, v) for name in ("ldvs", "own") for v in (0.3, 0.5)}
+    expected = {(name, "centred", v): "geometry = fig1" for name, v in both}
+    expected |= {(name, "dt 0.05", v): "dt = 0.1" for name, v in both}
+    assert told == expected | {("own", "lasting", 0.5): "ipsilateral = standing"}
+    assert notes(walked) == [
+        "* centred is usual for ldvs, own: walked with geometry = fig1 instead",
+        "* dt 0.05 is usual for ldvs, own: walked with dt = 0.1 instead",
+        "* lasting is usual for own: walked with ipsilateral = standing instead",
+    ]
+    assert "lasting is usual for own" in variants_figure(walked).get_supxlabel()
 
 
 def test_a_controller_that_reads_the_legs_is_varied_within():
@@ -145,6 +170,33 @@ def test_what_makes_no_sense_is_refused():
         Variants({"ldvs": (LDVS,)}, (0.1, 0.2))
     with pytest.raises(InputError, match="no network was given"):
         Variants({})
+    with pytest.raises(InputError, match=r"variant PEP0 -11: pep_min = -10.5, pep0 = -11.0"):
+        Variants({"ldvs": (LDVS,)}, (0.1,), stride=Stride(pep_min=-10.5, pep0=-10.0))
+    with pytest.raises(InputError, match=r"variant dt 0.2: .*expected at least one step, 0.2"):
+        Variants({"ldvs": (LDVS,)}, (0.1,), window=0.12)
+    with pytest.raises(InputError, match=r"^.*expected at least one step, 0.1") as plain:
+        Variants({"ldvs": (LDVS,)}, (0.1,), window=0.05)
+    assert "variant" not in str(plain.value)
+    with pytest.raises(InputError, match="variant 'bogus'; valid names: usual, centred"):
+        varied(LDVS, "bogus")
+
+
+@pytest.mark.parametrize("networks", [LDVS, ["ldvs"], [None], "ldvs"], ids=repr)
+def test_a_set_for_each_velocity_is_expected(networks):
+    with pytest.raises(InputError, match=r"networks of l = .*; expected some values, each a Cruse1998"):
+        Variants({"l": networks}, (0.5,))
+
+
+def test_the_command_marks_what_is_walked_otherwise(run, tmp_path):
+    words = ["variants", "--models", "lasting", "ldvs", "--velocities", 0.3, "--starts", 2, "--window", 3]
+    code, out, _ = run(*words, "--out", tmp_path)
+    (row,) = (line.split() for line in out.splitlines() if line.split()[:1] == ["lasting"] and "(" not in line)
+    assert code == 0
+    assert row[1].endswith("*")
+    assert not row[2].endswith("*")
+    assert "* lasting is usual for lasting" in out
+    code, out, _ = run(*words, "--json", "--out", tmp_path)
+    assert json.loads(out)["instead"][0][-1] == ["ipsilateral = standing"]
 
 
 def test_the_command(run, result, tmp_path):

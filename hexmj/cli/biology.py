@@ -71,8 +71,9 @@ class Biology(StudyCommand):
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
         yield table
         walked = result.value.sel(quantity="speed").notnull().sum("start")
-        counts = (f"{n} at {speed:g} mm/s" for n, speed in zip(walked.values, result.speed.values, strict=True))
-        yield f"{self.starts} starts, of which walked {', '.join(counts)}; sources in {self.out / TABLE}"
+        pairs = zip(walked.values, result.speed.values, strict=True)
+        counts = (f"{n} of {self.starts} at {speed:g} mm/s" for n, speed in pairs)
+        yield f"starts that walked: {', '.join(counts)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
 

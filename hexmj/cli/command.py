@@ -1,6 +1,6 @@
 """What commands that walk have in common: the options of the walks, and the line that tells them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,12 +36,23 @@ class WalkingCommand:
             "acceleration": self.accelerating.procedure,
         }
 
+    @property
+    def names(self) -> Sequence[str]:
+        """Of the controllers that walk, as they were asked for."""
+        own = vars(self)
+        return own.get("models", [own["model"]] if "model" in own else [])
+
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
+        from hexmj.controllers.cruse1998.presets import SEARCHED_ON
+
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
+        known = [name for name in self.names if SEARCHED_ON.get(name) == self.walks.seed]
+        line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
         if acceleration := self.accelerating.procedure:
             line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
         line += "".join(f"; {rule} {getattr(self.controlled, rule)}" for rule in self.controlled.rules)
+        line += "".join(f"; {name}: {told}" for name in self.names if (told := self.controlled.brought(name)))
         line += "; feedback" if self.controlled.feedback else ""
         if physical:
             values, usual, ground = self.conditions.flat(), Conditions().flat(), OBEYED[self.conditions.ground.ground]

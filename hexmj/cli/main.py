@@ -20,6 +20,7 @@ from hexmj.cli.words import checked, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
+from hexmj.signals import of_stop
 
 NUMBA = (
     "numba cannot find or keep compiled code; delete its files (*.nbi, *.nbc, beside the modules or in"
@@ -49,7 +50,7 @@ COMMANDS = {
     f" one.{AGAIN.format('run')}",
     "map": f"Physical FLSS over the velocity and one condition, and why starts fall or do not.{AGAIN.format('run')}",
     "variants": "FLSS of sets of weights with one constant or rule changed at a time that the paper leaves open,"
-    f" and its mean and worst.{AGAIN.format('run')}",
+    f" and its mean and worst. A set that has it anyway (*) gets the default instead.{AGAIN.format('run')}",
     "disturb": "Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies"
     f" buy.{AGAIN.format('run')}",
     "biology": "Forces, torques, gait, posture and work of the walking insect beside those of measured"
@@ -86,6 +87,10 @@ def main() -> None:
             options = options_of(words := checked(sys.argv[1:]))
             with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
+        except BaseException as error:
+            if of_stop(error):
+                raise KeyboardInterrupt from None
+            raise
         finally:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()

@@ -25,7 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.signals import unheard_by_children
+from hexmj.signals import of_stop, unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -48,7 +48,7 @@ class Walks:
     window: str = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (40 time units) or a number [time units]."""
     seed: int = 0
-    """Seed of the random starts."""
+    """Seed of the random starts; those of 0 are the ones on which our own presets were searched."""
     stride: OmitArgPrefixes[Stride] = field(default_factory=Stride)
 
     @property
@@ -127,6 +127,20 @@ class Controlled:
         given = {"order": self.order, "reading": self.reading and named_reading(self.reading)}
         return {name: value for name, value in given.items() if value is not None}
 
+    def brought(self, name: str) -> str:
+        """Order of updates and reading that a set brings along, where it does not walk as printed; else nothing."""
+        from hexmj.controllers.cruse1998 import Cruse1998
+        from hexmj.controllers.cruse1998.readings import in_words
+        from hexmj.controllers.named import load_controller
+
+        found = load_controller(name)
+        if not isinstance(found, Cruse1998):
+            return ""
+        rules = {"order": found.order, "reading": in_words(found.reading)}
+        return ", ".join(
+            f"{rule} {told}" for rule, told in rules.items() if told != "printed" and rule not in self.rules
+        )
+
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""
         check_distinct("controllers", names)
@@ -183,10 +197,11 @@ class Sweepers:
                     for _ in range(self.processes):
                         executor.submit(os.getpid)  # begins one
                 yield executor
-            except KeyboardInterrupt:  # nobody waits for cells that are stopped
-                threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
-                for worker in active_children():
-                    worker.terminate()
+            except BaseException as error:
+                if of_stop(error):  # nobody waits for cells that are stopped
+                    threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
+                    for worker in active_children():
+                        worker.terminate()
                 raise
 
 

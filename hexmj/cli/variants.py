@@ -50,18 +50,25 @@ class Variants(StudyCommand):
         if not self.physical:
             self.refuse_physical("without --physical")
         check_distinct("models", self.models)
+        networks = {name: tuple(self._network(name, v) for v in self.velocities) for name in self.models}
+        for several in networks.values():
+            self.refuse_contact_gap(several[0])
         return study.Variants(
-            {name: tuple(self._network(name, v) for v in self.velocities) for name in self.models},
+            networks,
             self.velocities,
             self.starts if self.starts is not None else 50 if self.physical else study.Variants.n_starts,
             **self.walked,
             conditions=self.conditions if self.physical else None,
         )
 
+    @property
+    def names(self) -> Sequence[str]:
+        """See `WalkingCommand.names`."""
+        return list(dict.fromkeys(_own(name, v) for name in self.models for v in self.velocities))
+
     def _network(self, name: str, velocity: float) -> Cruse1998:
         """A set, or that of this velocity."""
-        own = f"{name.removesuffix('V')}{velocity:g}" if name.endswith(OF_EACH) else name
-        found = self.controlled.controller(own)
+        found = self.controlled.controller(_own(name, velocity))
         if not isinstance(found, Cruse1998):
             raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
         return found
@@ -85,14 +92,22 @@ class Variants(StudyCommand):
             yield _table(result.sel(velocity=velocity))
         yield "Over all variants, with 95 % intervals"
         yield _together(result)
+        yield from study.notes(result)
         yield self.conditions_line(self.physical)
 
 
+def _own(name: str, velocity: float) -> str:
+    """A set's name, that of this velocity's where each has its own."""
+    return f"{name.removesuffix('V')}{velocity:g}" if name.endswith(OF_EACH) else name
+
+
 def _table(one: "xr.Dataset") -> "Table":
-    """A row for each variant, a column for each set."""
+    """A row for each variant, a column for each set; an asterisk where a set has the variant anyway."""
     table = new_table("variant", *one.network.values)
     for variant in one.variant.values:
-        table.add_row(variant, *(f"{flss:.4f}" for flss in one.flss.sel(variant=variant).values))
+        row = one.sel(variant=variant)
+        cells = zip(row.flss.values, row.instead, strict=True)
+        table.add_row(variant, *(f"{flss:.4f}{_mark(note)}" for flss, note in cells))
     return table
 
 
@@ -102,7 +117,11 @@ def _together(result: "xr.Dataset") -> "Table":
     for name in result.network.values:
         for velocity in result.velocity.values:
             one = result.sel(network=name, velocity=velocity)
-            table.add_row(
-                name, f"{velocity:g}", interval(one, "mean"), interval(one, "worst"), one.worst_variant.item()
-            )
+            which = one.worst_variant.item()
+            which += _mark(one.instead.sel(variant=which))
+            table.add_row(name, f"{velocity:g}", interval(one, "mean"), interval(one, "worst"), which)
     return table
+
+
+def _mark(note: "xr.DataArray") -> str:
+    return "*" if note.item() else ""

@@ -1,5 +1,6 @@
 """Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
 
+import re
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -93,15 +94,21 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
 
 
 _PAPER = {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS}
+_ENTRIES = read_toml(OWN)
 _OWN = {
     name: read_network({key: one for key, one in entry.items() if key != "command"}, f"{OWN.name} [{name}]", name)
-    for name, entry in read_toml(OWN).items()
+    for name, entry in _ENTRIES.items()
 }
 
 PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in _PAPER.items()} | _OWN
 """The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once;
 `robust-0.1`, good over all `hexmj.variants`; and `lasting-0.1` ... `lasting-0.7` and `lasting`, which were searched
 under that reading and walk by it."""
+
+SEARCHED_ON = {
+    name: int(found[1]) for name, entry in _ENTRIES.items() if (found := re.search(r"--seed (\d+)", entry["command"]))
+}
+"""Sets that a search found, and the seed of the starts on which it did: on these they look better than they are."""
 
 HWS, LDVS, UNCOORDINATED = (PRESETS[name] for name in ("hws", "ldvs", "uncoordinated"))
 """The paper's hard-wired and linearly velocity-dependent systems, and none (Section 5.1)."""

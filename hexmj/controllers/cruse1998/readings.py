@@ -1,6 +1,6 @@
 """Readings of the paper's ambiguous sentences on the network: each a named choice; what is printed is the default."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from hexmj.checks import check_types
@@ -56,3 +56,11 @@ def reading_name(reading: Reading) -> str:
         if one == reading:
             return name
     raise InputError(f"{reading} has no name; named ones: {', '.join(READINGS)}")
+
+
+def in_words(reading: Reading) -> str:
+    """Its name, or where it has none its choices that are not as printed, such as 'cap sum, neutral final'."""
+    if reading in READINGS.values():
+        return reading_name(reading)
+    chosen = [(one.name, getattr(reading, one.name)) for one in fields(Reading)]
+    return ", ".join(f"{name} {choice}" for name, choice in chosen if choice != getattr(Reading, name))

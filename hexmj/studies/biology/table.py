@@ -19,7 +19,7 @@ def rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
         at = f" at {row['at']:g} mm/s" if row["depends"] else ""
         unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
         several = row["low"] < row["high"]  # starts
-        ours = f"{row['mean']:.3g}" + (f" ({row['low']:.3g} to {row['high']:.3g})" if several else "")
+        ours = _range(row["mean"], row["mean"]) + (f" ({row['low']:.3g} to {row['high']:.3g})" if several else "")
         built_in = ", built in" if row["built_in"] else ""
         insects = _range(row["animal_low"], row["animal_high"])
         yield f"{row['name']}{at}{unit}", ours, insects, f"{row['verdict']}{built_in}", row["source"]

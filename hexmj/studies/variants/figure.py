@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.literal import in_figure
 from hexmj.studies.drawing import tidy
+from hexmj.studies.variants.study import notes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,6 +49,7 @@ def variants_figure(result: "xr.Dataset") -> "Figure":
         f" window {result.attrs['window']}",
         fontsize=11,
     )
+    figure.supxlabel("\n".join(map(in_figure, notes(result))), fontsize=9)
     return figure
 
 

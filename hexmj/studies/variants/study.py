@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.checks import check_types, given, printable
+from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
+from hexmj.legs import GEOMETRIES
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweeps import Cell, over_axes
 from hexmj.sweeps.plain import content, plain
 from hexmj.timing import Acceleration, Stride
-from hexmj.variants import variants, varied
+from hexmj.variants import instead, naming, variants, varied
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,6 +53,7 @@ class Variants:
             raise InputError("no network was given; expected at least one")
         for name, networks in self.networks.items():
             printable("a network's name", name)
+            typed(f"networks of {name}", networks, Sequence[Cruse1998])
             if len(networks) != len(self.velocities):
                 raise InputError(f"{name}: {len(networks)} networks; expected one for each of {self.velocities}")
         _ = self.times
@@ -69,8 +71,12 @@ class Variants:
     @property
     def times(self) -> np.ndarray:
         """Observation times, (variant, velocity) [time units]."""
-        how = self.velocities, self.window
-        return np.array([observed(*how, stride, self.acceleration)[1] for stride in self.strides.values()])
+
+        def time(variant: str) -> np.ndarray:
+            with naming(variant):
+                return observed(self.velocities, self.window, self.strides[variant], self.acceleration)[1]
+
+        return np.array([time(variant) for variant in self.variants])
 
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`."""
@@ -89,7 +95,8 @@ class Variants:
         """How often each set loses stability, and what this comes to over all variants.
 
         Returns:
-            Over (network, variant, velocity): `flss` with its 95 % Wilson interval, over the starts too `lost`.  Over
+            Over (network, variant, velocity): `flss` with its 95 % Wilson interval, over the starts too `lost`; and
+            `instead`, the default that was walked where a set has the variant already, empty elsewhere.  Over
             (network, velocity): `mean` and `worst` over the variants with their intervals, that of the mean too wide
             rather than too narrow: as if all variants lost the same starts; and the name of the worst, `worst_variant`.
         """
@@ -108,12 +115,39 @@ class Variants:
             for end, values in {"": count.values / self.n_starts, "_low": low, "_high": high}.items():
                 table[name + end] = count.copy(data=values).assign_attrs(units="1")
         table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
+        table["instead"] = lost.copy(data=self._instead()).assign_attrs(units="1")
         told = ("window", "n_starts", "seed", "acceleration", "conditions", "networks")
         return table.assign_attrs({name: plain(getattr(self, name)) for name in told} | self._stride)
+
+    def _instead(self) -> np.ndarray:
+        """See `result`, (network, variant, velocity)."""
+        usual = given("stride", self.stride, Stride)
+
+        def told(network: Cruse1998, variant: str) -> str:
+            return ", ".join(
+                f"{name} = {next((key for key, one in GEOMETRIES.items() if one == value), value)}"
+                for name, value in (instead(usual, variant) | instead(network, variant)).items()
+            )
+
+        return np.array([
+            [[told(one, variant) for one in networks] for variant in self.variants]
+            for networks in self.networks.values()
+        ])  # fmt: skip
 
     @property
     def _stride(self) -> dict[str, object]:
         return {"stride": plain(self.strides["usual"])}
+
+
+def notes(result: "xr.Dataset") -> list[str]:
+    """Sentences on the rows of a result whose name says what a set has anyway."""
+    told = []
+    for variant in result.variant.values:
+        row = result.instead.sel(variant=variant)
+        for default in sorted({*row.values.ravel().tolist()} - {""}):
+            names = row.network.values[(row == default).any("velocity").values]
+            told.append(f"* {variant} is usual for {', '.join(names)}: walked with {default} instead")
+    return told
 
 
 def losses(
