@@ -20,10 +20,11 @@ from hexmj.measures.physical import physical_walk
 from hexmj.physics.drive import drive
 from hexmj.physics.effort import EffortSoFar
 from hexmj.physics.settling import settle
+from hexmj.studies.league import physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import EVERYONE, entrants
 from hexmj.studies.league.figure import league_figure
-from hexmj.studies.league.frequencies import difference
+from hexmj.studies.league.frequencies import came, difference, frequencies
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
@@ -51,6 +52,22 @@ class Still:
             return Step(x, np.ones(x.shape, dtype=bool))
 
         return stepwise(step, starts, velocity, stride, acceleration)
+
+
+@dataclass(frozen=True)
+class Stretched(Still):
+    """The same; where the first leg starts ahead of its origin, that leg is told to stand where none reaches."""
+
+    name: str = "stretched"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """As `Still`, with a tip far beside its line."""
+        plan = super().begin(starts, velocity, stride, acceleration, threads)
+        y = np.tile(stride.geometry.y, (len(starts), 1))
+        y[starts[:, 0] > 0] *= 3
+        still = plan.step
+        plan.step = lambda v: replace(still(v), y=y)
+        return plan
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +123,20 @@ def test_what_cannot_be_asked_is_not_known(result) -> None:
     assert np.isnan(ideal.fell).all() and np.isnan(ideal.range) and (ideal.kinematic_starts == 1).all()
     assert (ideal.best == 0).all()
     assert by_rank(result).entrant.values[-1] == "graham-ideal"
+
+
+def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
+    entrant, how = Entrant(Stretched()), {"seed": 0, "conditions": Conditions(), "stride": Stride()}
+    found = physics.walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
+    refused = hexmj.draw_starts(6, 0)[:, 0] > 0
+    assert refused.any() and not refused.all()
+    still = physics.walks(Entrant(Still()), Still(), 0.5, 10.0, n_starts=6, **how)
+    for name, values in found.items():
+        assert np.isnan(values.values[refused]).all()
+        assert np.array_equal(values.values[~refused], still[name].values[~refused], equal_nan=True)
+    assert np.array_equal(came(found.fall).isnull(), refused)
+    told = frequencies("fell", came(found.fall).values[None], ("entrant",))
+    assert told["fell_starts"][1] == (~refused).sum()
 
 
 def test_tables_and_figure_show_every_entrant(result) -> None:
