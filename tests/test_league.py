@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 import pytest
@@ -52,6 +53,14 @@ class Still:
             return Step(x, np.ones(x.shape, dtype=bool))
 
         return stepwise(step, starts, velocity, stride, acceleration)
+
+
+class Walked(TypedDict):
+    """How walks go."""
+
+    seed: int
+    conditions: Conditions
+    stride: Stride
 
 
 @dataclass(frozen=True)
@@ -126,7 +135,7 @@ def test_what_cannot_be_asked_is_not_known(result) -> None:
 
 
 def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
-    entrant, how = Entrant(Stretched()), {"seed": 0, "conditions": Conditions(), "stride": Stride()}
+    entrant, how = Entrant(Stretched()), Walked(seed=0, conditions=Conditions(), stride=Stride())
     found = physics.walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
     refused = hexmj.draw_starts(6, 0)[:, 0] > 0
     assert refused.any() and not refused.all()
