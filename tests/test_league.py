@@ -82,8 +82,7 @@ class Stretched(Still):
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    sizes = {"n_starts": 12, "n_physical": 2, "n_tried": 2, "periods": 12}
-    return League(takes_part, (0.3, 0.6), **sizes, window=40.0, accelerating=False, seed=0)
+    return League(takes_part, (0.3, 0.6), 12, 2, 2, window=40.0, accelerating=False, periods=12, seed=0)
 
 
 @pytest.fixture(scope="module")
