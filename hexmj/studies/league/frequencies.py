@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def came(time: "xr.DataArray") -> "xr.DataArray":
     """Whether a time came, 1 or 0; NaN where the walk was refused."""
-    return np.isfinite(time).where(time.notnull())
+    return (time < np.inf).where(time.notnull())
 
 
 def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:
