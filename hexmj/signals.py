@@ -4,12 +4,15 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Timer
 from typing import Any
 
 STOPS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
 """Ctrl-C, a polite end, and a terminal that closes."""
+
+SWALLOWED = 5.0
+"""A stop after which the program goes on for so long was swallowed by somebody's code, and comes once more [s]."""
 
 _HEARD: list[int] = []
 
@@ -51,12 +54,20 @@ def unheard_by_children() -> Iterator[None]:
 
 def _stop(number: int, frame: Any) -> None:
     _HEARD.append(number)
+    _comes_again(SWALLOWED)
     raise KeyboardInterrupt
 
 
 def _unheard(ignored: Any) -> None:
     """A stop that C code swallows, as while numba loads what it has compiled, comes once more."""
     if _HEARD and ignored.exc_type is KeyboardInterrupt:
-        Timer(0.1, os.kill, (os.getpid(), _HEARD[-1])).start()
+        _comes_again(0.1)
     else:
         sys.__unraisablehook__(ignored)
+
+
+def _comes_again(seconds: float) -> None:
+    again = Timer(seconds, os.kill, (os.getpid(), _HEARD[-1]))
+    again.daemon = True
+    with suppress(RuntimeError):  # the interpreter is ending
+        again.start()

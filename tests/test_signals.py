@@ -134,3 +134,24 @@ def test_while_a_search_evaluates(tmp_path, by):
     out = tmp_path / "evaluations"
     stopped(started("search", "--out", str(tmp_path), until=out / "population-*.jsonl", wait=1.0), by)
     assert {path.suffix for path in out.iterdir()} == {".jsonl"}, "the lock is gone, the evaluations are not"
+
+
+def test_a_stop_that_somebody_swallows_comes_once_more():
+    script = (
+        "import os, signal, time\n"
+        "from hexmj import signals\n"
+        "signals.SWALLOWED = 0.3\n"
+        "signals.hear_stops()\n"
+        "for told in ('swallowed', 'heard'):\n"
+        "    try:\n"
+        "        if told == 'swallowed':\n"
+        "            os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        time.sleep(20)\n"
+        "    except KeyboardInterrupt:\n"
+        "        print(told)\n"
+        "signals.ignore_stops()\n"
+    )
+    begun = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", script], env=ENVIRONMENT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["swallowed", "heard"]
+    assert time.monotonic() - begun < 15

@@ -38,6 +38,9 @@ CONTROLLER = (
 MOST_PROCESSES = 1000
 """More than any machine has cores."""
 
+_LOADED: dict[str, Controller] = {}
+"""Controllers as they were loaded: a file may have been edited since, and is not run again."""
+
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
 
 
@@ -110,7 +113,7 @@ class Controlled:
         from hexmj.controllers.named import load_controller
         from hexmj.controllers.reads_legs import ReadsLegs
 
-        found = load_controller(name)
+        found = _LOADED[name] = load_controller(name)
         for rule, value in self.rules.items():
             if not isinstance(found, Cruse1998):
                 raise InputError(
@@ -131,9 +134,8 @@ class Controlled:
         """Order of updates and reading that a set brings along, where it does not walk as printed; else nothing."""
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.readings import in_words
-        from hexmj.controllers.named import load_controller
 
-        found = load_controller(name)
+        found = _LOADED.get(name)
         if not isinstance(found, Cruse1998):
             return ""
         rules = {"order": found.order, "reading": in_words(found.reading)}
