@@ -13,10 +13,10 @@ from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.trials import DISTURBED, LEGS_LOST, TRIALS, walking
+from hexmj.studies.league.trials import CROSSED, DISTURBED, GROUNDS, LEGS_LOST, TRIALS, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +76,9 @@ class League:
         if not self.entrants:
             raise InputError("no controller was given; expected at least one")
         if not (0 < self.tried_at < 1 and (self.observed[0] > 0).all()):
-            raise InputError(f"velocities = {self.velocities}, {self.tried_at}; expected each above 0 and below 1")
+            raise InputError(
+                f"velocities = {self.velocities}, of the trials = {self.tried_at}; expected each above 0 and below 1"
+            )
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -167,12 +169,15 @@ class League:
 
         found: dict[str, Cell] = {}
         at = {"velocity": self.tried_at, "window": self.window, "n_starts": self.n_tried}
+        way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
         grid = steps_in_chunk(self.conditions.substeps(self.stride))
         for trial in TRIALS:
             if trial in DISTURBED and entrant.steerable:
                 how = at | {"case": DISTURBED[trial], "conditions": self.conditions, "grid": grid}
                 found[trial] = self._cell(trial, physics.disturbed, 300, entrant, how)
-            elif trial not in DISTURBED and (one := walking(trial, entrant, self.conditions)):
+            elif trial in DISTURBED or (trial in GROUNDS and way < CROSSED):
+                continue
+            elif one := walking(trial, entrant, self.conditions):
                 how = at | {"controller": one.controller, "conditions": one.conditions}
                 found[trial] = self._cell(trial, physics.walks, 180, entrant, how)
         return found

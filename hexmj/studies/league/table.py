@@ -102,13 +102,13 @@ def _regimes(result: "xr.Dataset") -> Table:
 
 
 def _trials(result: "xr.Dataset") -> Table:
-    rows = []
+    rows, most = [], result.fell_starts.max().item()
     for name in (shown := by_rank(result)).entrant.values:
         one = shown.sel(entrant=name)
-        falls = (_known(f"{fell:.2f}") for fell in one.fell.values)
+        falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
         rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
-    starts, v = result.fell_starts.max().item(), result.attrs["tried_at"]
-    title = f"Falls at V = {v:g} in {starts} starts; at last losses on paper without a leg.  {TOLD}"
+    v = result.attrs["tried_at"]
+    title = f"Falls at V = {v:g} in {most} starts; at last losses on paper without a leg.  {TOLD}"
     return Table(title, ("controller", *result.trial.values, "paper"), rows)
 
 
@@ -132,6 +132,11 @@ def _short(value: float) -> str:
     """Two digits after the point, three where they matter, without a leading zero."""
     text = f"{value:.2f}" if value >= 0.1 else f"{value:.3f}".rstrip("0").rstrip(".")
     return text.replace("0.", ".", 1)
+
+
+def _share(value: float, starts: int, most: int) -> str:
+    """A share, and of how many starts where it is not of all."""
+    return _known(f"{value:.2f}") + (f" of {starts}" if 0 < starts < most else "")
 
 
 def _known(text: str) -> str:

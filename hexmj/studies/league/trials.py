@@ -34,7 +34,13 @@ MET: dict[str, dict[str, Any]] = {
     "rough": {"ground": "rough", "ground_height": 3.0, "ground_at": 45.0},
     "load": {"load": 1.0},
 }
-"""Conditions that are met by all starts; the ground begins where even slow walks come to it with all legs."""
+"""Conditions that are met; the ground begins where even slow walks come to it with all legs."""
+
+GROUNDS = ("step", "rough")
+"""Those of them that lie ahead."""
+
+CROSSED = 75.0
+"""Way after which all legs have come to the ground of a trial [mm]."""
 
 LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
 """Name of a trial -> index of the lost leg."""
@@ -48,7 +54,8 @@ TRIALS = (*DISTURBED, *MET, *LEGS_LOST, *READING)
 TOLD = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
     " until then; step and rough ground of 3 mm; load: twice the weight; lost: one leg, from the front; reads: the legs"
-    " are read; noise, late: with errors of 10 % of the step range, 20 ms late"
+    " are read; noise, late: with errors of 10 % of the step range, 20 ms late; - where plans cannot be steered or"
+    " read no legs, or the walk ends before the ground"
 )
 """What they are."""
 
