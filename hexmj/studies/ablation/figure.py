@@ -29,7 +29,7 @@ def ablation_figure(result: "xr.Dataset") -> "Figure":
             text, weight = f"{one.frequency.values[row, column]:.2f}", "bold"
             if not wholes[row]:
                 sure = one.more_low.values[row, column] > 0 or one.more_high.values[row, column] < 0
-                text, weight = f"{round(shown[row, column], 2) + 0.0:+.2f}", "bold" if sure else "normal"
+                text, weight = f"{np.round(shown[row, column], 2) + 0.0:+.2f}", "bold" if sure else "normal"
             colour = "white" if abs(np.nan_to_num(shown[row, column])) > 0.6 else "0.1" if weight == "bold" else "0.5"
             panel.text(
                 column,
