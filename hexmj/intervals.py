@@ -31,14 +31,19 @@ def paired_difference(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, n
     """Difference of two frequencies on the same starts, `one` less `other`, and its 95 % interval.
 
     Args:
-        one: whether it happened, (..., start).
+        one: whether it happened, (..., start), or in which part of several walks, 0 to 1; starts that are NaN here or
+            there are left out.
         other: the same under another condition or measure.
 
     Returns:
-        Difference, low and high, each (...).  The interval is that of Agresti and Min (Statistics in Medicine 24,
-        2005): half a start is added to each of the four cells.
+        Difference, low and high, each (...); NaN where no start is left.  The interval is that of Agresti and Min
+        (Statistics in Medicine 24, 2005): half a start is added to each of the four cells.
     """
-    size, only_one, only_other = one.shape[-1], (one & ~other).sum(axis=-1), (other & ~one).sum(axis=-1)
-    middle = (only_one - only_other) / (size + 2)
-    half = WILSON_Z * np.sqrt((only_one + only_other + 1) / (size + 2) - middle**2) / np.sqrt(size + 2)
-    return (only_one - only_other) / size, np.maximum(middle - half, -1.0), np.minimum(middle + half, 1.0)
+    apart = np.subtract(one, other, dtype=float)
+    known = np.isfinite(apart)
+    size, total, squares = (np.where(known, value, 0.0).sum(axis=-1) for value in (1.0, apart, apart**2))
+    middle = total / (size + 2)
+    half = WILSON_Z * np.sqrt((squares + 1) / (size + 2) - middle**2) / np.sqrt(size + 2)
+    with np.errstate(invalid="ignore"):
+        nothing = 0.0 * size / size  # NaN without a start
+        return total / size, np.maximum(middle - half, -1.0) + nothing, np.minimum(middle + half, 1.0) + nothing

@@ -25,7 +25,7 @@ from hexmj.studies.league import physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import EVERYONE, entrants
 from hexmj.studies.league.figure import league_figure
-from hexmj.studies.league.frequencies import came, difference, frequencies
+from hexmj.studies.league.frequencies import came, frequencies
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
@@ -176,10 +176,30 @@ def test_ranks_are_given_only_where_intervals_separate() -> None:
     assert [one.tolist() for one in ranks(few)] == [[1, 1], [2, 2]]
 
 
-def test_a_difference_of_zeros_and_ones_is_that_of_agresti_and_min() -> None:
+def test_a_difference_leaves_out_starts_that_are_not_known_and_takes_parts_of_walks() -> None:
     rng = np.random.default_rng(1)
     one, other = rng.uniform(size=(2, 50)) < [[0.3], [0.5]]
-    assert np.allclose(difference(one.astype(float), other.astype(float)), paired_difference(one, other))
+    known = rng.uniform(size=50) < 0.8
+    blanked = np.where(known, one, np.nan)
+    assert np.array_equal(paired_difference(blanked, other), paired_difference(one[known], other[known]))
+    assert np.isnan(paired_difference(np.full(50, np.nan), other)).all()
+    middle, low, high = paired_difference(one / 2, other / 2)
+    whole = paired_difference(one, other)
+    assert np.isclose(middle, whole[0] / 2) and low < middle < high and high - low < whole[2] - whole[1]
+
+
+def test_velocities_that_look_alike_are_not_the_same(league: League) -> None:
+    near = replace(league, velocities=(0.3, 0.3000001))
+    assert len(near.named_cells()) == len(league.named_cells())
+
+
+def test_a_quick_look_obeys_what_else_is_asked() -> None:
+    from hexmj.cli.main import options_of
+
+    quick, asked = (options_of(["league", "--quick", *words]).study() for words in ([], ["--starts", "1000"]))
+    assert (quick.n_starts, quick.n_physical, quick.velocities) == (200, 8, (0.1, 0.5, 0.9))
+    assert asked == replace(quick, n_starts=1000)
+    assert options_of(["league"]).study().velocities == League.velocities
 
 
 @pytest.mark.parametrize("leg", [0, 4])

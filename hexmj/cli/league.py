@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,7 +29,7 @@ TABLE, FILM = "league.md", "league.mp4"
 BEST = 6
 """Who are filmed, at most."""
 
-QUICK = {"velocities": (0.1, 0.5, 0.9), "starts": 200, "physical_starts": 8, "trial_starts": 4}
+QUICK: dict[str, Any] = {"velocities": (0.1, 0.5, 0.9), "n_starts": 200, "n_physical": 8, "n_tried": 4}
 """Sizes of a quick look."""
 
 
@@ -41,14 +41,14 @@ class League(StudyCommand):
         tuple[str, ...],
         arg(help=f"Who takes part, each {CONTROLLER}; wilson-ideal begins at its ideal start.  All unless given."),
     ] = ()
-    velocities: Sequence[float] = study.League.velocities
-    """Velocities V_r as fractions of V_p, 0 < V < 1."""
-    starts: int = study.League.n_starts
-    """Number of random starts on paper, the same for all."""
-    physical_starts: int = study.League.n_physical
-    """Of these, number of starts that walk in physics at every velocity."""
-    trial_starts: int = study.League.n_tried
-    """Number of starts in each trial."""
+    velocities: Sequence[float] = ()
+    """Velocities V_r as fractions of V_p, 0 < V < 1; 0.1, 0.2 ... 0.9 unless given, 0.1, 0.5, 0.9 if quick."""
+    starts: int | None = None
+    """Number of random starts on paper, the same for all; 1000 unless given, 200 if quick."""
+    physical_starts: int | None = None
+    """Of these, number of starts that walk in physics at every velocity; 200 unless given, 8 if quick."""
+    trial_starts: int | None = None
+    """Number of starts in each trial; 50 unless given, 4 if quick."""
     trial_velocity: float = study.League.tried_at
     """V_r of the trials."""
     quick: bool = False
@@ -65,12 +65,6 @@ class League(StudyCommand):
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["ground", "load"]))
 
     @property
-    def sized(self) -> "League":
-        """These options with the sizes of a quick look where it is asked for and no others are."""
-        few = {name: value for name, value in QUICK.items() if getattr(self, name) == getattr(League, name)}
-        return replace(self, **few, quick=False) if self.quick else self
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Who takes part."""
         return self.controllers or (FOUR if self.quick else EVERYONE)
@@ -78,14 +72,17 @@ class League(StudyCommand):
     def study(self) -> study.League:
         """See `StudyCommand.study`."""
         check_distinct("controllers", self.names)
-        sized = self.sized
+        asked = {
+            "velocities": self.velocities or None,
+            "n_starts": self.starts,
+            "n_physical": self.physical_starts,
+            "n_tried": self.trial_starts,
+        }
+        sizes = (QUICK if self.quick else {}) | {name: size for name, size in asked.items() if size is not None}
         return study.League(
             entrants(self.names),
-            sized.velocities,
-            sized.starts,
-            sized.physical_starts,
-            sized.trial_starts,
-            sized.trial_velocity,
+            **sizes,
+            tried_at=self.trial_velocity,
             window=self.walks.time,
             seed=self.walks.seed,
             conditions=self.conditions,

@@ -24,7 +24,7 @@ import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted
 from hexmj.files import read_toml
-from hexmj.legs import MIRROR
+from hexmj.legs import MIRROR, N2, N4
 
 FOUND = Path(__file__).with_name("evolved.toml")
 """The constants that were found, and how; as the search wrote them."""
@@ -35,7 +35,7 @@ GAIN = 8.0
 TAU = 2.0
 """Unit of the time constant [time units]; a swing from PEP_0 to AEP_0 takes 20."""
 
-BEHIND, AHEAD = [1, 2, 6, 4, 5, 6], [6, 0, 1, 6, 3, 4]
+BEHIND, AHEAD = ([near[0] if near else 6 for near in table] for table in (N2, N4))
 """Ipsilateral neighbours, (leg,); 6 where there is none."""
 
 

@@ -20,15 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted
-
-BEHIND = (1, 2, None, 4, 5, None)
-"""Ipsilateral leg behind each leg: sender of rules 1 and 2."""
-
-IN_FRONT = (None, 0, 1, None, 3, 4)
-"""Ipsilateral leg in front of each leg: sender of rule 3."""
-
-ACROSS = (3, 4, 5, 0, 1, 2)
-"""Contralateral leg of each leg: sender of rules 2 and 3."""
+from hexmj.legs import MIRROR, N2, N4
 
 
 class Nothing(NamedTuple):
@@ -71,16 +63,16 @@ class Scores(Lifted):
         late = np.where(in_stance, legs.travel, 0.0)
         early = np.where(in_stance, 1.0 - legs.travel, 0.0)
         return (
-            self.rule1 * _from(BEHIND, ~legs.stands)
-            + (self.rule2_ipsilateral * _from(BEHIND, early) + self.rule2_contralateral * _from(ACROSS, early))
-            + (self.rule3_ipsilateral * _from(IN_FRONT, late) + self.rule3_contralateral * _from(ACROSS, late))
+            self.rule1 * _from(N2, ~legs.stands)
+            + (self.rule2_ipsilateral * _from(N2, early) + self.rule2_contralateral * early[:, MIRROR])
+            + (self.rule3_ipsilateral * _from(N4, late) + self.rule3_contralateral * late[:, MIRROR])
         )
 
 
-def _from(senders: tuple[int | None, ...], signal: np.ndarray) -> np.ndarray:
-    """(start, leg) each leg's sender's signal, 0 without a sender."""
+def _from(senders: tuple[tuple[int, ...], ...], signal: np.ndarray) -> np.ndarray:
+    """(start, leg) the signal of each leg's only sender, 0 without one."""
     heard = np.zeros(signal.shape)
-    for leg, sender in enumerate(senders):
-        if sender is not None:
+    for leg, near in enumerate(senders):
+        for sender in near:
             heard[:, leg] = signal[:, sender]
     return heard

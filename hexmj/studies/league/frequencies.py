@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.intervals import WILSON_Z, wilson_intervals
+from hexmj.intervals import paired_difference, wilson_intervals
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,21 +45,5 @@ def differences(name: str, happened: np.ndarray, other: np.ndarray, dims: tuple[
         other: what broadcasts to it.
         dims: of the frequency.
     """
-    starts = happened.shape[-1]
-    pairs = (one.reshape(-1, starts) for one in (happened, np.broadcast_to(other, happened.shape)))
-    ends = np.array([difference(*pair) for pair in zip(*pairs, strict=True)]).reshape(*happened.shape[:-1], 3)
-    return {f"{name}{end}": (dims, ends[..., i], {"units": "1"}) for i, end in enumerate(("", "_low", "_high"))}
-
-
-def difference(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
-    """Mean difference of what happened to the same starts, each (start,) from 0 to 1, and its 95 % interval.
-
-    As `intervals.paired_difference`, also for frequencies over several velocities; starts that are NaN are left out.
-    """
-    apart = (one - other)[np.isfinite(one - other)]
-    size = len(apart)
-    if size < 2:
-        return np.nan, np.nan, np.nan
-    middle = apart.sum() / (size + 2)
-    half = WILSON_Z * np.sqrt((apart @ apart + 1) / (size + 2) - middle**2) / np.sqrt(size + 2)
-    return apart.mean(), max(middle - half, -1.0), min(middle + half, 1.0)
+    ends = zip(("", "_low", "_high"), paired_difference(happened, np.broadcast_to(other, happened.shape)), strict=True)
+    return {f"{name}{end}": (dims, values, {"units": "1"}) for end, values in ends}

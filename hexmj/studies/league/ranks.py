@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hexmj.studies.league.frequencies import difference
+from hexmj.intervals import paired_difference
 
 
 def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -15,10 +15,9 @@ def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         1 and how many are better for sure; the number of those that are ranked less how many are worse for sure.
     """
-    ranked = np.isfinite(values).sum(axis=1) > 1
+    ranked = np.isfinite(values).any(axis=1)
     best, worst = np.zeros(len(values), dtype=int), np.zeros(len(values), dtype=int)
     for i in np.flatnonzero(ranked):
-        ends = [difference(values[i], values[j])[1:] for j in np.flatnonzero(ranked) if j != i]
-        best[i] = 1 + sum(low > 0 for low, _ in ends)
-        worst[i] = ranked.sum() - sum(high < 0 for _, high in ends)
+        _, low, high = paired_difference(values[i], values[ranked])  # of itself the interval holds 0
+        best[i], worst[i] = 1 + (low > 0).sum(), ranked.sum() - (high < 0).sum()
     return best, worst

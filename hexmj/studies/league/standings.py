@@ -42,7 +42,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     """
     import xarray as xr
 
-    names, v = list(league.entrants), [f"{one:g}" for one in league.observed[0]]
+    names, v = list(league.entrants), league.observed[0].tolist()
     on_paper, walked, regimes = (
         [[data.get((name, f"{kind} {one}")) for one in v] for name in names] for kind in ("paper", "physics", "regime")
     )
@@ -52,9 +52,11 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         "physical": _each(walked, lambda one: came(one.fall)),
     }
     reference = names.index(REFERENCE) if REFERENCE in names else 0
+    ideal = np.array([entrant.ideal for entrant in league.entrants.values()])[:, None, None]
+    same = {measure: np.where(ideal, np.nan, values) for measure, values in happened.items()}  # the same random starts
     table: dict[str, Any] = {}
-    for measure, values in happened.items():
-        table |= frequencies(measure, values, OVER_VELOCITY)
+    for measure, values in same.items():
+        table |= frequencies(measure, happened[measure], OVER_VELOCITY)
         table |= differences(f"{measure}_above", values, values[reference], OVER_VELOCITY)
     for asked in ("range", "accelerated"):
         table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
@@ -62,10 +64,10 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     tried, lamed = ([[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "paper, "))
     table |= frequencies("fell", _each(tried, _fell), over_trials)
     table |= frequencies("lost", _each(lamed, _lost), over_trials)
-    best, worst = np.array([ranks(values.mean(axis=1)) for values in happened.values()]).transpose(1, 2, 0)
+    best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
-    table |= {name: _over(walked, find) for name, find in COSTS.items()}
-    table |= {name: _over(regimes, find) for name, find in REGIMES.items()}
+    table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
+    table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
     velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
     return xr.Dataset(table, axes, {"reference": names[reference]})
@@ -85,15 +87,15 @@ def _upright(one: "xr.Dataset") -> "xr.Dataset":
     return one.isel(start=np.isinf(one.fall.values))
 
 
-COSTS = {
+OF_WALKS = {
     "speed": lambda one: _upright(one).speed.mean(),
     "slip": lambda one: _upright(one).slip.mean(),
     "cost": lambda one: _upright(one).work.sum() / _upright(one).way.sum(),
     "torque": lambda one: _upright(one).torque.max() if _upright(one).start.size else np.nan,
 }
-"""Of the walks at one velocity; NaN where all fell."""
+"""What is told of walks at one velocity, of those without a fall; NaN where all fell."""
 
-REGIMES = {
+OF_REGIMES = {
     "periodic": lambda one: np.isfinite(one.reached).mean(),
     "stable": lambda one: one.stable.mean(),
     "reached": lambda one: one.reached.median(),
@@ -101,7 +103,7 @@ REGIMES = {
     "ipsilateral": lambda one: _phase(one.ipsilateral),
     "contralateral": lambda one: _phase(one.contralateral),
 }
-"""Of the limit regimes at one velocity; duty factor and phases are NaN where none was reached."""
+"""What is told of limit regimes at one velocity; duty factor and phases are NaN where none was reached."""
 
 
 def _phase(values: "xr.DataArray") -> float:

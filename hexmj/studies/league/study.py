@@ -120,7 +120,7 @@ class League:
     def _on_paper(self, entrant: Entrant) -> dict[str, Cell]:
         """Losses at every velocity."""
         return {
-            f"paper {v:g}": self._cell(
+            f"paper {v}": self._cell(
                 f"paper-V-{v:g}", paper.losses, time * PAPER, entrant, {"velocity": v, "window": self.window}
             )
             for v, time in self._velocities
@@ -133,7 +133,7 @@ class League:
         how = {"controller": entrant.controller, "window": self.window, "conditions": self.conditions}
         how["n_starts"] = self.n_physical
         return {
-            f"physics {v:g}": self._cell(f"physics-V-{v:g}", physics.walks, time, entrant, how | {"velocity": v})
+            f"physics {v}": self._cell(f"physics-V-{v:g}", physics.walks, time, entrant, how | {"velocity": v})
             for v, time in self._velocities
         }
 
@@ -142,7 +142,7 @@ class League:
         window = {"window": self.window}
         few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
         found = {
-            f"regime {v:g}": self._cell(
+            f"regime {v}": self._cell(
                 f"regime-V-{v:g}", paper.regimes, 20 * time * PAPER, entrant, few | {"velocity": v}
             )
             for v, time in self._velocities

@@ -65,7 +65,9 @@ class Walking:
     """A trial in which a controller walks from the start on."""
 
     controller: Controller
+    """The entrant's own, or what was made of it."""
     conditions: Conditions
+    """In which it walks."""
 
 
 def walking(name: str, entrant: Entrant, conditions: Conditions) -> Walking | None:
