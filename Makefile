@@ -1,5 +1,6 @@
 # make compare    the main job; ARGS="..." adds options
-# make test       the tests
+# make test       the tests, but for those that take their time
+# make slow       the others: kills at every write, the soak's sample, all commands of the documents, examples
 # make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
 # make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types
@@ -7,18 +8,22 @@
 
 PYTHON ?= python3
 PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
+TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 
-.PHONY: compare test soak bench lint system
+.PHONY: compare test slow soak bench lint system
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
 	.venv/bin/hexmj compare --out results/compare $(ARGS)
 
-test: export MUJOCO_GL ?= egl
+test slow: export MUJOCO_GL ?= egl
 test: .venv/dev system
-	.venv/bin/python -m pytest -p no:benchmark --numprocesses 2 --dist worksteal $(ARGS)
+	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
+
+slow: .venv/dev system
+	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
 
 soak: export MUJOCO_GL ?= egl
 soak: .venv/dev system
@@ -70,5 +75,5 @@ system:
 
 .venv/dev: .venv/project
 	$(PIP) install "pip>=25.1"  # the first with dependency groups
-	$(PIP) install --constraint constraints.txt --group dev
+	$(PIP) install --constraint constraints.txt --editable ".[gym,dask,view,docs]" --group dev
 	touch $@

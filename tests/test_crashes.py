@@ -23,6 +23,8 @@ from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
 from tests.soak.faults import KINDS
 
+pytestmark = pytest.mark.slow
+
 PATHS = (str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}
 

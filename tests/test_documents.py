@@ -10,6 +10,8 @@ import pytest
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    hexmj (.+)$", README, flags=re.MULTILINE)

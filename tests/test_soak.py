@@ -7,6 +7,8 @@ import pytest
 from tests.soak.drawn import KINDS, try_inputs
 from tests.soak.walks import tried
 
+pytestmark = pytest.mark.slow
+
 INPUTS = 60
 
 
