@@ -225,9 +225,10 @@ def test_each_of_our_own_sets_names_the_command_that_found_it():
         assert words[at : at + 2 - single] == ([name.rpartition("-")[2]] if single else ["0.1", "0.5"])
         assert ("--reading" in words) == (PRESETS[name].reading != Reading())
         assert ("--over" in words) == name.startswith("robust")
-        begun = load_controller(words[words.index("--begin") + 1])
-        assert isinstance(begun, Cruse1998)
-        assert general(begun.weights).p1.any()
+        if "--begin" in words:
+            begun = load_controller(words[words.index("--begin") + 1])
+            assert isinstance(begun, Cruse1998)
+            assert general(begun.weights).p1.any()
 
 
 @pytest.mark.parametrize("weights", [LDVS.weights, Weights.from_vector(np.random.default_rng(1).integers(0, 2, 58))])
