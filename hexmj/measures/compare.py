@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -95,8 +96,8 @@ class Comparison:
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
-        attributes = settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
-        return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes)
+        told = {"study": "compare"} | settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
+        return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes(told))
 
 
 def compare(
@@ -174,7 +175,7 @@ def physical_flss(
     beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
     wanted = [*beside, "fall", *BESIDE.values(), *REPORTED]
     reported = result.isel(controller=0, drop=True)[wanted].drop_vars("duration")
-    return table.assign(reported.data_vars).assign_attrs(result.attrs)
+    return table.assign(reported.data_vars).assign_attrs(result.attrs | {"study": "flss"})
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
@@ -195,5 +196,5 @@ def _with_answers(data: "xr.Dataset") -> "xr.Dataset":
     """The numbers of starts in each case of `AGREEMENT` beside their outcomes."""
     lost, fell = data.planned_loss < np.inf, data.fall < np.inf
     answers = dict(zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True))
-    attributes = {"units": "1", "long_name": "number of starts"}
-    return data.assign({name: true.sum("start").assign_attrs(attributes) for name, true in answers.items()})
+    told = {"units": "1", "long_name": "number of starts"}
+    return data.assign({name: true.sum("start").assign_attrs(told) for name, true in answers.items()})

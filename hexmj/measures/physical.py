@@ -14,7 +14,7 @@ from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
 from hexmj.physics.settling import Settled, settle
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, Walk, joined, part_of
@@ -108,7 +108,7 @@ def physical_walk(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> PhysicalWalk:
     """The physical walk of every start, kept whole.
 
@@ -121,17 +121,18 @@ def physical_walk(
         stride: of the plan.
         acceleration: the accelerating procedure of Eq. 11.
         threads: one per core unless given; the result does not depend on it.
-        progress: told the fraction done since it was last called.
+        progress: True shows a bar; or a function that is told the fraction done since it was last called.
 
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
     stride, conditions = given("stride", stride, Stride), given("conditions", conditions, Conditions)
-    typed("progress", progress, Progress | None)
-    planned = walk(starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
-    plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
-    settled = settle(starts, conditions, stride, threads)
-    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress)
+    with shown(progress, "walking") as told:
+        how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+        planned = walk(starts, controller, velocity, duration, **how)
+        plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
+        settled = settle(starts, conditions, stride, threads)
+        return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=told)
 
 
 def physical_walk_of_plan(

@@ -200,9 +200,9 @@ def _phase_figure(gaits: "xr.Dataset", colour: str) -> "tuple[Figure, xr.Dataset
 
 
 def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure
+    from hexmj.pictures import picture
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return picture(width, height)
 
 
 Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]

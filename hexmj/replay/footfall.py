@@ -10,14 +10,15 @@ from hexmj.measures.figures import MEASURE_COLOURS, spans
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 
-def walk_figure(recording: "xr.Dataset") -> "Figure":
+def walk_figure(recording: "xr.Dataset") -> "Picture":
     """Footfall diagram (bars are protraction) and stability margin over time, from a recording."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import picture
 
-    figure = Figure(figsize=(8.0, 4.8), layout="constrained")
+    figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time = recording.time.values
     physical = "measured_stance" in recording
