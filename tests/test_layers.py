@@ -15,7 +15,7 @@ FLOORS = (
     ("as_run", "attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
     ("pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
-    ("timing",),
+    ("diagrams", "timing"),
     ("stability", "walks"),
     ("starts",),
     ("controllers",),

@@ -71,5 +71,5 @@ class Walk(WalkingCommand):
 def _told(key: str, value: Any) -> str:
     """A number of a walk; a time in words."""
     if key in TIMES:
-        return f"at {value:.4g} time units" if math.isfinite(value) else "none"
+        return f"at {value:.4g} time units" if math.isfinite(value) else "none within the walk"
     return short(value)

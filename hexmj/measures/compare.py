@@ -14,7 +14,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
-from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweeps import Cell, Execution, conduct, over_axes
 from hexmj.timing import Acceleration, Stride
@@ -102,7 +102,7 @@ class Comparison:
 
 def compare(
     controllers: Controller | Mapping[str, Controller],
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = Comparison.n_starts,
     window: str | float = Comparison.window,
@@ -117,8 +117,8 @@ def compare(
 
     Args:
         controllers: one, or several by name.
-        velocities: as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride` and
-            `acceleration`.
+        velocities: one or several, as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride`
+            and `acceleration`.
         n_starts: number of starts.
         window: observation time.
         seed: of the starts.
@@ -132,7 +132,7 @@ def compare(
         Over (controller, velocity): the three FLSS and that of `BESIDE` with their 95 % Wilson intervals
         (`kinematic`, `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
         fraction of starts for which kinematic and physical answer are the same; over (controller, velocity,
-        start) every field of `Outcomes`.
+        start) every field of `physics.outcomes.Outcomes`.
 
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
@@ -142,12 +142,12 @@ def compare(
         controllers = {controllers.name: controllers}
     typed("folder", folder, Path | str | None)
     walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
-    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *walks), folder, **how)
+    return conduct(Comparison(controllers, several(velocities), n_starts, window, seed, *walks), folder, **how)
 
 
 def physical_flss(
     controller: Controller,
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = 200,
     window: str | float = Comparison.window,

@@ -84,13 +84,6 @@ def velocity_ticks(axes: "Axes", velocities: np.ndarray) -> None:
         axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
 
 
-def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
-    """Begin and length of each stretch of time in which `on`, (step,), holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    step = time[1] - time[0] if len(time) > 1 else 0.0
-    return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
     """Axes of FLSS against velocity."""
     axes.set(xlabel="velocity $V_r / V_p$", xlim=(0.0, min(1.0, velocities.max() + 0.1)))

@@ -78,7 +78,7 @@ def first_loss(
 
 def flss(
     controller: Controller,
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = 7 * SAMPLE,
     window: str | float = "walk",
@@ -95,7 +95,7 @@ def flss(
 
     Args:
         controller: plans the walks.
-        velocities: V_r (when accelerating, its final value), each 0 <= V < 1.
+        velocities: V_r (when accelerating, its final value), one or several, each 0 <= V < 1.
         n_starts: N.
         window: 'walk', 'start' or the observation time itself [time units].
         seed: of the starts.

@@ -10,6 +10,7 @@ from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
+from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
@@ -17,10 +18,10 @@ from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, Walk, joined, part_of
+from hexmj.walks import PlannedWalk, Walk, extent, joined, part_of
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PhysicalWalk:
     """Physical walks kept whole.  After a fall everything measured is NaN, and no foot stands."""
 
@@ -44,6 +45,17 @@ class PhysicalWalk:
     """Of the walk."""
     stride: Stride
     """Of the plan."""
+
+    def __repr__(self) -> str:
+        return f"PhysicalWalk({extent(self.ordered)}; {self.outcomes!r})"
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows: the feet that are off the ground."""
+        if len(self.measured.time) < 2 or not self.measured.stance.shape[1]:
+            return None
+        known, fall = ~np.isnan(self.measured.x[:, 0]), self.outcomes.fall[0]
+        told = "start 0 as measured" + (f", which fell at {fall:.4g}" if np.isfinite(fall) else "")
+        return footfall_html(repr(self), self.measured.time, known & ~self.measured.stance[:, 0], told)
 
 
 def physical_outcomes(

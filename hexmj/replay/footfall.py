@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.diagrams import spans
 from hexmj.legs import LEGS
 from hexmj.literal import in_figure
-from hexmj.measures.figures import MEASURE_COLOURS, spans
+from hexmj.measures.figures import MEASURE_COLOURS
 
 if TYPE_CHECKING:
     import xarray as xr
