@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import hexmj.as_run  # noqa: F401  # from now on
 
 if TYPE_CHECKING:
+    from hexmj.attributes import settings as settings
     from hexmj.bodies.description import Body as Body
     from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
     from hexmj.conditions import Conditions as Conditions
@@ -35,12 +36,15 @@ if TYPE_CHECKING:
     from hexmj.measures.kinematic import walk as walk
     from hexmj.measures.physical import PhysicalWalk as PhysicalWalk
     from hexmj.measures.physical import physical_walk as physical_walk
+    from hexmj.plots import plot as plot
     from hexmj.replay.film.film import Film as Film
     from hexmj.replay.film.video import render as render
     from hexmj.replay.recording import load_recording as load_recording
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
     from hexmj.replay.recording import save_recording as save_recording
+    from hexmj.results import load as load
+    from hexmj.results import save as save
     from hexmj.search.forms import FieldsForm as FieldsForm
     from hexmj.search.network_forms import NetworkForm as NetworkForm
     from hexmj.search.problems import Problem as Problem
@@ -55,6 +59,7 @@ if TYPE_CHECKING:
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
+    "attributes": ("settings",),
     "bodies.description": ("Body",),
     "bodies.stick_insect": ("STICK_INSECT",),
     "conditions": ("Conditions",),
@@ -66,9 +71,11 @@ _MODULES = {
     "measures.compare": ("compare", "physical_flss"),
     "measures.kinematic": ("first_loss", "flss", "flss_over_range", "walk"),
     "measures.physical": ("PhysicalWalk", "physical_walk"),
+    "plots": ("plot",),
     "replay.film.film": ("Film",),
     "replay.film.video": ("render",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
+    "results": ("load", "save"),
     "search.forms": ("FieldsForm",),
     "search.network_forms": ("NetworkForm",),
     "search.problems": ("Problem",),

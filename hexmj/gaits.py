@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import numbers, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
+from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2
 from hexmj.stability import walk_margin
@@ -57,7 +58,7 @@ PART = 4096
 GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "other"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Gait:
     """The limit regime of each start; NaN where no periodic one was reached."""
 
@@ -75,6 +76,32 @@ class Gait:
     """(start,) True if from some onset on all legs keep one period and their lags, over `CYCLES` cycles or more."""
     stable: np.ndarray
     """(start,) True if a periodic regime is statically stable throughout the last period of the walk."""
+
+    def __repr__(self) -> str:
+        known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
+        line += f", stable {int(self.stable.sum())}"
+        if known.any():
+            phases = ", ".join(
+                f"{pair} {circular_mean(self.phase[known, n]):.2f}" for n, pair in enumerate(PAIRS) if pair in TOLD
+            )
+            line += f"; period {self.period[known].mean():.4g} time units, duty factor"
+            line += f" {self.duty_factor[known].mean():.2f}, phases {phases}"
+        return f"{line})"
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows: two periods of the first periodic regime."""
+        if not self.periodic.any():
+            return None
+        start = int(np.argmax(self.periodic))
+        phase, time = dict(zip(PAIRS, self.phase[start], strict=True)), np.linspace(0.0, 2.0, 801)[1:]
+        onset = np.cumsum([[0.0, phase["1-2"], phase["2-3"]], [phase["1-4"], phase["4-5"], phase["5-6"]]], axis=1)
+        protracted = (time[:, np.newaxis] - onset.ravel()) % 1.0  # since its onset, of a period
+        swings = protracted < 1.0 - self.duty_factor[start]
+        return footfall_html(repr(self), time * self.period[start], swings, f"start {start}")
+
+
+TOLD = ("1-2", "2-3", "1-4")
+"""Pairs whose phases are told in a line."""
 
 
 def gait(walk: Walk) -> Gait:

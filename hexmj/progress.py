@@ -1,19 +1,49 @@
-"""A progress bar on standard error for long work."""
+"""How far long work has come: a bar in a terminal or a notebook, lines elsewhere, all on standard error."""
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from threading import Event, Thread
+from time import monotonic
+from typing import Any
+
+from hexmj.checks import typed
+from hexmj.literal import literal
 
 Progress = Callable[[float], None]
 """Told the fraction of the work that has been done since the last call."""
 
+EVERY = 5.0
+"""Time from line to line where there is no bar [s]."""
+
+OFTEN = 0.2
+"""Least time from one state of a notebook's bar to the next [s]."""
+
+
+@contextmanager
+def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | None]:
+    """What a caller's `progress` comes to while the block runs: its function, a bar for True, else nothing.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    if typed("progress", progress, Progress | bool | None) is True:
+        with progress_bar(label) as told:
+            yield told
+    else:
+        yield progress or None
+
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
-    """Show a bar in a terminal while the block runs; call what it gives with the fraction done since the last call."""
-    if not (sys.stderr and sys.stderr.isatty()):
-        yield lambda _: None
-        return
+    """Show how far the block has come; call what it gives with the fraction done since the last call."""
+    way = _in_terminal if sys.stderr and sys.stderr.isatty() else _in_notebook if _is_notebook() else _in_lines
+    with way(label) as told:
+        yield told
+
+
+@contextmanager
+def _in_terminal(label: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
@@ -22,3 +52,58 @@ def progress_bar(label: str) -> Iterator[Progress]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=1.0)
         yield lambda done: bar.advance(task, done)
+
+
+def _is_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this."""
+    shell: Any = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
+@contextmanager
+def _in_notebook(label: str) -> Iterator[Progress]:
+    """The browser's own bar, which needs no widgets."""
+    from html import escape
+
+    from IPython.display import HTML, display
+
+    def bar(done: float) -> HTML:
+        return HTML(f'{escape(label)} <progress max="1" value="{done:.3f}"></progress> {done:.0%}')
+
+    shown: Any = display(bar(0.0), display_id=True)
+    sofar, drawn = 0.0, monotonic()
+
+    def told(done: float) -> None:
+        nonlocal sofar, drawn
+        sofar += done
+        if monotonic() - drawn > OFTEN:
+            shown.update(bar(sofar))
+            drawn = monotonic()
+
+    yield told
+    shown.update(bar(1.0))
+
+
+@contextmanager
+def _in_lines(label: str) -> Iterator[Progress]:
+    """A line every few seconds, however seldom anything is done."""
+    sofar, begun, over = 0.0, monotonic(), Event()
+
+    def told(done: float) -> None:
+        nonlocal sofar
+        sofar += done
+
+    def tell() -> None:
+        while not over.wait(EVERY):
+            gone = monotonic() - begun
+            left = f", about {gone / sofar - gone:.0f} s to go" if sofar > 0 else ""
+            with suppress(OSError, ValueError, AttributeError):  # closed, or nobody listens any more
+                print(f"{literal(label)}: {sofar:.0%} in {gone:.0f} s{left}", file=sys.stderr, flush=True)
+
+    teller = Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield told
+    finally:
+        over.set()
+        teller.join()

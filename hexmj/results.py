@@ -10,13 +10,43 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hexmj import netcdf
+from hexmj.attributes import attributes
+from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import remove_leftovers, sealed, try_writing, write_whole
-from hexmj.literal import literal
+from hexmj.files import read_bytes, remove_leftovers, sealed, try_writing, unsealed, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+
+def load(path: Path | str) -> "xr.Dataset":
+    """Read a result that a command, `save` or its own `to_netcdf` wrote; it is the same as when it was fresh.
+
+    Args:
+        path: such as "results/compare/comparison.nc".
+
+    Raises:
+        InputError: it cannot be read, is damaged, or is no NetCDF.
+    """
+    path = path_of(path)
+    content = read_bytes(path)
+    return netcdf.decode(unsealed(content) or content, f"{path} is damaged, or no NetCDF; expected a result of hexmj")
+
+
+def save(result: "xr.Dataset", path: Path | str) -> Path:
+    """Write a result as NetCDF, for `load` or any other reader; the file appears whole or not at all.
+
+    Args:
+        result: of `compare`, `flss`, any study or recording.
+        path: of the file; what stands there is overwritten.
+
+    Raises:
+        InputError: it is no dataset, holds what NetCDF cannot, or cannot be written.
+    """
+    import xarray as xr
+
+    return write_whole(path_of(path), sealed(netcdf.encode(typed("result", result, xr.Dataset))))
 
 
 def results_folder(path: Path, names: Sequence[str]) -> Path:
@@ -52,14 +82,7 @@ def _try(folder: Path, missing: Sequence[str]) -> None:
 def save_dataset(data: "xr.Dataset", path: Path) -> Path:
     """Write a dataset as NetCDF; settings that NetCDF has no type for become JSON text."""
     plain = data.copy()
-    plain.attrs = {
-        key: literal(value)
-        if type(value) is str
-        else value
-        if type(value) is float or (type(value) is int and abs(value) < 2**63)
-        else json.dumps(value, default=str)
-        for key, value in data.attrs.items()
-    }
+    plain.attrs = attributes({str(key): value for key, value in data.attrs.items()})
     return write_whole(path, sealed(netcdf.encode(plain)))
 
 

@@ -8,11 +8,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hexmj.checks import typed
+from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, Geometry
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Walk:
     """Where the tips are, seen from the centre of mass, and which of them stand.
 
@@ -49,13 +50,23 @@ class Walk:
                     f" shape {expected}: its steps, starts and legs"
                 )
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({extent(self)})"
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows."""
+        if len(self.time) < 2 or not self.stance.shape[1]:
+            return None
+        known = ~np.isnan(self.x[:, 0])
+        return footfall_html(repr(self), self.time, known & ~self.stance[:, 0], "start 0")
+
     @property
     def feet(self) -> np.ndarray:
         """(step, start, leg, 2) tips from the centre of mass: ahead, to the left [mm]."""
         return np.stack([self.x + np.array(self.geometry.origin), self.y], axis=-1)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlannedWalk(Walk):
     """A walk as planned, with what a body needs to lift and lower the feet."""
 
@@ -64,6 +75,15 @@ class PlannedWalk(Walk):
     the foot in time; NaN where nothing tells: then it is lowered once the leg stands."""
     height: np.ndarray = field(kw_only=True)
     """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
+
+
+def extent(walk: Walk) -> str:
+    """How many steps and starts a walk has, how long it is and how fast, in a line."""
+    steps, starts = walk.stance.shape[:2]
+    known = walk.velocity[np.isfinite(walk.velocity)]
+    ends = sorted({f"{v:.3g}" for v in (known.min(), known.max())}, key=float) if len(known) else ["unknown"]
+    end = f" to t = {walk.time[-1]:.4g} time units" if steps else ""
+    return f"{steps} steps{end}, {starts} start{'s' * (starts != 1)}, V = {' to '.join(ends)}"
 
 
 PLANNED = ("x", "y", "stance", "aep", "height")

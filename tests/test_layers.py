@@ -12,20 +12,20 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("as_run", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
-    ("progress", "results", "rotations", "same_numbers", "signals", "threads"),
+    ("as_run", "attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
+    ("pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
-    ("timing",),
+    ("diagrams", "timing"),
     ("stability", "walks"),
     ("starts",),
     ("controllers",),
-    ("gaits", "measures.figures", "measures.kinematic", "measures.velocities", "variants"),
+    ("gaits", "measures.kinematic", "measures.velocities", "variants"),
     ("bodies.description", "bodies.stick_insect", "conditions"),
     ("bodies",),
     ("physics",),
     ("measures",),
     ("paper", "search", "studies"),
-    ("environments", "replay"),
+    ("environments", "plots", "replay"),
     ("machine",),
     ("__main__", "cli"),
 )

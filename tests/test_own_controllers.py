@@ -58,7 +58,7 @@ def test_both_measures_beside_ldvs(own):
     assert both.speed.sel(controller="own").min() > 0.8
     alone = hexmj.physical_flss(own, [0.4], n_starts=12, window=80.0)
     assert alone.flss.item() == physical[0]
-    assert alone.attrs["controllers"][own.name]["name"] == own.name
+    assert hexmj.settings(alone)["controllers"][own.name]["name"] == own.name
 
 
 def test_it_is_recorded_and_shown_beside_its_plan(own, tmp_path):

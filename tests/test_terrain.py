@@ -25,6 +25,7 @@ from hexmj import (
     physical_walk,
     render,
 )
+from hexmj.attributes import settings
 from hexmj.bodies.grounds import beyond_the_ground, ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
@@ -138,7 +139,7 @@ def test_every_start_is_counted_once(few):
     flat, step = few.isel(obstacle=0), few.isel(obstacle=1)
     assert few.obstacle.values.tolist() == ["flat", "step 4 mm"]
     assert_array_equal(step.reached, flat.reached)
-    begin = few.attrs["conditions"]["ground_at"] - reach(Stride())[0]
+    begin = settings(few)["conditions"]["ground_at"] - reach(Stride())[0]
     before = few.fall * few.velocity <= begin
     assert_array_equal(few.reached + before.sum("start"), few.sizes["start"])
     assert_array_equal(before.isel(obstacle=0), before.isel(obstacle=1))

@@ -134,7 +134,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: flss(velocities=[True]), "velocities = [True]; expected numbers"),
     (lambda: flss(velocities=None), "velocities = None; expected numbers"),
     (lambda: flss(stride=[]), "stride = []; expected a Stride"),
-    (lambda: flss(progress=3), "progress = 3; expected a function or None"),
+    (lambda: flss(progress=3), "progress = 3; expected a function or True or False or None"),
     (lambda: flss(controller=None), "controller = None; expected a controller"),
     (lambda: over_range(low="a"), "low = 'a'; expected a number"),
     (lambda: over_range(high=None), "high = None; expected a number"),
@@ -186,7 +186,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: physical_walk(conditions={}), "conditions = {}; expected a Conditions"),
     (lambda: physical_walk(stride=3), "stride = 3; expected a Stride"),
     (lambda: physical_walk(duration="x"), "duration = 'x'; expected a number"),
-    (lambda: physical_walk(progress=3), "progress = 3; expected a function or None"),
+    (lambda: physical_walk(progress=3), "progress = 3; expected a function or True or False or None"),
     (lambda: physical_outcomes(settle(STARTS), LDVS, 0.3, "x"), "duration = 'x'; expected a number"),  # pyright: ignore
     (lambda: check_controller(LDVS, 3), "stride = 3; expected a Stride"),  # pyright: ignore
     (lambda: hexmj.loss_time(nan_tips()), "a foot that stands is at NaN or infinity"),
@@ -247,8 +247,8 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: compare({"a\nb": LDVS}), "a controller's name = 'a\\nb'; expected 1 to 200 printable characters"),
     (lambda: compare({1: LDVS}), "a controller's name = 1; expected a text"),
     (lambda: compare(executor=3), "executor = 3; expected an Executor or None"),
-    (lambda: compare(progress=object), "progress = <class 'object'>; expected a function or None"),
-    (lambda: compare(progress=3), "progress = 3; expected a function or None"),
+    (lambda: compare(progress=object), "progress = <class 'object'>; expected a function or True or False or None"),
+    (lambda: compare(progress=3), "progress = 3; expected a function or True or False or None"),
     (
         lambda: hexmj.walk(np.zeros((10**5, 6)), LDVS, 0.3, 1e5),
         "1000000 steps of 100000 starts, kept whole, take",

@@ -3,13 +3,13 @@
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from tyro.conf import arg
 
+from hexmj.attributes import settings
 from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand
@@ -55,9 +55,8 @@ class Compare(StudyCommand):
         """See `StudyCommand.outputs`."""
         from hexmj.measures.figures import comparison_figure
 
-        figure = partial(comparison_figure, told=self.conditions_line().replace("_", " "))
         others = "recording.nc", "gait.mp4"
-        return Outputs("comparing", "comparison.nc", {"comparison.png": figure}, others=others)
+        return Outputs("comparing", "comparison.nc", {"comparison.png": comparison_figure}, others=others)
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The video, unless it is left out or cannot be made."""
@@ -84,7 +83,7 @@ class Compare(StudyCommand):
             one = result.sel(controller=name)
             summary[name] = {key: one[key].values.tolist() for key in keys}
         durations = {"duration": result.duration.values.tolist()}
-        return summary | {"report": physical_report(result), "settings": result.attrs | durations}
+        return summary | {"report": physical_report(result), "settings": settings(result) | durations}
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The frequencies, what the starts did, the conditions, and how far the bodies did what they were told."""

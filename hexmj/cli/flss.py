@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.attributes import attributes, settings
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import ControllerName, Workers
+from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
 from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset
 from hexmj.starts import SAMPLE
@@ -33,6 +35,7 @@ class Flss(WalkingCommand):
     out: Path | None = None
     """Folder for figure, NetCDF and manifest; none are written unless given."""
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
 
     @property
     def kind(self) -> str:
@@ -51,9 +54,11 @@ class Flss(WalkingCommand):
         controller = self.controlled.controller(self.model)
         self.refuse_contact_gap(controller)
         if self.out:
-            results_folder(self.out, ("flss.nc", "flss.png", MANIFEST))
+            results_folder(self.out, ("flss.nc", self.drawn.named("flss.png"), MANIFEST))
+        elif self.drawn != Figures():
+            raise InputError(f"--format {self.drawn.format} without --out; expected it where a figure is written")
         table = self._measured(controller)
-        table.attrs = {"model": self.model, "physical": self.physical} | table.attrs
+        table.attrs |= attributes({"model": self.model, "physical": self.physical})
         self._print(table, self._write(table, controller, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
@@ -70,20 +75,18 @@ class Flss(WalkingCommand):
     def _write(self, table: "xr.Dataset", controller: Controller, out: Path) -> list[Path]:
         from hexmj.measures.figures import flss_figure
 
-        conditions = self.conditions_line(self.physical).replace("_", " ")
-        title = f"{controller.name}, {self.kind} FLSS, {self.n_starts} starts\n{conditions}"
         files = [
             save_dataset(table, out / "flss.nc"),
-            save_figure(flss_figure(table, title), out / "flss.png"),
+            save_figure(flss_figure(table), out / self.drawn.named("flss.png")),
         ]
-        return [*files, save_manifest(self, table.attrs, files, out / MANIFEST)]
+        return [*files, save_manifest(self, settings(table), files, out / MANIFEST)]
 
     def _print(self, table: "xr.Dataset", files: list[Path]) -> None:
         columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]
         report = physical_report(table) if self.physical else {}
         if self.json:
             lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
-            print_json(lists | ({"report": report} if report else {}) | {"settings": table.attrs, "files": files})
+            print_json(lists | ({"report": report} if report else {}) | {"settings": settings(table), "files": files})
             return
         columns = [name for name in columns if table[name].notnull().any()]  # no sample_sd of less than two samples
         rows = new_table("V", *columns)

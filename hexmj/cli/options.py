@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
-from typing import Annotated, Any, TypeVar, cast, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
 
 from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
 from tyro.constructors import (
@@ -149,6 +149,18 @@ class Controlled:
         found = [self.controller(name) for name in names]
         own = [one.name for one in found]
         return dict(zip(own if len(set(own)) == len(own) else names, found, strict=True))
+
+
+@dataclass(frozen=True)
+class Figures:
+    """How figures are written."""
+
+    format: Literal["png", "pdf", "svg"] = "png"
+    """Format of the figures: PNG for screens, PDF or SVG for print."""
+
+    def named(self, name: str) -> str:
+        """The name of a figure's file, from that of the PNG."""
+        return f"{name.removesuffix('.png')}.{self.format}"
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Controlled, Workers
+from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.files import read_toml
@@ -79,6 +79,7 @@ class Search(WalkingCommand):
     out: Path = Path("results/search")
     """Folder for what was found (TOML), the history (NetCDF), a figure, a manifest and all evaluations."""
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
 
     def run(self) -> None:
         """Search, judge what was found on fresh starts, write and print."""
@@ -95,7 +96,7 @@ class Search(WalkingCommand):
         self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
-        out = results_folder(self.out, ("history.nc", FOUND, "convergence.png", MANIFEST))
+        out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
         with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
         verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
@@ -200,6 +201,10 @@ class Search(WalkingCommand):
         return self.velocities or (v, v)
 
     @property
+    def _figure(self) -> str:
+        return self.drawn.named("convergence.png")
+
+    @property
     def _title(self) -> str:
         low, high = self._range
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
@@ -214,7 +219,7 @@ class Search(WalkingCommand):
         files = [
             save_dataset(found.history, self.out / "history.nc"),
             save_text(text, self.out / FOUND),
-            save_figure(convergence_figure(found.history, self._title), self.out / "convergence.png"),
+            save_figure(convergence_figure(found.history, self._title), self.out / self._figure),
         ]
         return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
 

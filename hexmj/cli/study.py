@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.attributes import settings
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Sweepers
+from hexmj.cli.options import Figures, Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.progress import progress_bar
 from hexmj.results import results_folder, save_dataset
@@ -29,7 +30,7 @@ class Outputs:
     data: str
     """Name of the NetCDF file."""
     figures: "Mapping[str, Callable[[xr.Dataset], Figure]]"
-    """By the names of their files."""
+    """By the names of their files as PNG."""
     manifest: str = MANIFEST
     """Name of its file."""
     others: tuple[str, ...] = ()
@@ -41,6 +42,7 @@ class StudyCommand(WalkingCommand):
     """Base of the commands that conduct a study."""
 
     sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
+    drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
     out: Path = Path("results")
     """Folder for figure, NetCDF, manifest and finished walks."""
 
@@ -67,16 +69,17 @@ class StudyCommand(WalkingCommand):
     def run(self) -> None:
         """Conduct the study in the folder, write its result, and print."""
         study, outputs = self.study(), self.outputs()
-        folder = results_folder(self.out, [outputs.data, *outputs.figures, outputs.manifest, *outputs.others])
+        figures = {self.drawn.named(name): draw for name, draw in outputs.figures.items()}
+        folder = results_folder(self.out, [outputs.data, *figures, outputs.manifest, *outputs.others])
         with progress_bar(outputs.doing) as progress, self.sweepers.executor() as executor:
             how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
             result = conduct(study, folder / "walks", **how)
         files = [
             save_dataset(result, folder / outputs.data),
-            *(save_figure(draw(result), folder / name) for name, draw in outputs.figures.items()),
+            *(save_figure(draw(result), folder / name) for name, draw in figures.items()),
             *self.write_others(result),
         ]
-        files.append(save_manifest(self, result.attrs, files, folder / outputs.manifest))
+        files.append(save_manifest(self, settings(result), files, folder / outputs.manifest))
         if self.json:
             print_json(self.summary(result) | {"files": files})
         else:
@@ -85,4 +88,4 @@ class StudyCommand(WalkingCommand):
 
 def lists_of(result: "xr.Dataset") -> dict[str, Any]:
     """All coordinates and variables of a result as lists, and its settings, for JSON."""
-    return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": result.attrs}
+    return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": settings(result)}

@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import ControllerName, Workers
+from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, save_figure, short, show
 from hexmj.conditions import FootPath, TimeScale
@@ -36,6 +36,7 @@ class Walk(WalkingCommand):
     out: Path = Path("results/walk")
     """Folder for the results."""
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
 
     def run(self) -> None:
         """Walk, and write recording, figure and manifest."""
@@ -46,7 +47,8 @@ class Walk(WalkingCommand):
         if not self.physical:
             self.refuse_physical("without --physical", SHOWN)
         controller = self.controlled.controller(self.model)
-        out = results_folder(self.out, ("recording.nc", "walk.png", MANIFEST))
+        figure = self.drawn.named("walk.png")
+        out = results_folder(self.out, ("recording.nc", figure, MANIFEST))
         title = f"{controller.name}, V = {self.velocity:g}"
         how: Any = {"physical": self.physical, "threads": self.workers.threads}
         walked = recorded(self, controller, self.velocity, self.start, title=title, **how)
@@ -55,7 +57,7 @@ class Walk(WalkingCommand):
         told |= {"conditions": self.conditions.settings()}
         files = [
             save_recording(walked, out / "recording.nc"),
-            save_figure(walk_figure(walked), out / "walk.png"),
+            save_figure(walk_figure(walked), out / figure),
         ]
         files.append(save_manifest(self, told, files, out / MANIFEST))
         summary = walk_summary(walked)
@@ -69,5 +71,5 @@ class Walk(WalkingCommand):
 def _told(key: str, value: Any) -> str:
     """A number of a walk; a time in words."""
     if key in TIMES:
-        return f"at {value:.4g} time units" if math.isfinite(value) else "none"
+        return f"at {value:.4g} time units" if math.isfinite(value) else "none within the walk"
     return short(value)

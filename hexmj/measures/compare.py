@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
-from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweeps import Cell, Execution, conduct, over_axes
 from hexmj.timing import Acceleration, Stride
@@ -95,13 +96,13 @@ class Comparison:
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
-        attributes = settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
-        return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes)
+        told = {"study": "compare"} | settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
+        return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes(told))
 
 
 def compare(
     controllers: Controller | Mapping[str, Controller],
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = Comparison.n_starts,
     window: str | float = Comparison.window,
@@ -116,8 +117,8 @@ def compare(
 
     Args:
         controllers: one, or several by name.
-        velocities: as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride` and
-            `acceleration`.
+        velocities: one or several, as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride`
+            and `acceleration`.
         n_starts: number of starts.
         window: observation time.
         seed: of the starts.
@@ -131,7 +132,7 @@ def compare(
         Over (controller, velocity): the three FLSS and that of `BESIDE` with their 95 % Wilson intervals
         (`kinematic`, `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT` and `agreement`, the
         fraction of starts for which kinematic and physical answer are the same; over (controller, velocity,
-        start) every field of `Outcomes`.
+        start) every field of `physics.outcomes.Outcomes`.
 
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
@@ -141,12 +142,12 @@ def compare(
         controllers = {controllers.name: controllers}
     typed("folder", folder, Path | str | None)
     walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
-    return conduct(Comparison(controllers, velocities, n_starts, window, seed, *walks), folder, **how)
+    return conduct(Comparison(controllers, several(velocities), n_starts, window, seed, *walks), folder, **how)
 
 
 def physical_flss(
     controller: Controller,
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = 200,
     window: str | float = Comparison.window,
@@ -174,7 +175,7 @@ def physical_flss(
     beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
     wanted = [*beside, "fall", *BESIDE.values(), *REPORTED]
     reported = result.isel(controller=0, drop=True)[wanted].drop_vars("duration")
-    return table.assign(reported.data_vars).assign_attrs(result.attrs)
+    return table.assign(reported.data_vars).assign_attrs(result.attrs | {"study": "flss"})
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
@@ -195,5 +196,5 @@ def _with_answers(data: "xr.Dataset") -> "xr.Dataset":
     """The numbers of starts in each case of `AGREEMENT` beside their outcomes."""
     lost, fell = data.planned_loss < np.inf, data.fall < np.inf
     answers = dict(zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True))
-    attributes = {"units": "1", "long_name": "number of starts"}
-    return data.assign({name: true.sum("start").assign_attrs(attributes) for name, true in answers.items()})
+    told = {"units": "1", "long_name": "number of starts"}
+    return data.assign({name: true.sum("start").assign_attrs(told) for name, true in answers.items()})

@@ -1,78 +1,99 @@
 """FLSS against velocity as figures, and what other figures share with them."""
 
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.attributes import settings
 from hexmj.literal import in_figure
+from hexmj.measures.captions import caption, conditions
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 MEASURE_COLOURS = {"kinematic": "#1b6ca8", "measured": "#e08e1b", "physical": "#b3261e", "toppled": "#6a4c93"}
-BESIDE = 0.03
+MEASURE_STYLES: dict[str, dict[str, Any]] = {
+    "kinematic": {"marker": "o", "linestyle": "-"},
+    "measured": {"marker": "s", "linestyle": "--"},
+    "physical": {"marker": "^", "linestyle": "-."},
+    "toppled": {"marker": "x", "linestyle": ":"},
+}
+"""What tells the measures apart where colours are not seen."""
+
+BESIDE = 0.024
 """Width in V_r / V_p over which the points of one velocity stand beside each other."""
 
-CONTROLLER_LINES = ("-", "--", ":", "-.")
-CONTROLLER_MARKERS = ("o", "s", "^", "D")
+IN_A_ROW = 3
+"""Panels of controllers beside each other, at most."""
+
+MOST_TICKS = 9
+"""Velocities that are written at an axis; of more, round numbers are."""
 
 
-def comparison_figure(result: "xr.Dataset", told: str = "") -> "Figure":
-    """FLSS against velocity, every measure and controller with its 95 % intervals, from `compare.compare`.
+def comparison_figure(result: "xr.Dataset") -> "Picture":
+    """FLSS against velocity with 95 % intervals, a panel for each controller, from `compare.compare`."""
+    from hexmj.pictures import head, picture
 
-    Args:
-        result: of all starts, FLSS over (controller, velocity).
-        told: stands in the title: window, conditions.
-    """
-    figure, axes = _flss_axes(7.2, 4.6)
-    styles: list[Any] = list(zip(CONTROLLER_LINES, CONTROLLER_MARKERS, strict=True)) * result.sizes["controller"]
-    beside = iter(np.linspace(-0.5, 0.5, len(MEASURE_COLOURS) * result.sizes["controller"]) * BESIDE)
-    for (line, marker), name in zip(styles, result.controller.values, strict=False):
+    names = result.controller.values
+    columns = min(IN_A_ROW, len(names))
+    rows = -(-len(names) // columns)
+    figure = picture(max(5.6, 3.4 * columns), 1.3 + 2.7 * rows)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    shifts = dict(zip(MEASURE_COLOURS, np.linspace(-0.5, 0.5, len(MEASURE_COLOURS)) * BESIDE, strict=True))
+    for axes, name in zip(panels.ravel(), names, strict=False):
         one = result.sel(controller=name)
         for measure, colour in MEASURE_COLOURS.items():
             low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
-            axes.errorbar(
-                one.velocity + next(beside), middle, [middle - low, high - middle],
-                color=colour, linestyle=line, marker=marker, markersize=4, capsize=2.5, linewidth=1.6,
-                label=f"{in_figure(name)}, {measure}",
+            _with_intervals(
+                axes, one.velocity + shifts[measure], low, middle, high,
+                color=colour, label=measure, **MEASURE_STYLES[measure],
             )  # fmt: skip
-    axes.legend(frameon=False, fontsize=9)
-    title = "Loss of static stability on paper (kinematic), under the feet (measured), and falls (physical)"
-    axes.set_title(_in_lines(f"{title}\n{result.sizes['start']} starts; {told}", 104), fontsize=8.5)
+        axes.set_title(in_figure(name), fontsize=10)
+        flss_axes(axes, result.velocity.values)
+    for n, axes in enumerate(panels.ravel()):
+        axes.set_visible(n < len(names))
+        axes.tick_params(labelbottom=n + columns >= len(names))
+        axes.set(xlabel=axes.get_xlabel() if n + columns >= len(names) else "", ylabel="" if n % columns else "FLSS")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
+    title = "Loss of static stability on paper (kinematic) and under the feet (measured); falls (physical)"
+    head(figure, title, caption(result))
     return figure
 
 
-def flss_figure(table: "xr.Dataset", title: str) -> "Figure":
-    """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.frequency_table`."""
-    figure, axes = _flss_axes(6.4, 4.2)
-    error = [table.flss - table.low, table.high - table.flss]
-    axes.errorbar(table.velocity, table.flss, error, marker="o", markersize=4, capsize=2.5, color="#1b6ca8")
-    axes.set_title(_in_lines(title, 96), fontsize=8.5)
-    return figure
+def flss_figure(table: "xr.Dataset") -> "Picture":
+    """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.flss` or `compare.physical_flss`."""
+    from hexmj.pictures import head, picture
 
-
-def _in_lines(title: str, width: int) -> str:
-    """A title, its lines of at most so many characters."""
-    return "\n".join(in_figure(line) for long in title.split("\n") for line in wrap(long, width))
-
-
-def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
-    """Begin and length of each stretch of time in which `on`, (step,), holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    step = time[1] - time[0] if len(time) > 1 else 0.0
-    return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _flss_axes(width: float, height: float) -> "tuple[Figure, Axes]":
-    """A figure of FLSS against velocity, with nothing in it yet; its size in inches."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure, told = picture(6.4, 4.2), settings(table)
+    kind = "physical" if conditions(told) else "kinematic"
     axes = figure.subplots()
-    axes.set(xlabel="velocity $V_r / V_p$", ylabel="FLSS", ylim=(-0.02, 1.02), xlim=(0.0, 1.0))
+    style = {"color": MEASURE_COLOURS[kind]} | MEASURE_STYLES[kind]
+    _with_intervals(axes, table.velocity, table.low, table.flss, table.high, **style)
+    flss_axes(axes, table.velocity.values)
+    head(figure, f"{kind} FLSS with 95 % intervals", caption(table))
+    return figure
+
+
+def velocity_ticks(axes: "Axes", velocities: np.ndarray) -> None:
+    """Ticks at the velocities that were walked, unless they are too many to be read."""
+    if len(velocities) <= MOST_TICKS:
+        axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
+
+
+def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
+    """Axes of FLSS against velocity."""
+    axes.set(xlabel="velocity $V_r / V_p$", xlim=(0.0, min(1.0, velocities.max() + 0.1)))
+    axes.set(ylabel="FLSS", ylim=(-0.02, 1.02))
+    velocity_ticks(axes, velocities)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
-    return figure, axes
+
+
+def _with_intervals(axes: "Axes", x: Any, low: Any, middle: Any, high: Any, **style: Any) -> None:
+    """A curve through frequencies with the intervals around them."""
+    dots: dict[str, Any] = {"markersize": 4.5, "capsize": 2.5, "linewidth": 1.6}
+    axes.errorbar(x, middle, [middle - low, high - middle], **dots | style)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.attributes import attributes
 from hexmj.checks import given, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
@@ -14,7 +15,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type, settin
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval, wilson_intervals
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.starts import SAMPLE, check_draw, draw_slabs
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk
@@ -77,7 +78,7 @@ def first_loss(
 
 def flss(
     controller: Controller,
-    velocities: Sequence[float],
+    velocities: Sequence[float] | float,
     *,
     n_starts: int = 7 * SAMPLE,
     window: str | float = "walk",
@@ -85,7 +86,7 @@ def flss(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
@@ -94,36 +95,36 @@ def flss(
 
     Args:
         controller: plans the walks.
-        velocities: V_r (when accelerating, its final value), each 0 <= V < 1.
+        velocities: V_r (when accelerating, its final value), one or several, each 0 <= V < 1.
         n_starts: N.
         window: 'walk', 'start' or the observation time itself [time units].
         seed: of the starts.
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11.
         threads: one per core unless given; the result does not depend on it.
-        progress: told the fraction done since it was last called.
+        progress: True shows a bar; or a function that is told the fraction done since it was last called.
 
     Returns:
         Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
         of 1000 starts, and the observation time `duration`.
     """
     stride = given("stride", stride, Stride)
-    typed("progress", progress, Progress | None)
     check_controller_type(controller)
     n_starts, seed = check_draw(n_starts, seed)
     v, duration = observed(velocities, window, stride, acceleration)
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     counts = []
-    for x in draw_slabs(n_starts, seed, stride):
-        lost = np.empty((len(v), len(x)), dtype=bool)
-        for i in range(len(v)):
-            lost[i] = np.isfinite(first_loss(x, controller, v[i], duration[i], **how))
-            if progress:
-                progress(len(x) / n_starts / len(v))
-        counts.append(losses_by_sample(lost))
-    return frequency_table(np.concatenate(counts, axis=1), n_starts, v, duration).assign_attrs(
-        settings({controller.name: controller}, window, n_starts, seed, stride, acceleration)
-    )
+    with shown(progress, "kinematic FLSS") as told:
+        for x in draw_slabs(n_starts, seed, stride):
+            lost = np.empty((len(v), len(x)), dtype=bool)
+            for i in range(len(v)):
+                lost[i] = np.isfinite(first_loss(x, controller, v[i], duration[i], **how))
+                if told:
+                    told(len(x) / n_starts / len(v))
+            counts.append(losses_by_sample(lost))
+    made = settings({controller.name: controller}, window, n_starts, seed, stride, acceleration)
+    table = frequency_table(np.concatenate(counts, axis=1), n_starts, v, duration)
+    return table.assign_attrs(attributes({"study": "flss"} | made))
 
 
 def flss_over_range(
@@ -176,7 +177,7 @@ def settings(
     stride: Stride,
     acceleration: Acceleration | None,
 ) -> dict[str, Any]:
-    """All that is needed to run a measure again, as plain data; it stands in every result's `attrs`."""
+    """All that is needed to run a measure again, as plain data; every result has it, see `attributes.settings`."""
     return {
         "controllers": {name: settings_of(one) for name, one in controllers.items()},
         "window": window,

@@ -10,17 +10,18 @@ from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
+from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
 from hexmj.physics.settling import Settled, settle
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, Walk, joined, part_of
+from hexmj.walks import PlannedWalk, Walk, extent, joined, part_of
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PhysicalWalk:
     """Physical walks kept whole.  After a fall everything measured is NaN, and no foot stands."""
 
@@ -44,6 +45,17 @@ class PhysicalWalk:
     """Of the walk."""
     stride: Stride
     """Of the plan."""
+
+    def __repr__(self) -> str:
+        return f"PhysicalWalk({extent(self.ordered)}; {self.outcomes!r})"
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows: the feet that are off the ground."""
+        if len(self.measured.time) < 2 or not self.measured.stance.shape[1]:
+            return None
+        known, fall = ~np.isnan(self.measured.x[:, 0]), self.outcomes.fall[0]
+        told = "start 0 as measured" + (f", which fell at {fall:.4g}" if np.isfinite(fall) else "")
+        return footfall_html(repr(self), self.measured.time, known & ~self.measured.stance[:, 0], told)
 
 
 def physical_outcomes(
@@ -108,7 +120,7 @@ def physical_walk(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> PhysicalWalk:
     """The physical walk of every start, kept whole.
 
@@ -121,17 +133,18 @@ def physical_walk(
         stride: of the plan.
         acceleration: the accelerating procedure of Eq. 11.
         threads: one per core unless given; the result does not depend on it.
-        progress: told the fraction done since it was last called.
+        progress: True shows a bar; or a function that is told the fraction done since it was last called.
 
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
     stride, conditions = given("stride", stride, Stride), given("conditions", conditions, Conditions)
-    typed("progress", progress, Progress | None)
-    planned = walk(starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
-    plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
-    settled = settle(starts, conditions, stride, threads)
-    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress)
+    with shown(progress, "walking") as told:
+        how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+        planned = walk(starts, controller, velocity, duration, **how)
+        plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
+        settled = settle(starts, conditions, stride, threads)
+        return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=told)
 
 
 def physical_walk_of_plan(

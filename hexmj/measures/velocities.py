@@ -1,6 +1,7 @@
 """The axis of velocities that tables lie along, with the observation time of each."""
 
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,21 @@ from hexmj.starts import checked_list
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 
 
+def several(velocities: Sequence[float] | float) -> Sequence[float]:
+    """Velocities as a list, one alone too."""
+    alone = isinstance(velocities, Real) and not isinstance(velocities, bool)
+    return [velocities] if alone else velocities  # pyright: ignore[reportReturnType]
+
+
 def observed(
-    velocities: Sequence[float], window: str | float, stride: Stride, acceleration: Acceleration | None = None
+    velocities: Sequence[float] | float, window: str | float, stride: Stride, acceleration: Acceleration | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The velocities of a table and their observation times [time units], both (velocity,), if they make sense.
 
     Raises:
         InputError: a velocity that is none or comes twice, or a time without steps.
     """
-    v = checked_list(velocities, acceleration)
+    v = checked_list(several(velocities), acceleration)
     duration = observation_time(window, v, stride, acceleration)
     steps_within(duration, stride)
     return v, duration

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.diagrams import spans
 from hexmj.gaits import PAIRS, circular_mean, wilson_phase
 from hexmj.legs import LEGS
-from hexmj.measures.figures import spans
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
 from hexmj.timing import WINDOWS
@@ -200,9 +200,9 @@ def _phase_figure(gaits: "xr.Dataset", colour: str) -> "tuple[Figure, xr.Dataset
 
 
 def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure
+    from hexmj.pictures import picture
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return picture(width, height)
 
 
 Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]

@@ -11,7 +11,8 @@ from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 WORDS = {
     "order": "order\nof updates",
@@ -23,12 +24,13 @@ WORDS = {
 COLOURS = {"walk": "#1b6ca8", "start": "#e08e1b"}
 
 
-def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Figure":
+def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Picture":
     """Held-out claims that agree, a dot for every reading and window, by each choice; bars are means."""
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    from hexmj.pictures import head, picture
+
+    figure = picture(11.0, 4.4)
     panels = figure.subplots(1, len(CHOICES), sharey=True, width_ratios=[len(one) for one in CHOICES.values()])
     count, shift = agreeing(scores).sel(constants="inferred"), dict(zip(COLOURS, (-0.13, 0.13), strict=True))
     for axes, (name, choices) in zip(panels, CHOICES.items(), strict=True):
@@ -52,8 +54,5 @@ def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Figu
         Line2D([], [], linestyle="", marker=".", color=one, label=f"window {name}") for name, one in COLOURS.items()
     ]
     figure.legend(handles=dots, frameon=False, fontsize=9, loc="outside lower center", ncols=2)
-    figure.suptitle(
-        f"{len(readings)} readings of the 1998 paper; the printed choice stands first; constants as inferred",
-        fontsize=11,
-    )
+    head(figure, f"{len(readings)} readings of the 1998 paper; the printed choice stands first; constants as inferred")
     return figure

@@ -18,6 +18,14 @@ from hexmj.walks import Walk
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
 
+HAPPENED = {
+    "lost on paper": "planned_loss",
+    "lost as measured": "measured_loss",
+    "fell": "fall",
+    "toppled": "topple",
+}
+"""What can happen to a start -> the time at which it did."""
+
 TOPPLED = 0.1
 """Tilt of the trunk beyond which it has toppled, whatever the direction [rad]; see `docs/falls.md`."""
 
@@ -28,7 +36,7 @@ LEAST_UPRIGHT = float(np.cos(TOPPLED))
 """Upward component of the trunk's vertical at that tilt."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Outcomes:
     """How every start went; times in time units, inf where it did not happen."""
 
@@ -59,6 +67,11 @@ class Outcomes:
     """(start,) fraction of joints times physics steps in which the torque stood at its limit."""
     unreachable: np.ndarray
     """(start,) tip targets out of reach; such a leg keeps its last angles and is counted here."""
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{name} {int(np.isfinite(getattr(self, time)).sum())}" for name, time in HAPPENED.items())
+        least = f"; least clearance {self.clearance.min():.3g} mm" if len(self.fall) else ""
+        return f"Outcomes(of {len(self.fall)}: {counts}{least})"
 
 
 def measured_walk(

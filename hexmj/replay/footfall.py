@@ -4,20 +4,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.diagrams import spans
 from hexmj.legs import LEGS
 from hexmj.literal import in_figure
-from hexmj.measures.figures import MEASURE_COLOURS, spans
+from hexmj.measures.figures import MEASURE_COLOURS
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 
-def walk_figure(recording: "xr.Dataset") -> "Figure":
+def walk_figure(recording: "xr.Dataset") -> "Picture":
     """Footfall diagram (bars are protraction) and stability margin over time, from a recording."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import picture
 
-    figure = Figure(figsize=(8.0, 4.8), layout="constrained")
+    figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time = recording.time.values
     physical = "measured_stance" in recording

@@ -8,16 +8,17 @@ from hexmj.literal import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 
-def convergence_figure(history: "xr.Dataset", title: str) -> "Figure":
+def convergence_figure(history: "xr.Dataset", title: str) -> "Picture":
     """Every candidate's cost and the least so far against the number of evaluations, from `History.dataset`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import picture
 
-    figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+    figure = picture(6.8, 4.2)
     axes = figure.subplots()
     evaluation = np.arange(1, history.sizes["evaluation"] + 1)
     for number, (stage, colour) in enumerate(STAGE_COLOURS.items()):

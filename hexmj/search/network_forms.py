@@ -87,7 +87,7 @@ class NetworkForm:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """See `Form.names`."""
+        """See `forms.Form.names`."""
         return FORMS[self.name].names
 
     @property
@@ -107,11 +107,11 @@ class NetworkForm:
         return np.where(neutral, -reach, 0.0), np.where(self.binary, 1.0, reach)
 
     def controller(self, vector: np.ndarray) -> Cruse1998:
-        """See `Form.controller`."""
+        """See `forms.Form.controller`."""
         return Cruse1998(FORMS[self.name].weights(vector), self.order, reading=self.reading)
 
     def vector(self, controller: Controller) -> np.ndarray:
-        """See `Form.vector`."""
+        """See `forms.Form.vector`."""
         if not isinstance(controller, Cruse1998):
             raise InputError(f"{controller.name} has no weights; expected a set of the 1998 network")
         vector = FORMS[self.name].vector(controller.weights)

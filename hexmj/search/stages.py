@@ -14,7 +14,7 @@ from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.locks import locked
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.search.covariance import CovarianceAdaptation
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
@@ -58,8 +58,8 @@ class Effort:
     domain: float = 10.0
     """Reach of the initial population [mm, or 1], see `Problem.domain`."""
     begin: Controller | None = None
-    """Where the population begins; without it at `Form.begin`, and with none there either at the paper's '0'-individual
-    (evolution) or in the middle of the domain (cmaes)."""
+    """Where the population begins; without it at `forms.Form.begin`, and with none there either at the paper's
+    '0'-individual (evolution) or in the middle of the domain (cmaes)."""
     starts: int = 500
     """Starts of each candidate."""
     budget: int = 1000
@@ -106,7 +106,7 @@ def search(
     *,
     folder: Path | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Found:
     """Search with a population, then refine the best of it; binary parameters stay as the first stage found them.
 
@@ -116,7 +116,7 @@ def search(
         folder: keeps every evaluation as it is made; none of them is made again, by this search or another of the same
             problem and starts.  It is held meanwhile, and another search has to wait.
         threads: one per core unless given; the result does not depend on it.
-        progress: told the fraction done since it was last called.
+        progress: True shows a bar; or a function that is told the fraction done since it was last called.
 
     Raises:
         InputError: settings that make no sense, a file that is damaged or cannot be written, a folder in use, or a
@@ -125,10 +125,9 @@ def search(
     """
     typed("problem", problem, Problem)
     typed("effort", effort, Effort)
-    typed("progress", progress, Progress | None)
     folder = None if folder is None else path_of(folder)
-    with locked(folder) if folder else nullcontext():
-        return _search(problem, effort, folder, threads, progress)
+    with shown(progress, "searching") as told, locked(folder) if folder else nullcontext():
+        return _search(problem, effort, folder, threads, told)
 
 
 def _search(

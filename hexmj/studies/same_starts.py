@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -60,8 +61,9 @@ class SameStarts:
         same = "controller", "n_starts", "seed", "stride", "acceleration"
         return Cell(name, function, {name: getattr(self, name) for name in same} | own, work)
 
-    def attributes(self, **own: Any) -> dict[str, Any]:
+    def attributes(self, study: str, **own: Any) -> dict[str, Any]:
         """All that is needed to run the study again: what all studies have, and its own; conditions but for lists."""
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         conditions = {name: value for name, value in self.conditions.settings().items() if name not in self.lists}
-        return settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
+        told = settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
+        return attributes({"study": study} | told)

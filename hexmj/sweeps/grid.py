@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import prepare
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.sweeps.cells import Cell, check_unedited
 from hexmj.sweeps.files import read, write
 
@@ -38,8 +38,8 @@ class Execution(TypedDict, total=False):
     executor: Executor | None
     """Computes them, in threads, processes or on other machines that see the folder; without one they are computed
     here, one after another."""
-    progress: Progress | None
-    """Told the fraction done since it was last called."""
+    progress: Progress | bool | None
+    """True shows a bar; or a function that is told the fraction done since it was last called."""
     threads: int | None
     """For each cell; one per core unless given, and a single one with an executor."""
 
@@ -51,7 +51,8 @@ def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) 
 
 def run(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[Execution]) -> list["xr.Dataset"]:
     """What the cells give, in their order; arguments and errors as of `finish`."""
-    found = dict(finish(cells, folder, **how))
+    with shown(how.get("progress"), "computing") as progress:
+        found = dict(finish(cells, folder, **how | {"progress": progress}))
     return [found[i] for i in range(len(cells))]
 
 

@@ -16,7 +16,7 @@ from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
-from hexmj.progress import Progress
+from hexmj.progress import Progress, shown
 from hexmj.replay.film import gl
 from hexmj.replay.film.encoder import encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
@@ -40,7 +40,7 @@ def render(
     recordings: Sequence[xr.Dataset],
     path: Path | str,
     film: Film | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     *,
     body: Body = STICK_INSECT,
 ) -> int:
@@ -50,7 +50,7 @@ def render(
         recordings: one to six; from four on they stand in two rows.
         path: of the film, an MP4 file; it appears whole or not at all.
         film: how it is filmed.
-        progress: told the fraction done since it was last called.
+        progress: True shows a bar; or a function that is told the fraction done since it was last called.
         body: the description of what was recorded.
 
     Returns:
@@ -77,8 +77,8 @@ def render(
     except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
         raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
     frames = max(1, round(max(take.duration for take in takes) * film.slow_motion * film.fps))
-    with replacing(path) as part:
-        _write(takes, part, frames, film, progress)
+    with shown(progress, "rendering") as told, replacing(path) as part:
+        _write(takes, part, frames, film, told)
     return frames
 
 

@@ -5,20 +5,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.literal import in_figure
+from hexmj.measures.captions import caption
 from hexmj.studies.ablation.study import MEASURES
 from hexmj.studies.league.study import REGIMES
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 
-def ablation_figure(result: "xr.Dataset") -> "Figure":
+def ablation_figure(result: "xr.Dataset") -> "Picture":
     """Frequencies of the whole, and below it how much more often it happens without a part, from `Ablation`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
     rows, velocities = result.sizes["controller"], [f"{v:g}" for v in result.velocity.values]
-    figure = Figure(figsize=(3.6 + 2.5 * len(MEASURES), 1.8 + 0.42 * rows), layout="constrained")
+    figure = picture(3.6 + 2.5 * len(MEASURES), 1.8 + 0.42 * rows)
     panels = figure.subplots(1, len(MEASURES), sharey=True)
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
@@ -49,9 +51,7 @@ def ablation_figure(result: "xr.Dataset") -> "Figure":
         for row in np.flatnonzero(wholes)[1:]:
             panel.axhline(row - 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
-    figure.suptitle(
-        f"What a part buys: frequencies of the whole, and differences without it (bold: the 95 % interval excludes 0);"
-        f" {result.attrs['n_starts']} starts, {result.attrs['n_physical']} in physics, {REGIMES} for the limit",
-        fontsize=10,
-    )
+    counts = f"{result.attrs['n_starts']} starts, {result.attrs['n_physical']} in physics, {REGIMES} for the limit"
+    heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
+    head(figure, heading, f"{counts}; {caption(result)}")
     return figure

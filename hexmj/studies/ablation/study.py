@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.named import load_controller
@@ -132,10 +133,11 @@ class Ablation:
         dims = "controller", "measure", "velocity"
         told = frequencies("frequency", happened, dims) | differences("more", happened, wholes, dims)
         axes = {"controller": names, "measure": list(MEASURES), "whole": ("controller", list(whole_of.values()))}
-        settings = {name: getattr(self, name) for name in ("n_starts", "n_physical", "periods", "seed")}
+        settings: dict[str, Any] = {"study": "ablate"}
+        settings |= {name: getattr(self, name) for name in ("n_starts", "n_physical", "periods", "seed")}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride), "window": "walk"}
         settings |= {"controllers": {name: plain(one) for name, one in self.controllers.items()}}
-        return xr.Dataset(told, axes, settings).assign_coords(velocity_axis(*self.observed))
+        return xr.Dataset(told, axes, attributes(settings)).assign_coords(velocity_axis(*self.observed))
 
 
 def _happened(one: "xr.Dataset") -> np.ndarray:

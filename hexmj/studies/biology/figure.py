@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.measures.captions import caption
 from hexmj.studies.biology.animals import ANIMALS
 from hexmj.studies.biology.names import JOINTS, SEGMENTS
 from hexmj.studies.drawing import tidy
@@ -11,7 +12,8 @@ from hexmj.studies.drawing import tidy
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 OURS, INSECTS = "#1b6ca8", "#e08e1b"
 COLOURS = ("#1b6ca8", "#2a9d5c", "#6a4c93")
@@ -32,11 +34,11 @@ BARS = {
 """Label of an axis -> what stands side by side there for each pair of legs."""
 
 
-def biology_figure(result: "xr.Dataset") -> "Figure":
+def biology_figure(result: "xr.Dataset") -> "Picture":
     """Two panels over the pairs of legs, means of a stride and of its stance; four over speed; from `Biology`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
-    figure = Figure(figsize=(11.0, 6.4), layout="constrained")
+    figure = picture(11.0, 6.4)
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
         _bars(panel, result.value.sel(speed=24.0), names)
@@ -45,11 +47,7 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
     axes[2].legend(frameon=False, fontsize=9)
-    figure.suptitle(
-        f"{next(iter(result.attrs['controllers']))} beside insects, {result.sizes['start']} starts; bars at 24 mm/s,"
-        " with standard deviations",
-        fontsize=11,
-    )
+    head(figure, "The walking insect beside measured ones; bars at 24 mm/s, with standard deviations", caption(result))
     return figure
 
 

@@ -81,7 +81,7 @@ class Biology(SameStarts):
             "source": [row.source for row in ANIMALS],
         }
         told = {name: ("row", values, {"units": "mm/s" if name == "at" else "1"}) for name, values in columns.items()}
-        return table.assign(told).assign_attrs(self.attributes(periods=self.periods, speeds=list(SPEEDS)))
+        return table.assign(told).assign_attrs(self.attributes("biology", periods=self.periods, speeds=list(SPEEDS)))
 
 
 def _mean(values: np.ndarray) -> tuple[float, float, float]:

@@ -4,30 +4,39 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.measures.captions import caption
+from hexmj.measures.figures import velocity_ticks
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
-COLOURS = {"none": "#b3261e", "reorganise": "#1b6ca8", "slow_down": "#2a9d5c", "grasp": "#e08e1b"}
-"""Strategy -> colour."""
+    from hexmj.pictures import Picture
+
+STYLES: dict[str, dict[str, Any]] = {
+    "none": {"color": "#b3261e", "marker": "o", "linestyle": "-"},
+    "reorganise": {"color": "#1b6ca8", "marker": "s", "linestyle": "--"},
+    "slow_down": {"color": "#2a9d5c", "marker": "^", "linestyle": "-."},
+    "grasp": {"color": "#e08e1b", "marker": "D", "linestyle": (0, (5, 1))},
+}
+"""Of the strategies."""
 UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
 ROWS = {"kinematic": "on paper (kinematic)", "physical": "falls (physical)"}
 """Measure -> what its row of panels is called."""
 
 
-def disturbed_figure(result: "xr.Dataset") -> "Figure":
+def disturbed_figure(result: "xr.Dataset") -> "Picture":
     """A column of panels for each disturbance, a row for each measure; window `whole`, from `DisturbedWalks`."""
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+
+    from hexmj.pictures import head, picture
 
     names, strategies = result.disturbance.values, result.strategy.values
     kinds = list(dict.fromkeys(names[1:]))
     measures = [measure for measure in ROWS if measure in result]
-    figure = Figure(figsize=(2.2 + 2.5 * len(kinds), 1.4 + 2.5 * len(measures)), layout="constrained")
+    figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
-    used = [strategy for strategy in COLOURS if strategy in strategies]
+    used = [strategy for strategy in STYLES if strategy in strategies]
     shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
     one = result.sel(window="whole")
     for (row, column), axes in np.ndenumerate(panels):
@@ -39,21 +48,20 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
         axes.plot(one.velocity, one[measure].isel(case=0), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
             strategy = strategies[case]
-            x, colour = one.velocity + shifts[strategy], COLOURS[strategy]
-            frequency_curve(axes, x, one.isel(case=case), measure, color=colour)
+            x = one.velocity + shifts[strategy]
+            frequency_curve(axes, x, one.isel(case=case), measure, **STYLES[strategy])
         axes.set(ylim=(-0.03, 1.03))
+        velocity_ticks(axes, one.velocity.values)
         tidy(axes)
     for column, kind in enumerate(kinds):
         panels[0, column].set_title(_title(kind), fontsize=10)
         panels[-1, column].set_xlabel("velocity $V_r / V_p$")
     for row, measure in enumerate(measures):
-        panels[row, 0].set_ylabel(f"FLSS {ROWS[measure]}", fontsize=9)
-    entries = [Line2D([], [], color=COLOURS[one], marker="o", label=one.replace("_", " ")) for one in used]
+        panels[row, 0].set_ylabel(f"FLSS {ROWS[measure]}")
+    entries = [Line2D([], [], markersize=4, label=one.replace("_", " "), **STYLES[one]) for one in used]
     entries.append(Line2D([], [], **UNDISTURBED, label="undisturbed"))
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
-    figure.suptitle(
-        f"After a disturbance in mid-walk: {result.sizes['start']} starts at each velocity, 95 % intervals", fontsize=10
-    )
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption(result))
     return figure
 
 

@@ -5,25 +5,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.literal import in_figure
+from hexmj.measures.captions import caption
 from hexmj.studies.league.table import by_rank
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 LOSSES, SHARES, COSTS, PHASES = "YlOrRd", "YlGn", "PuBu", "twilight"
 """Colours of what is bad, good, costly and periodic."""
 
 
-def league_figure(result: "xr.Dataset") -> "Figure":
+def league_figure(result: "xr.Dataset") -> "Picture":
     """Heat maps of all measures, the best in physics at the top, from `League`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
     shown = by_rank(result)
     velocities, rows = [f"{v:g}" for v in shown.velocity.values], shown.sizes["entrant"]
     width = 5.0 + 1.35 * len(velocities)
-    figure = Figure(figsize=(max(13.0, width), 2.6 + 0.52 * rows), layout="constrained")
+    figure = picture(max(13.0, width), 2.6 + 0.52 * rows)
     panels = figure.subplots(2, 4, sharey=True)
     n = {key: int(shown[f"{key}_starts"].max()) for key in ("kinematic", "physical", "fell")}
     over_v: dict[str, tuple[str, str, float]] = {
@@ -46,7 +48,7 @@ def league_figure(result: "xr.Dataset") -> "Figure":
     _dots(rest[7], shown)
     first.set_yticks(range(rows), [in_figure(name) for name in shown.entrant.values])
     first.set_ylim(rows - 0.5, -0.5)
-    figure.suptitle(f"The league, best in physics first; window {result.attrs['window']}", fontsize=12)
+    head(figure, "The league, best in physics first", caption(result))
     return figure
 
 

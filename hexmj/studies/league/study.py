@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
@@ -112,10 +113,10 @@ class League:
             "seed",
             "accelerating",
         )
-        settings = {name: plain(getattr(self, name)) for name in told}
+        settings: dict[str, Any] = {"study": "league"} | {name: plain(getattr(self, name)) for name in told}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
         settings["controllers"] = {name: plain(entrant) for name, entrant in self.entrants.items()}
-        return standings(self, dict(zip(self.named_cells(), data, strict=True))).assign_attrs(settings)
+        return standings(self, dict(zip(self.named_cells(), data, strict=True))).assign_attrs(attributes(settings))
 
     def _on_paper(self, entrant: Entrant) -> dict[str, Cell]:
         """Losses at every velocity."""

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.measures.captions import caption
 from hexmj.studies.stability_map.mechanisms import SAVED
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 MECHANISM_COLOURS = {
     "never_lost": "#e4e4e4",
@@ -26,6 +28,9 @@ MECHANISM_COLOURS = {
 }
 """Grey where nothing happened, greens for the saved, warm colours for falls after a planned loss, violet for others."""
 
+HATCHES = {"tipped_behind": "//", "tipped_ahead": "\\\\", "thrown": "xx", "unplanned": "..", "narrow": "--"}
+"""Of those that fell, where colours are not seen."""
+
 BAR: Mapping[str, Any] = {"marker": "_", "linestyle": "none"}
 MARKS: Mapping[str, Mapping[str, Any]] = {
     "physical": {"color": "0.1", "markersize": 22, "markeredgewidth": 1.8},
@@ -34,12 +39,12 @@ MARKS: Mapping[str, Mapping[str, Any]] = {
 """Measure -> the mark above which its starts lie."""
 
 
-def map_figure(result: "xr.Dataset") -> "Figure":
+def map_figure(result: "xr.Dataset") -> "Picture":
     """Physical FLSS above the kinematic one, and how many static losses dynamics saves, from `StabilityMap`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
     rows, columns = result.sizes["value"], result.sizes["velocity"]
-    figure = Figure(figsize=(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1)), layout="constrained")
+    figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
     physical, saved = figure.subplots(1, 2, sharey=True)
     numbers = np.concatenate([result.kinematic.values[:1], result.physical.values])
     words = [[f"{number:.2f}" for number in row] for row in numbers]
@@ -64,23 +69,24 @@ def map_figure(result: "xr.Dataset") -> "Figure":
         axes.set_title(title, fontsize=11)
         axes.set_xticks(range(columns), [f"{v:g}" for v in result.velocity.values])
         axes.set_xlabel("velocity $V_r / V_p$")
-    figure.suptitle(_title(result), fontsize=10)
+    head(figure, "What falls in physics, and what dynamics saves", caption(result))
     return figure
 
 
-def mechanisms_figure(result: "xr.Dataset") -> "Figure":
+def mechanisms_figure(result: "xr.Dataset") -> "Picture":
     """What happened to every start, a panel for each velocity, from `StabilityMap`."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
     columns, total = result.sizes["velocity"], result.sizes["start"]
-    figure = Figure(figsize=(max(8.0, 2.6 + 2.3 * columns), 4.6), layout="constrained")
+    figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
     panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
     values = [f"{value:g}" for value in result.value.values]
     for panel, v in zip(panels, result.velocity.values, strict=True):
         bottom = np.zeros(len(values))
         for name, colour in MECHANISM_COLOURS.items():
             share = result["count"].sel(velocity=v, mechanism_name=name).values / total
-            panel.bar(values, share, 0.82, bottom, color=colour, label=name.replace("_", " "))
+            style = {"color": colour, "hatch": HATCHES.get(name), "edgecolor": "0.25", "linewidth": 0.0}
+            panel.bar(values, share, 0.82, bottom, label=name.replace("_", " "), **style)
             bottom = bottom + share
         for measure, style in MARKS.items():
             panel.plot(values, 1.0 - result[measure].sel(velocity=v).values, **BAR, **style)
@@ -90,7 +96,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
     panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
-    figure.suptitle(_title(result), fontsize=10)
+    head(figure, "What happened to every start", caption(result))
     return figure
 
 
@@ -110,15 +116,3 @@ def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: st
 def _label(result: "xr.Dataset") -> str:
     name, unit = result.value.attrs["long_name"], result.value.attrs["units"]
     return name.replace("V_p", "$V_p$") + (f" [{unit}]" if unit != "1" else "")
-
-
-def _title(result: "xr.Dataset") -> str:
-    conditions, over = result.attrs["conditions"], result.attrs["over"]
-    named = {
-        "vp": "$V_p$ = {:g} mm/s",
-        "step_height": "step height {:g} mm",
-        "standing_height": "standing height {:g} mm",
-        "friction": "friction {:g}",
-    }
-    others = ", ".join(words.format(conditions[name]) for name, words in named.items() if name != over)
-    return f"{result.sizes['start']} starts at every cell, window {result.attrs['window']}; {others}"

@@ -1,16 +1,30 @@
 """The static limit as a figure: FLSS, agreement and distances from the plan against V_p."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hexmj.measures.figures import CONTROLLER_LINES, MEASURE_COLOURS
+from hexmj.measures.captions import caption
+from hexmj.measures.figures import MEASURE_COLOURS
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 COLOURS = MEASURE_COLOURS | {"grounded": "#46a35e"}
+
+LINES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
+"""Of the masses of the legs in turn."""
+
+MARKERS = {
+    "measured": "s",
+    "grounded": "D",
+    "physical": "^",
+    "centre of pressure": "v",
+    "measured, same feet stand": "o",
+}
+"""Of what is told in the legends."""
 
 PANELS = {  # label of the axis, then for each curve its colour and name
     "agreement": (
@@ -34,22 +48,23 @@ PANELS = {  # label of the axis, then for each curve its colour and name
 }
 
 
-def static_limit_figure(result: "xr.Dataset") -> "Figure":
+def static_limit_figure(result: "xr.Dataset") -> "Picture":
     """Four panels against V_p, a kind of line for each mass of the legs, from `StaticLimit`."""
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(9.6, 7.0), layout="constrained")
+    from hexmj.pictures import head, picture
+
+    figure = picture(9.6, 7.0)
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
-    lines = dict(zip(result.leg_mass.values, CONTROLLER_LINES * len(result.leg_mass), strict=False))
+    lines: dict[float, Any] = dict(zip(result.leg_mass.values, LINES * len(result.leg_mass), strict=False))
     for mass, line in lines.items():
         one, first = result.sel(leg_mass=mass), mass == result.leg_mass[0]
         _frequencies(axes["flss"], one, line, first)
         for panel, (_, curves) in PANELS.items():
             for name, (colour, label) in curves.items():
                 values = one[name].mean("start") if "start" in one[name].dims else one[name]
-                style = {"color": colour, "marker": "o", "markersize": 4, "linewidth": 1.6}
-                axes[panel].plot(one.vp, values, line, label=label if first and label else None, **style)
+                style = {"color": colour, "marker": MARKERS.get(label, "o"), "markersize": 4.5, "linewidth": 1.6}
+                axes[panel].plot(one.vp, values, linestyle=line, label=label if first and label else None, **style)
     axes["flss"].set(ylabel="FLSS", ylim=(-0.02, 1.02))
     axes["agreement"].set(ylim=(-0.02, 1.02))
     for panel, (label, _) in PANELS.items():
@@ -62,15 +77,11 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
             one.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
     masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
     axes["drift"].legend(handles=masses, frameon=False, fontsize=9)
-    figure.suptitle(
-        f"As $V_p$ goes to zero: {result.sizes['start']} starts, V = {result.attrs['velocity']:g},"
-        f" window {result.attrs['window']}, with 95 % intervals",
-        fontsize=11,
-    )
+    head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
     return figure
 
 
-def _frequencies(axes: "Axes", one: "xr.Dataset", line: str, first: bool) -> None:
+def _frequencies(axes: "Axes", one: "xr.Dataset", line: Any, first: bool) -> None:
     """The FLSS at one mass of the legs; the kinematic one, a band, depends on no mass and no V_p."""
     if first:
         low, middle, high = (one[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
@@ -78,8 +89,8 @@ def _frequencies(axes: "Axes", one: "xr.Dataset", line: str, first: bool) -> Non
         axes.axhline(middle, color=MEASURE_COLOURS["kinematic"], linewidth=1.6, label="kinematic")
     shift = 0.97 if first else 1.03
     for measure in ("measured", "grounded", "physical"):
-        style = {"linestyle": line, "color": COLOURS[measure], "label": measure if first else None}
-        frequency_curve(axes, one.vp * shift, one, measure, **style)
+        style = {"linestyle": line, "color": COLOURS[measure], "marker": MARKERS[measure]}
+        frequency_curve(axes, one.vp * shift, one, measure, label=measure if first else None, **style)
 
 
 def _v_axis(axes: "Axes", result: "xr.Dataset") -> None:

@@ -1,15 +1,17 @@
 """Obstacles as a figure: FLSS once an obstacle has been reached, against its size."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.measures.captions import caption
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 SIZES = {
     "step": "height of the step [mm]",
@@ -19,17 +21,23 @@ SIZES = {
 }
 """Kind of ground -> label of its axis."""
 
-COLOURS = ("#1b6ca8", "#2a9d5c", "#e08e1b", "#b3261e", "#6a4c93")
+STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
+    {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
+    {"color": "#e08e1b", "marker": "^", "linestyle": "-."},
+    {"color": "#b3261e", "marker": "D", "linestyle": ":"},
+    {"color": "#6a4c93", "marker": "v", "linestyle": "-"},
+)
 """Of the velocities in turn."""
 
 
-def terrain_figure(result: "xr.Dataset") -> "Figure":
+def terrain_figure(result: "xr.Dataset") -> "Picture":
     """A column for each kind of ground, a row for each grasp, a colour for each velocity; flat ground is at 0 mm."""
-    from matplotlib.figure import Figure
+    from hexmj.pictures import head, picture
 
     kinds, grasps = list(dict.fromkeys(result.ground.values[1:])), result.grasp.values
-    size = (1.0 + 2.8 * len(kinds), 1.0 + 2.6 * len(grasps))
-    figure = Figure(figsize=size, layout="constrained")
+    size = (max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
+    figure = picture(*size)
     panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
     for row, grasp in zip(panels, grasps, strict=True):
         for axes, kind in zip(row, kinds, strict=True):
@@ -38,13 +46,9 @@ def terrain_figure(result: "xr.Dataset") -> "Figure":
         row[0].set_ylabel(f"FLSS, grasp {grasp:g}")
     for axes, kind in zip(panels[-1], kinds, strict=True):
         axes.set_xlabel(SIZES[kind])
-    panels[0, 0].legend(frameon=False, fontsize=9, loc="upper left")
-    conditions = result.attrs["conditions"]
-    figure.suptitle(
-        f"Falls once the obstacle has been reached, of {result.sizes['start']} starts; $V_p$ = {conditions['vp']:g}"
-        f" mm/s, standing height {conditions['standing_height']:g} mm, with 95 % intervals",
-        fontsize=10,
-    )
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=min(5, len(labels)))
+    head(figure, "Falls once the obstacle has been reached, with 95 % intervals", caption(result))
     return figure
 
 
@@ -52,8 +56,8 @@ def _curves(axes: "Axes", one: "xr.Dataset") -> None:
     """FLSS against size, (obstacle, velocity), with its intervals side by side."""
     sizes, count = one["size"].values, one.sizes["velocity"]
     shifts = (np.arange(count) - (count - 1) / 2) * 0.02 * sizes.max()
-    for v, colour, shift in zip(one.velocity.values, COLOURS * count, shifts, strict=False):
-        frequency_curve(axes, sizes + shift, one.sel(velocity=v), "flss", color=colour, label=f"V = {v:g}")
+    for v, style, shift in zip(one.velocity.values, STYLES * count, shifts, strict=False):
+        frequency_curve(axes, sizes + shift, one.sel(velocity=v), "flss", label=f"V = {v:g}", **style)
     axes.set(ylim=(-0.02, 1.02))
     axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
     tidy(axes)

@@ -3,13 +3,15 @@
 from typing import TYPE_CHECKING
 
 from hexmj.literal import in_figure
+from hexmj.measures.captions import caption
 from hexmj.studies.drawing import tidy
 from hexmj.studies.variants.study import notes
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from hexmj.pictures import Picture
 
 COLOURS = {
     "centred": "#6a4c93",
@@ -24,15 +26,16 @@ COLOURS = {
 """Of the variants whose names begin so."""
 
 
-def variants_figure(result: "xr.Dataset") -> "Figure":
+def variants_figure(result: "xr.Dataset") -> "Picture":
     """A panel for each velocity, a row for each set, a dot for each variant, from `Variants`."""
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+
+    from hexmj.pictures import head, picture
 
     columns = min(2, result.sizes["velocity"])
     rows = -(-result.sizes["velocity"] // columns)
     size = 1.4 + 4.6 * columns, 1.5 + rows * (0.9 + 0.36 * result.sizes["network"])
-    figure = Figure(figsize=size, layout="constrained")
+    figure = picture(*size)
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for panel, velocity in zip(panels, result.velocity.values, strict=False):
         _panel(panel, result.sel(velocity=velocity))
@@ -44,10 +47,8 @@ def variants_figure(result: "xr.Dataset") -> "Figure":
     marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
     handles = [Line2D([], [], color="0.1", label=name, **dots | mark) for name, mark in marks.items()] + handles
     figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
-    figure.suptitle(
-        f"FLSS with one constant or rule changed at a time; {result.sizes['start']} starts,"
-        f" window {result.attrs['window']}",
-        fontsize=11,
+    head(
+        figure, "FLSS with one constant or rule changed at a time", f"{result.sizes['start']} starts; {caption(result)}"
     )
     figure.supxlabel("\n".join(map(in_figure, notes(result))), fontsize=9)
     return figure

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import Cruse1998
@@ -117,7 +118,8 @@ class Variants:
         table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
         table["instead"] = lost.copy(data=self._instead()).assign_attrs(units="1")
         told = ("window", "n_starts", "seed", "acceleration", "conditions", "networks")
-        return table.assign_attrs({name: plain(getattr(self, name)) for name in told} | self._stride)
+        settings = {name: plain(getattr(self, name)) for name in told} | self._stride
+        return table.assign_attrs(attributes({"study": "variants"} | settings))
 
     def _instead(self) -> np.ndarray:
         """See `result`, (network, variant, velocity)."""

@@ -1,0 +1,86 @@
+"""What a figure's title tells of a result: who walked, from how many starts, how long, under which conditions."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from hexmj.attributes import settings
+from hexmj.conditions import OBEYED, Conditions
+from hexmj.literal import in_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WORDS = {
+    "vp": "$V_p$ = {:g} mm/s",
+    "step_height": "step height {:g} mm",
+    "standing_height": "standing height {:g} mm",
+    "lift_time": "lift time {:g} ms",
+    "landing_time": "landing time {:g} ms",
+    "load": "load {:g} times the weight",
+    "centre_of_mass": "centre of mass {:g} mm ahead of O",
+    "leg_mass": "legs' mass x {:g}",
+    "friction": "friction {:g}",
+    "grasp": "grasp {:g}",
+    "ground": "ground: {}",
+    "ground_height": "{:g} mm high",
+    "ground_at": "obstacle at {:g} mm",
+    "ground_length": "{:g} mm long",
+    "ground_seed": "seed {:g} of the bumps",
+    "longest_substep": "physics steps of at most {:g} ms",
+    "contact_gap": "contact gap {:g} ms",
+    "settling_time": "settling {:g} ms",
+    "body": "body {}",
+}
+"""Condition -> how it is told."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+"""Between a condition's number and its unit, which stay in one line."""
+
+FEW = 3
+"""Most controllers whose names a title tells."""
+
+
+def caption(result: "xr.Dataset") -> str:
+    """One line for the title of a figure: all that was chosen, and of the conditions V_p and what is not as usual."""
+    told = settings(result)
+    return "; ".join(filter(None, [controllers(told), *_walks(told), conditions(told)]))
+
+
+def controllers(told: Mapping[str, Any]) -> str:
+    """The names of a result's controllers as they stand in figures, with what is not as printed in 1998; few only."""
+    several = told.get("controllers", {})
+    return ", ".join(f"{in_figure(name)}{_rules(one)}" for name, one in several.items()) if len(several) <= FEW else ""
+
+
+def conditions(told: Mapping[str, Any]) -> str:
+    """V_p and the conditions that are not the usual ones; nothing of a result on paper."""
+    given = told.get("conditions") or {}
+    usual, obeyed = Conditions().settings(), OBEYED[given.get("ground", "flat")]
+    shown = {name for name, value in given.items() if name == "vp" or name in obeyed or value != usual[name]}
+    words = [WORDS[name].format(given[name]).replace(" ", NO_BREAK) for name in WORDS if name in shown]
+    return ", ".join(words)
+
+
+def _walks(told: Mapping[str, Any]) -> list[str]:
+    """Starts, window, seed and acceleration, as far as a result has them."""
+    words = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
+    found = [word.format(told[name]) for name, word in words.items() if name in told]
+    if acceleration := told.get("acceleration"):
+        found.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
+    return found
+
+
+def _rules(controller: Any) -> str:
+    """Order of updates and reading of a set of the network, where they are not as printed."""
+    if not isinstance(controller, Mapping):
+        return ""
+    if "controller" in controller:
+        return _rules(controller["controller"])
+    reading = controller.get("reading")
+    found = [f"{controller['order']} order"] if controller.get("order", "printed") != "printed" else []
+    if isinstance(reading, Mapping):
+        from hexmj.controllers.cruse1998.readings import Reading, in_words
+
+        chosen = Reading(**{name: value for name, value in reading.items() if name != "class"})
+        found += [f"reading {in_words(chosen)}"] if chosen != Reading() else []
+    return f" ({', '.join(found)})" if found else ""

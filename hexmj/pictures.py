@@ -1,0 +1,25 @@
+"""Figures that show themselves in a notebook, made without pyplot."""
+
+import io
+
+from matplotlib.figure import Figure
+
+
+class Picture(Figure):
+    """A figure of matplotlib; what it can do is in its documentation, first of all `savefig`."""
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        drawn = io.BytesIO()
+        self.savefig(drawn, format="png", dpi=100)
+        return drawn.getvalue()
+
+
+def picture(width: float, height: float) -> Picture:
+    """An empty figure, its size in inches, whose parts make room for each other."""
+    return Picture(figsize=(width, height), layout="constrained")
+
+
+def head(figure: Figure, *lines: str) -> None:
+    """The title of a figure, in lines that are broken where they do not fit."""
+    figure.suptitle("\n".join(filter(None, lines)), fontsize=10, wrap=True)

@@ -1,0 +1,62 @@
+"""The figure that belongs to a result, fresh or read from its file."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from hexmj.checks import typed
+from hexmj.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.pictures import Picture
+
+FIGURES: dict[str, dict[str, str]] = {
+    "flss": {"flss": "measures.figures:flss_figure"},
+    "compare": {"comparison": "measures.figures:comparison_figure"},
+    "map": {
+        "map": "studies.stability_map.figure:map_figure",
+        "mechanisms": "studies.stability_map.figure:mechanisms_figure",
+    },
+    "converge": {"converge": "studies.static_limit.figure:static_limit_figure"},
+    "terrain": {"terrain": "studies.terrain.figure:terrain_figure"},
+    "disturb": {"disturb": "studies.disturbance.figure:disturbed_figure"},
+    "variants": {"variants": "studies.variants.figure:variants_figure"},
+    "biology": {"biology": "studies.biology.figure:biology_figure"},
+    "league": {"league": "studies.league.figure:league_figure"},
+    "ablate": {"ablation": "studies.ablation.figure:ablation_figure"},
+    "recording": {"walk": "replay.footfall:walk_figure"},
+}
+"""What a result is of, as its attribute `study` tells -> its figures by name, each a module and a function of it."""
+
+
+def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
+    """Draw a result; a notebook shows the figure, and `savefig` of it writes PNG, PDF or SVG.
+
+    Args:
+        result: of `compare`, `flss`, `physical_flss`, `record` or a study, fresh or as `load` reads it.
+        which: of several figures; the first one unless given.
+
+    Raises:
+        InputError: a dataset that no figure belongs to, or no such figure.
+    """
+    import xarray as xr
+
+    figures = FIGURES.get(_study(typed("result", result, xr.Dataset)))
+    if figures is None:
+        raise InputError(
+            f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
+            f" hexmj.load reads, of {', '.join(FIGURES)}"
+        )
+    chosen = next(iter(figures)) if which is None else which
+    if chosen not in figures:
+        raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
+    module, _, name = figures[chosen].partition(":")
+    draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
+    return draw(result)
+
+
+def _study(result: "xr.Dataset") -> str:
+    """What a dataset is of, a key of `FIGURES` if it is a result."""
+    return "recording" if "planned_stance" in result else str(result.attrs.get("study", ""))

@@ -1,0 +1,171 @@
+"""Results are the same after they were saved and loaded, and so is the figure that is drawn of them."""
+
+import io
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+from PIL import Image
+
+import hexmj
+from hexmj.errors import InputError
+from hexmj.plots import FIGURES
+from hexmj.sweeps import Study, conduct
+
+ALPHA = "ß: 1 $"
+"""A name that JSON escapes, and that figures would set as a formula."""
+
+
+def pixels(result: xr.Dataset, which: str | None = None) -> bytes:
+    """The figure of a result."""
+    drawn = io.BytesIO()
+    hexmj.plot(result, which).savefig(drawn, format="rgba", dpi=50)
+    return drawn.getvalue()
+
+
+def flss() -> xr.Dataset:
+    return hexmj.flss(hexmj.ReadsLegs(hexmj.LDVS), [0.3, 0.5], n_starts=40, seed=2**70)
+
+
+def compared() -> xr.Dataset:
+    conditions = hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5)
+    slow = hexmj.Acceleration(rate=0.01)
+    models = {ALPHA: hexmj.LDVS, "null": hexmj.load_controller("graham")}
+    how: Any = {"n_starts": 3, "window": 20.0, "conditions": conditions, "acceleration": slow}
+    return hexmj.compare(models, [0.3, 0.5], **how)
+
+
+def fallen() -> xr.Dataset:
+    return hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=2, window=10.0)
+
+
+def recorded() -> xr.Dataset:
+    return hexmj.record(hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 10.0), 0, ALPHA)
+
+
+def study(name: str) -> xr.Dataset:
+    from hexmj.studies.ablation.study import Ablation, switched
+    from hexmj.studies.biology.study import Biology
+    from hexmj.studies.disturbance.study import DisturbedWalks
+    from hexmj.studies.league.entrants import entrants
+    from hexmj.studies.league.study import League
+    from hexmj.studies.stability_map.study import StabilityMap
+    from hexmj.studies.static_limit.study import StaticLimit
+    from hexmj.studies.terrain.study import Terrain
+    from hexmj.studies.variants.study import Variants
+
+    small: dict[str, Callable[[], Study]] = {
+        "map": lambda: StabilityMap(hexmj.LDVS, "vp", [80.0, 320.0], [0.5], n_starts=2, window=10.0),
+        "converge": lambda: StaticLimit(hexmj.LDVS, vps=[320.0], n_starts=2, window=10.0),
+        "terrain": lambda: Terrain(hexmj.LDVS, [0.6], ["step"], [3.0], grasps=[0.0], n_starts=2),
+        "disturb": lambda: DisturbedWalks(hexmj.LDVS, [0.6], ["halt"], n_starts=2, window=20.0),
+        "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=10),
+        "biology": lambda: Biology(hexmj.LDVS, 4, n_starts=2),
+        "league": lambda: League(entrants(["ldvs"]), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
+        "ablate": lambda: Ablation({"ldvs": switched("ldvs")}, [0.5], n_starts=5, n_physical=2, periods=12),
+    }
+    return conduct(small[name]())
+
+
+MADE: dict[str, Callable[[], xr.Dataset]] = {
+    "flss": flss,
+    "compare": compared,
+    "physical": fallen,
+    "recording": recorded,
+}
+STUDIES = [name for name in FIGURES if name not in MADE]
+
+
+def check_it_stays_the_same(result: xr.Dataset, folder: Path) -> None:
+    """Saved in any way, read in any way."""
+    ours, plain = hexmj.save(result, folder / "ours.nc"), folder / "plain.nc"
+    result.to_netcdf(plain)
+    with xr.open_dataset(ours, decode_times=False) as opened:
+        for read in (hexmj.load(ours), hexmj.load(plain), opened.load()):
+            assert read.identical(result)
+            assert hexmj.settings(read) == hexmj.settings(result)
+            for which in FIGURES["recording" if "planned_stance" in read else read.attrs["study"]]:
+                assert pixels(read, which) == pixels(result, which)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
+    check_it_stays_the_same(MADE[name](), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_stays_what_it_is(name: str, tmp_path: Path):
+    check_it_stays_the_same(study(name), tmp_path)
+
+
+def test_settings_are_told_as_they_were_given():
+    told = hexmj.settings(compared())
+    assert told["study"] == "compare"
+    assert [*told["controllers"]] == [ALPHA, "null"]
+    assert told["conditions"] == hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5).settings()
+    assert told["acceleration"] == {"rate": 0.01, "start": 0.1}
+    assert (told["window"], told["starts"], told["seed"]) == (20.0, 3, 0)
+    assert hexmj.settings(flss())["seed"] == 2**70
+    assert hexmj.settings(flss())["acceleration"] is None
+
+
+def test_the_title_tells_what_was_chosen():
+    title = hexmj.plot(compared()).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
+    for words in ("3 starts", "seed 0", "window 20", "= 200 mm/s", "friction 0.5", "ground: step", "a = 0.01"):
+        assert words in title
+    assert "height" not in title, "what is as usual is not told"
+    assert "ldvs, reading the legs" in hexmj.plot(flss()).get_suptitle()
+    lasting = hexmj.flss(hexmj.load_controller("lasting"), [0.5], n_starts=5)
+    assert "lasting (reading lasting)" in hexmj.plot(lasting).get_suptitle()
+
+
+def test_a_title_fits_into_its_figure():
+    """However small that is."""
+    figure = hexmj.plot(compared())
+    figure.set_size_inches(3.0, 3.0)
+    figure.draw_without_rendering()
+    (title,) = (one for one in figure.texts if one.get_text() == figure.get_suptitle())
+    box = title.get_window_extent()
+    assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.width
+
+
+def test_a_notebook_is_shown_a_figure():
+    shown = Image.open(io.BytesIO(hexmj.plot(flss())._repr_png_()))
+    assert shown.format == "PNG"
+    assert len(shown.convert("RGB").getcolors(1 << 20) or ()) > 20
+
+
+def test_what_belongs_to_no_figure_is_refused_in_a_sentence(tmp_path: Path):
+    wrong: Any = 3
+    with pytest.raises(InputError, match="result = 3; expected a Dataset"):
+        hexmj.plot(wrong)
+    with pytest.raises(InputError, match="result = 3; expected a Dataset"):
+        hexmj.save(wrong, tmp_path / "a.nc")
+    with pytest.raises(InputError, match=r"a dataset of x; expected a result, .* of flss, compare, map"):
+        hexmj.plot(xr.Dataset({"x": 1.0}))
+    with pytest.raises(InputError, match="which = 'fate'; valid names: flss"):
+        hexmj.plot(flss(), "fate")
+    (tmp_path / "text.nc").write_text("no NetCDF")
+    with pytest.raises(InputError, match=r"text\.nc is damaged, or no NetCDF"):
+        hexmj.load(tmp_path / "text.nc")
+    saved = hexmj.save(flss(), tmp_path / "cut.nc")
+    saved.write_bytes(saved.read_bytes()[:-200])
+    with pytest.raises(InputError, match=r"cut\.nc is damaged"):
+        hexmj.load(saved)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
+def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
+    words = ["compare", "--starts", "2", "--window", "10", "--no-video", "--format", form, "--out", str(tmp_path)]
+    subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)
+    drawn = tmp_path / f"comparison.{form}"
+    assert drawn.read_bytes()[:5] == {"png": b"\x89PNG\r", "pdf": b"%PDF-", "svg": b"<?xml"}[form]
+    if form == "png":
+        hexmj.plot(hexmj.load(tmp_path / "comparison.nc")).savefig(tmp_path / "again.png", dpi=150)
+        assert (tmp_path / "again.png").read_bytes() == drawn.read_bytes()

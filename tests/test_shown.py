@@ -1,0 +1,125 @@
+"""What is shown of results in a line, in a notebook and by help()."""
+
+import ast
+import inspect
+import re
+import xml.etree.ElementTree as Xml
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.diagrams import spans
+from hexmj.gaits import Gait, limit_gait
+from hexmj.legs import LEGS
+
+STARTS = hexmj.draw_starts(3, seed=1)
+MODULES = {
+    ".".join(path.relative_to(Path(hexmj.__file__).parent).with_suffix("").parts).removesuffix(".__init__")
+    for path in Path(hexmj.__file__).parent.rglob("*.py")
+}
+
+
+@pytest.fixture(scope="module")
+def walked() -> hexmj.PhysicalWalk:
+    return hexmj.physical_walk(STARTS, hexmj.UNCOORDINATED, [0.3, 0.5, 0.6], 60.0)
+
+
+@pytest.fixture(scope="module")
+def found() -> Gait:
+    return limit_gait(hexmj.HWS, 0.6, n_starts=3, stride=hexmj.Stride(dt=0.05), periods=30)
+
+
+def test_results_say_what_they_are_in_a_line(walked: hexmj.PhysicalWalk, found: Gait):
+    fell = int(np.isfinite(walked.outcomes.fall).sum())
+    assert repr(walked.planned) == "PlannedWalk(600 steps to t = 60 time units, 3 starts, V = 0.3 to 0.6)"
+    assert repr(walked.measured).startswith("Walk(600 steps")
+    assert repr(walked).startswith("PhysicalWalk(600 steps to t = 60 time units, 3 starts, V = 0.3 to 0.6; Outcomes(")
+    assert f"fell {fell}, " in repr(walked.outcomes)
+    assert re.match(r"Gait\(of 3: periodic \d, stable \d", repr(found))
+    for one in (walked, walked.planned, walked.measured, walked.outcomes, found):
+        assert len(repr(one)) < 200
+        assert "\n" not in repr(one)
+
+
+def bars(html: str) -> dict[int, list[tuple[float, float]]]:
+    """Begin and end of each bar of a diagram, by legs, as parts of its width."""
+    drawing = Xml.fromstring(html.partition("</p>")[2])
+    found: dict[int, list[tuple[float, float]]] = {leg: [] for leg in range(6)}
+    for bar in drawing.iter("rect"):
+        x, y, width = (float(bar.attrib[name]) for name in ("x", "y", "width"))
+        found[int(y // 14)].append(((x - 28) / 640, (x - 28 + width) / 640))
+    return found
+
+
+def test_a_notebook_shows_the_feet_that_are_off_the_ground(walked: hexmj.PhysicalWalk):
+    time, off = walked.planned.time, ~walked.planned.stance[:, 0]
+    drawn = bars(walked.planned._repr_html_() or "")
+    for leg in range(len(LEGS)):
+        expected = [(begin / 60, (begin + length) / 60) for begin, length in spans(time, off[:, leg])]
+        np.testing.assert_allclose(drawn[leg], expected, atol=1e-3)
+    html, fall = walked._repr_html_() or "", float(walked.outcomes.fall[0])
+    assert f"which fell at {fall:.4g}" in html
+    assert max(end for several in bars(html).values() for _, end in several) <= fall / 60 + 2e-3
+
+
+def test_a_notebook_shows_two_periods_of_a_gait(found: Gait):
+    assert found.periodic[0]
+    for leg, several in bars(found._repr_html_() or "").items():
+        off = sum(end - begin for begin, end in several)
+        assert off == pytest.approx(1.0 - found.duty_factor[0, leg], abs=4e-3)
+
+
+def test_nothing_that_can_be_shown_is_no_error():
+    empty = hexmj.Walk(np.zeros(0), np.zeros((0, 0)), *np.zeros((2, 0, 0, 6)), np.zeros((0, 0, 6), dtype=bool))
+    assert repr(empty) == "Walk(0 steps, 0 starts, V = unknown)"
+    assert empty._repr_html_() is None
+
+
+def documented() -> Iterator[tuple[str, Any, str]]:
+    """Every exported name with its object and all docstrings of it: of its methods and fields, too."""
+    for name in hexmj.__all__:
+        thing = getattr(hexmj, name)
+        if inspect.isclass(thing) or inspect.isfunction(thing):
+            tree = ast.parse(inspect.getsource(thing))
+            texts = [
+                one.value.value
+                for one in ast.walk(tree)
+                if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
+            ]
+            yield name, thing, "\n".join(map(str, texts))
+
+
+def leads_somewhere(name: str, thing: Any) -> bool:
+    """Whether a name in a docstring is one of its module, of its class or of the package, or begins with a module's."""
+    parts = name.split(".")
+    wheres = [(one, parts) for one in (import_module(thing.__module__), thing, hexmj)]
+    for cut in range(1, len(parts)):
+        ends = f".{'.'.join(parts[:cut])}"
+        wheres += [(import_module(f"hexmj.{one}"), parts[cut:]) for one in MODULES if f".{one}".endswith(ends)]
+    return any(follow(where, path) for where, path in wheres)
+
+
+def follow(thing: Any, path: list[str]) -> bool:
+    """Whether attributes, or fields of a dataclass, lead from one to the next."""
+    for part in path:
+        known = hasattr(thing, part) or part in getattr(thing, "__annotations__", {})
+        thing = getattr(thing, part, None)
+        if not known:
+            return False
+    return True
+
+
+def test_names_in_docstrings_lead_somewhere():
+    """Those of classes and constants, and those with a dot, which nobody would take for an argument."""
+    lost = [
+        f"{name}: {cited}"
+        for name, thing, text in documented()
+        for cited in re.findall(r"(?<!`)`([A-Za-z_]\w*(?:\.\w+)*)`(?!`)", text)
+        if ("." in cited or cited[0].isupper()) and not leads_somewhere(cited, thing)
+    ]
+    assert lost == []
