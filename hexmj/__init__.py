@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import physical_walk as physical_walk
     from hexmj.replay.film.film import Film as Film
     from hexmj.replay.film.video import render as render
+    from hexmj.replay.page.page import page as page
     from hexmj.replay.recording import load_recording as load_recording
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
@@ -68,6 +69,7 @@ _MODULES = {
     "measures.physical": ("PhysicalWalk", "physical_walk"),
     "replay.film.film": ("Film",),
     "replay.film.video": ("render",),
+    "replay.page.page": ("page",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
     "search.forms": ("FieldsForm",),
     "search.network_forms": ("NetworkForm",),
