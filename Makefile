@@ -12,7 +12,7 @@ TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 
-.PHONY: compare test slow soak bench lint system
+.PHONY: compare test slow soak bench lint system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
@@ -22,7 +22,7 @@ test slow: export MUJOCO_GL ?= egl
 test: .venv/dev system
 	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
 
-slow: .venv/dev system
+slow: .venv/dev system browser
 	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
 
 soak: export MUJOCO_GL ?= egl
@@ -57,6 +57,16 @@ system:
 	    $$root env DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends $(GL_PACKAGES); } \
 	    >/dev/null 2>&1 || \
 	echo "Rendering needs system packages that could not be installed here: apt-get install $(GL_PACKAGES)."
+
+# A browser for the tests of pages, which are skipped without one.
+browser:
+	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit; done; \
+	root=; test "$$(id -u)" = 0 || root="sudo -n"; \
+	echo "Installing chromium, for the tests of pages."; \
+	{ $$root apt-get -qq update && \
+	    $$root env DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends chromium; } \
+	    >/dev/null 2>&1 || \
+	echo "Tests of pages are skipped: chromium could not be installed here: apt-get install chromium."
 
 .venv/project: pyproject.toml constraints.txt
 	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || \

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from hexmj.plots import plot as plot
     from hexmj.replay.film.film import Film as Film
     from hexmj.replay.film.video import render as render
+    from hexmj.replay.page.page import page as page
     from hexmj.replay.recording import load_recording as load_recording
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
@@ -74,6 +75,7 @@ _MODULES = {
     "plots": ("plot",),
     "replay.film.film": ("Film",),
     "replay.film.video": ("render",),
+    "replay.page.page": ("page",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
     "results": ("load", "save"),
     "search.forms": ("FieldsForm",),

@@ -38,6 +38,8 @@ COMMANDS = {
     "flss": "FLSS of one controller over velocities, kinematic or physical.",
     "walk": "One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF).",
     "render": "A gait video, from recordings or from a walk that is recorded first.",
+    "page": "One HTML file that plays a recording, or two side by side: 3D, footfall diagram and stability margin; it"
+    " needs no network.",
     "search": "Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with"
     f" many.{AGAIN.format('search')}",
     "reproduce": "The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms,"

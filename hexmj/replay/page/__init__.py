@@ -1,0 +1,1 @@
+"""Recordings as one HTML file that anybody can open and play."""

@@ -1,0 +1,116 @@
+"""What a page is told of a recording: its steps in full, and poses, some of them, for the eye."""
+
+import base64
+from typing import Any
+
+import mujoco
+import numpy as np
+import xarray as xr
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.loading import compile_body
+from hexmj.conditions import OBEYED, Conditions
+from hexmj.legs import LEGS
+from hexmj.replay.page.shapes import body_shape, ground_shape
+from hexmj.replay.take import Take
+from hexmj.stability import support_polygon
+
+APART = 0.005
+"""From one pose that is shown to the next [s]."""
+
+MOST_POSES = 4000
+"""In one page; those of a longer walk are farther apart."""
+
+
+def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
+    """A recording and its take as JSON can hold them.
+
+    Margins and times are float64, as the recording has them; places and poses are float32.
+    """
+    compiled = compile_body(take.conditions)
+    every = max(1, round(APART / take.step), -(-len(take.qpos) // MOST_POSES))
+    rows = np.unique(np.append(np.arange(0, len(take.qpos), every), len(take.qpos) - 1))
+    poses, tips = _poses(compiled, take.qpos[rows])
+    corners, level = _polygons(take, rows)
+    told = {
+        "title": take.title,
+        "physical": take.physical,
+        "conditions": told_conditions(take.conditions, take.physical),
+        "legs": LEGS,
+        "vp": take.conditions.time.vp,
+        "step": take.step,
+        "lost": _or_none(take.lost),
+        "fell": _or_none(take.fell),
+        "part": take.part,
+        "plane": float(compiled.model.geom(take.conditions.body.ground).pos[2]),
+        "gap": take.conditions.ground.ground == "gap",
+        "marks": {"tip": take.conditions.body.marks.tip, "outline": take.conditions.body.marks.outline}
+        | {"centre": take.conditions.body.marks.rim[0]},
+        "seconds": packed(recording["seconds"], "f8"),
+        "velocity": packed(recording["velocity"], "f4"),
+        "planned_margin": packed(recording["planned_margin"], "f8"),
+        "planned_stance": packed(recording["planned_stance"], "u1"),
+        "rows": packed(rows, "i4"),
+        "poses": packed(poses, "f4"),
+        "tips": packed(tips, "f4"),
+        "planned_tips": packed(take.planned_tip[rows], "f4"),
+        "centre_of_mass": packed(take.centre_of_mass[rows], "f4"),
+        "polygon": packed(corners, "f4"),
+        "level": packed(level, "f4"),
+        "body": _packed_shape(body_shape(compiled.model)),
+        "ground": _packed_shape(ground_shape(compiled)),
+    }
+    if take.physical:
+        told["measured_margin"] = packed(recording["measured_margin"], "f8")
+        told["measured_stance"] = packed(recording["measured_stance"], "u1")
+    return told
+
+
+def told_conditions(conditions: Conditions, physical: bool) -> str:
+    """What body walked, at which V_p, and under which conditions that are not the usual ones."""
+    values, usual = conditions.flat(), Conditions().flat()
+    ground = OBEYED[conditions.ground.ground]
+    names = [key for key in values if key != "vp" and (key in ground or values[key] != usual[key])]
+    body = conditions.body.name.replace("_", " ")
+    who = f"{body} in physics" if physical else f"the plan, shown by a {body} that follows it"
+    values_told = (f"{name.replace('_', ' ')} {values[name]}" for name in names)
+    return ", ".join([who, f"V_p = {conditions.time.vp:g} mm/s", *values_told])
+
+
+def packed(values: Any, kind: str) -> dict[str, Any]:
+    """An array as text: its type, little-endian, its shape, and its bytes in base64."""
+    array = np.ascontiguousarray(values, dtype=f"<{kind}")
+    return {"type": kind, "shape": array.shape, "bytes": base64.b64encode(array.tobytes()).decode()}
+
+
+def _poses(compiled: CompiledBody, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places and quaternions of all bodies, (pose, body, 7), and the feet, (pose, leg, 3), in the world [mm]."""
+    model, body = compiled.model, compiled.conditions.body
+    data, feet = mujoco.MjData(model), [model.site(foot).id for foot in body.feet]
+    poses, tips = np.empty((len(qpos), model.nbody, 7)), np.empty((len(qpos), 6, 3))
+    for n, now in enumerate(qpos):
+        data.qpos[:] = now
+        mujoco.mj_kinematics(model, data)
+        poses[n, :, :3], poses[n, :, 3:], tips[n] = data.xpos, data.xquat, data.site_xpos[feet]
+    return poses, tips
+
+
+def _polygons(take: Take, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Support polygons, (pose, 6, 2), NaN beyond their corners, and the ground below them, (pose,) [mm]."""
+    corners, level, conditions = np.full((len(rows), 6, 2), np.nan), np.empty(len(rows)), take.conditions
+    for n, row in enumerate(rows):
+        polygon = support_polygon(take.feet[row], take.stance[row])
+        corners[n, : len(polygon)] = polygon
+        below = np.vstack([polygon, take.centre_of_mass[row, :2]])
+        level[n] = ground_level(conditions.ground, conditions.body.lengths, below).max()
+    return corners, level
+
+
+def _packed_shape(shape: Any) -> dict[str, Any]:
+    kinds = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
+    return {name: packed(getattr(shape, name), kind) for name, kind in kinds.items()}
+
+
+def _or_none(seconds: float) -> float | None:
+    return seconds if np.isfinite(seconds) else None
