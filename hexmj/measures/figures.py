@@ -46,7 +46,7 @@ def comparison_figure(result: "xr.Dataset", told: str = "") -> "Figure":
 
 
 def flss_figure(table: "xr.Dataset", title: str) -> "Figure":
-    """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.frequency_table`."""
+    """One curve of FLSS against velocity with its 95 % intervals, from `frequency.frequency_table`."""
     figure, axes = _flss_axes(6.4, 4.2)
     error = [table.flss - table.low, table.high - table.flss]
     axes.errorbar(table.velocity, table.flss, error, marker="o", markersize=4, capsize=2.5, color="#1b6ca8")
