@@ -95,6 +95,26 @@ def try_writing(folder: Path) -> None:
         part.unlink(missing_ok=True)
 
 
+@contextmanager
+def marked(folder: Path) -> Iterator[Path]:
+    """A file in a folder while the block runs, by which others tell that they see the same folder.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    mark = folder / f"{PART}{uuid4().hex}"
+    with among_writers(folder):
+        try:
+            mark.touch()
+        except OSError as error:
+            raise InputError(f"{folder} cannot be written to: {error.strerror or error}") from None
+        try:
+            yield mark
+        finally:
+            with suppress(OSError):
+                mark.unlink(missing_ok=True)
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove what killed processes left half written in a folder, unless somebody writes into it at this moment."""
     with among_writers(folder, alone=True) as alone:

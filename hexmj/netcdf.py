@@ -2,6 +2,10 @@
 
 import io
 import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from hexmj.errors import InputError
@@ -11,6 +15,9 @@ if TYPE_CHECKING:
 
 READ_OTHERWISE = {"scale_factor", "add_offset", "missing_value", "_FillValue"}
 """Attributes by which readers of NetCDF change numbers."""
+
+_ENCODING = Lock()
+"""Held while Dask's settings are other ones."""
 
 
 def encode(data: "xr.Dataset") -> bytes:
@@ -28,9 +35,19 @@ def encode(data: "xr.Dataset") -> bytes:
             raise InputError(f"NetCDF would give other numbers: {name} has the attribute {min(odd)}; expected none")
         variable.encoding["_FillValue"] = None
     try:
-        return bytes(plain.to_netcdf(engine="h5netcdf"))
+        with _no_lock_of_dask():
+            return bytes(plain.to_netcdf(engine="h5netcdf"))
     except (TypeError, ValueError, OverflowError, NotImplementedError) as error:
         raise InputError(f"NetCDF cannot hold this: {error}; expected arrays, numbers and texts") from None
+
+
+@contextmanager
+def _no_lock_of_dask() -> Iterator[None]:
+    """While the block runs, xarray asks no Dask cluster for a lock that this process works for: nobody else writes to
+    its memory, and the cluster does not know such a file."""
+    dask = sys.modules.get("dask")
+    with _ENCODING, dask.config.set(scheduler="synchronous") if dask else nullcontext():
+        yield
 
 
 def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":

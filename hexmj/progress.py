@@ -27,11 +27,12 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
     Raises:
         InputError: it is none of these.
     """
-    if typed("progress", progress, Progress | bool | None) is True:
+    wanted = typed("progress", progress, Progress | bool | None)
+    if wanted is True:
         with progress_bar(label) as told:
             yield told
     else:
-        yield progress or None
+        yield None if wanted is False else wanted
 
 
 @contextmanager

@@ -44,16 +44,16 @@ def draw_start(start: int, seed: int, stride: Stride) -> np.ndarray:
         InputError: a number or a seed that makes no sense.
     """
     start, seed = whole("start", start, 0, MOST_STARTS), whole("seed", seed, 0)
+    return next(draw_slabs(1, seed, stride, start))
+
+
+def draw_slabs(n_starts: int, seed: int, stride: Stride, first: int = 0) -> Iterator[np.ndarray]:
+    """The starts of `draw_starts` from `first` on, (start, leg) [mm], `SLAB` at a time, without those before them."""
     source = np.random.PCG64(seed)
-    source.advance(6 * start)  # a tip takes one step of it
-    return np.random.Generator(source).uniform(stride.pep0, stride.aep0, (1, 6))
-
-
-def draw_slabs(n_starts: int, seed: int, stride: Stride) -> Iterator[np.ndarray]:
-    """The starts of `draw_starts`, (start, leg) [mm], `SLAB` at a time."""
-    rng = np.random.default_rng(seed)
-    for first in range(0, n_starts, SLAB):
-        yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - first), 6))
+    source.advance(6 * first)  # a tip takes one step of it
+    rng = np.random.Generator(source)
+    for begin in range(0, n_starts, SLAB):
+        yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - begin), 6))
 
 
 def check_draw(n_starts: int, seed: int) -> tuple[int, int]:

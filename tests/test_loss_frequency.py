@@ -1,5 +1,7 @@
 """FLSS against an independent simulation, and the laws of its windows, starts and intervals."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -7,8 +9,9 @@ from scipy.stats import binomtest
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
-from hexmj.measures.kinematic import first_loss, flss, flss_over_range
-from hexmj.starts import SLAB, draw_start, draw_starts
+from hexmj.measures.kinematic import KinematicFlss, first_loss, flss, flss_over_range, losses_of_range
+from hexmj.starts import SLAB, draw_slabs, draw_start, draw_starts
+from hexmj.sweeps import conduct, run
 from hexmj.timing import Acceleration, Stride, observation_time
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]
@@ -84,7 +87,7 @@ def test_progress_is_the_share_of_starts_and_velocities(monkeypatch):
     monkeypatch.setattr("hexmj.starts.SLAB", 1000)
     told: list[float] = []
     flss(UNCOORDINATED, [0.9, 0.95], n_starts=1500, window=0.1, progress=told.append)
-    assert told == pytest.approx([1 / 3, 1 / 3, 1 / 6, 1 / 6])
+    assert told == pytest.approx([1 / 3, 1 / 6, 0, 1 / 3, 1 / 6, 0])
 
 
 def test_slabs_are_one_stream():
@@ -97,6 +100,34 @@ def test_slabs_are_one_stream():
     v = np.random.default_rng([2, 1]).uniform(0.5, 0.9, size)
     over_range, _ = flss_over_range(LDVS, 0.5, 0.9, n_starts=size, window="start", seed=2)
     assert over_range == np.isfinite(first_loss(starts, LDVS, v, 40.0)).mean()
+
+
+@pytest.mark.parametrize("range_of", [1, 700, 1000, 1234, SLAB, SLAB + 1999, SLAB + 2000])
+def test_any_cut_counts_what_one_run_counts(tmp_path, range_of):
+    """Whatever the ranges' size and the order in which they are computed, and whoever computes them."""
+    size, velocities = (SLAB + 2000, [0.7]) if range_of >= SLAB else (3400, [0.5, 0.9]) if range_of > 1 else (12, [0.7])
+    whole = flss(LDVS, velocities, n_starts=size, window="start", seed=2)
+    study = KinematicFlss(LDVS, velocities, size, "start", 2, range_of=range_of)
+    cells = study.cells()
+    backwards = run(cells[::-1], tmp_path)
+    assert study.result(backwards[::-1]).identical(whole)
+    with ThreadPoolExecutor(3) as pool:
+        assert conduct(study, tmp_path, executor=pool).identical(whole)
+        assert conduct(study, executor=pool).identical(whole)
+
+
+def test_ranges_of_one_stream_never_overlap():
+    """A range holds the stream's starts from its first one on, and its losses stand in the stream's samples."""
+    lost = np.isfinite(first_loss(draw_starts(2500, 4), LDVS, 0.6, 40.0))
+    for first, n_starts in [(0, 1), (999, 2), (1000, 1000), (123, 2222), (2499, 1)]:
+        assert np.array_equal(
+            np.concatenate([*draw_slabs(n_starts, 4, Stride(), first)]), draw_starts(2500, 4)[first:][:n_starts]
+        )
+        one = losses_of_range(LDVS, 0.6, 40.0, first, n_starts, seed=4, stride=Stride())
+        inside = (np.arange(2500) >= first) & (np.arange(2500) < first + n_starts)
+        samples = np.add.reduceat(lost & inside, [0, 1000, 2000], dtype=int)
+        held = slice(first // 1000, (first + n_starts - 1) // 1000 + 1)
+        assert np.array_equal(one.losses, samples[held]) and samples.sum() == one.losses.sum()
 
 
 @pytest.mark.parametrize(("lost", "size"), [(0, 10), (1, 1), (7, 200), (4999, 7000), (10**7, 10**7), (0, 10**10)])
@@ -136,6 +167,8 @@ def test_a_range_may_begin_at_a_stand():
         ({"n_starts": 0}, "at least 1"),
         ({"seed": -1}, "at least 0"),
         ({"threads": 0}, "at least 1"),
+        ({"range_of": 0}, "range_of = 0; expected a whole number of at least 1 and at most"),
+        ({"n_starts": 10**8, "range_of": 999}, "range_of = 999; expected a whole number of at least 1000 and"),
     ],
 )
 def test_nonsense_gets_a_clear_sentence(change, words):

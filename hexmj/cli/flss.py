@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.attributes import attributes, settings
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import ControllerName, Figures, Workers
+from hexmj.cli.options import ControllerName, Figures, Sweepers
 from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -19,6 +19,9 @@ from hexmj.starts import SAMPLE
 
 if TYPE_CHECKING:
     import xarray as xr
+
+FINISHED = "walks"
+"""Folder in that of the results, for what is finished."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,11 @@ class Flss(WalkingCommand):
     """Count falls of the insect in MuJoCo instead of losses of the planned polygon."""
     starts: int | None = None
     """Number of random starts; 7000 unless given (seven samples of 1000, as in the paper), 200 if physical."""
+    range_of: int | None = None
+    """Starts that are computed and kept as one, if kinematic; 1600000 unless given.  No result depends on it."""
     out: Path | None = None
-    """Folder for figure, NetCDF and manifest; none are written unless given."""
-    workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
+    """Folder for figure, NetCDF, manifest and what is finished; none are written unless given."""
+    sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
     drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
 
     @property
@@ -51,6 +56,8 @@ class Flss(WalkingCommand):
         """Measure, write what is asked for, and print."""
         if not self.physical:
             self.refuse_physical("without --physical")
+        elif self.range_of is not None:
+            raise InputError(f"--range-of = {self.range_of} with --physical; expected it with kinematic walks only")
         controller = self.controlled.controller(self.model)
         self.refuse_contact_gap(controller)
         if self.out:
@@ -62,15 +69,16 @@ class Flss(WalkingCommand):
         self._print(table, self._write(table, controller, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
-        how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.workers.threads}
-        with progress_bar(f"{self.kind} FLSS") as progress:
+        how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.sweepers.threads_each}
+        with progress_bar(f"{self.kind} FLSS") as progress, self.sweepers.executor() as executor:
+            how |= {"folder": self.out and self.out / FINISHED, "executor": executor, "progress": progress}
             if self.physical:
                 from hexmj.measures.compare import physical_flss
 
-                return physical_flss(controller, self.velocities, conditions=self.conditions, progress=progress, **how)
-            from hexmj.measures.kinematic import flss
+                return physical_flss(controller, self.velocities, conditions=self.conditions, **how)
+            from hexmj.measures.kinematic import RANGE, flss
 
-            return flss(controller, self.velocities, progress=progress, **how)
+            return flss(controller, self.velocities, range_of=RANGE if self.range_of is None else self.range_of, **how)
 
     def _write(self, table: "xr.Dataset", controller: Controller, out: Path) -> list[Path]:
         from hexmj.measures.figures import flss_figure

@@ -35,7 +35,8 @@ AGAIN = f"\n\n{GOES_ON} with a {{}} that was stopped."
 COMMANDS = {
     "compare": "Kinematic, measured and physical FLSS on the same starts: table, figure, NetCDF, manifest and one gait"
     f" video.{AGAIN.format('run')}",
-    "flss": "FLSS of one controller over velocities, kinematic or physical.",
+    "flss": "FLSS of one controller over velocities, kinematic or physical."
+    f"\n\n{GOES_ON} with a run that was stopped, if it has --out.",
     "walk": "One walk, kinematic or physical: footfall diagram, stability margin and a recording (NetCDF).",
     "render": "A gait video, from recordings or from a walk that is recorded first.",
     "page": "One HTML file that plays a recording, or two side by side: 3D, footfall diagram and stability margin; it"
@@ -97,7 +98,7 @@ def main() -> None:
             if sys.stdout:  # there is none where it was closed
                 sys.stdout.flush()
     except KeyboardInterrupt:
-        goes_on = options and GOES_ON in COMMANDS.get(sys.argv[1], "")
+        goes_on = getattr(options, "out", None) and GOES_ON in COMMANDS.get(sys.argv[1], "")
         kept = f"; what is finished is kept. {GOES_ON}" if goes_on else ""
         sys.exit(_complain(f"stopped{kept}", 130))
     except InputError as error:

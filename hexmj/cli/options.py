@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
 
@@ -179,6 +179,9 @@ class Sweepers:
     """Threads of each process; unless given, processes share the cores.  No result depends on it."""
     processes: int = 1
     """Processes that compute cells side by side.  No result depends on it."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers compute the cells instead; they must see
+    the results' folder.  No result depends on it."""
 
     @property
     def threads_each(self) -> int | None:
@@ -190,16 +193,19 @@ class Sweepers:
 
     @contextmanager
     def executor(self) -> Iterator[Executor | None]:
-        """The processes, or None where this one does the work.
+        """The processes, a cluster's workers, or None where this process does the work.
 
         Raises:
-            InputError: no process, or too many.
+            InputError: no process, or too many, or a scheduler as well or that cannot be reached.
         """
         if not 1 <= self.processes <= MOST_PROCESSES:
             raise InputError(f"--processes = {self.processes}; expected at least 1 and at most {MOST_PROCESSES}")
         if self.processes == 1:
-            yield None
+            with self._cluster() as executor:
+                yield executor
             return
+        if self.scheduler is not None:
+            raise InputError(f"--scheduler and --processes = {self.processes}; expected one of them")
         from concurrent.futures import ProcessPoolExecutor
         from multiprocessing import active_children, get_context
 
@@ -217,6 +223,14 @@ class Sweepers:
                     for worker in active_children():
                         worker.terminate()
                 raise
+
+    def _cluster(self) -> AbstractContextManager[Executor | None]:
+        """The workers of the scheduler, if one was named."""
+        if self.scheduler is None:
+            return nullcontext()
+        from hexmj.sweeps.cluster import workers_of
+
+        return workers_of(self.scheduler)
 
 
 def changed(given: Any, usual: Any) -> Iterator[str]:

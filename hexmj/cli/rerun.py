@@ -37,6 +37,9 @@ class Rerun:
     """As of the command that is repeated.  No result depends on it."""
     processes: int | None = None
     """As of the command that is repeated, where it has this option.  No result depends on it."""
+    scheduler: str | None = None
+    """As of the command that is repeated, where it has this option; its workers must see this machine's folder for
+    temporary files (TMPDIR).  No result depends on it."""
     json: bool = False
     """Print one JSON object on standard output, nothing else."""
 
@@ -45,8 +48,8 @@ class Rerun:
         found = manifests(self.result)
         for path, manifest in found.items():
             _check(path, manifest)
-        workers = {"--threads": self.threads, "--processes": self.processes}
-        more = [word for option, n in workers.items() if n is not None for word in (option, str(n))]
+        workers = {"--threads": self.threads, "--processes": self.processes, "--scheduler": self.scheduler}
+        more = [word for option, one in workers.items() if one is not None for word in (option, str(one))]
         repeated = [_repeat(path, manifest, more) for path, manifest in found.items()]
         equal = all(one.equal for one in repeated)
         if self.json:

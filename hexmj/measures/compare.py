@@ -85,7 +85,7 @@ class Comparison:
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """As `compare` gives it."""
-        from hexmj.measures.kinematic import settings
+        from hexmj.measures.frequency import settings
 
         starts = draw_starts(self.n_starts, self.seed, self.stride)
         table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
@@ -164,7 +164,7 @@ def physical_flss(
         The table of `kinematic.flss`, the frequency of `BESIDE` with its interval; the times of the fall and of
         `BESIDE`, and the outcomes `REPORTED`, of every start.
     """
-    from hexmj.measures.kinematic import frequency_table, losses_by_sample
+    from hexmj.measures.frequency import frequency_table, losses_by_sample
 
     result = compare(
         controller, velocities, n_starts=n_starts, window=window, seed=seed, conditions=conditions, stride=stride,

@@ -1,27 +1,38 @@
 """The kinematic measure: planned walks, their first losses, and FLSS, the frequency of these (paper, Section 3)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.attributes import attributes
-from hexmj.checks import given, typed
+from hexmj.checks import check_types, given, typed, whole
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
+from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
-from hexmj.intervals import wilson_interval, wilson_intervals
-from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.progress import Progress, shown
-from hexmj.starts import SAMPLE, check_draw, draw_slabs
+from hexmj.intervals import wilson_interval
+from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
+from hexmj.measures.velocities import observed
+from hexmj.progress import Progress
+from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
+from hexmj.sweeps import Cell, Execution, conduct
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk
 
 if TYPE_CHECKING:
     import xarray as xr
+
+RANGE = 1600 * SAMPLE
+"""Starts of a range that one worker counts: seconds to minutes of one core."""
+
+MOST_RANGES = 10**5
+"""More files in one folder are no good."""
 
 
 def walk(
@@ -76,55 +87,145 @@ def first_loss(
     return np.where(lost > 0, lost * stride.dt, np.inf)
 
 
+@dataclass(frozen=True)
+class KinematicFlss:
+    """Kinematic FLSS of a controller, a cell for each velocity and range of starts.
+
+    All ranges are stretches of one stream of random starts, and losses are counted by its samples of 1000: however it
+    is cut, the counts are those of one long run.
+    """
+
+    controller: Controller
+    """Plans the walks."""
+    velocities: Sequence[float]
+    """V_r (when accelerating, its final value), each 0 <= V < 1."""
+    n_starts: int = 7 * SAMPLE
+    """N, the same starts for every velocity."""
+    window: str | float = "walk"
+    """'walk', 'start' or the observation time itself [time units]."""
+    seed: int = 0
+    """Of the starts."""
+    stride: Stride = field(default_factory=Stride)
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+    range_of: int = RANGE
+    """Starts of a range; the last one may have fewer."""
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        check_controller_type(self.controller)
+        check_draw(self.n_starts, self.seed)
+        whole("range_of", self.range_of, math.ceil(self.n_starts / MOST_RANGES), MOST_STARTS)
+        _ = self.observed
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocities and observation times [time units], both (velocity,)."""
+        return observed(self.velocities, self.window, self.stride, self.acceleration)
+
+    @property
+    def places(self) -> list[tuple[int, int]]:
+        """Of each cell: the velocity's place and the range's first start."""
+        return list(product(range(len(self.velocities)), range(0, self.n_starts, self.range_of)))
+
+    def cells(self) -> list[Cell]:
+        """See `sweeps.Study`; each is a `losses_of_range`."""
+        v, duration = self.observed
+        same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
+        cells = []
+        for i, first in self.places:
+            count = min(self.range_of, self.n_starts - first)
+            own = {"velocity": v[i], "duration": duration[i], "first": first, "n_starts": count}
+            name = f"{self.controller.name}-V-{v[i]:g}-from-{first}"
+            cells.append(Cell(name, losses_of_range, same | own, work=duration[i] * count))
+        return cells
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """As `flss` gives it."""
+        losses = np.zeros((len(self.velocities), math.ceil(self.n_starts / SAMPLE)), dtype=int)
+        for (i, first), one in zip(self.places, data, strict=True):
+            begin = first // SAMPLE
+            losses[i, begin : begin + one.sizes["sample"]] += one.losses.values
+        told = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        made = settings({self.controller.name: self.controller}, *told)
+        return frequency_table(losses, self.n_starts, *self.observed).assign_attrs(attributes({"study": "flss"} | made))
+
+
+def losses_of_range(
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    first: int,
+    n_starts: int,
+    *,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> "xr.Dataset":
+    """How many of the starts from `first` on lose static stability: `losses`, (sample,), of 1000 starts each.
+
+    Starts are drawn, walked and counted slab by slab.  The samples are those of the stream; the range holds no more
+    than a part of the first and the last, if it does not begin and end with one.
+    """
+    import xarray as xr
+
+    begin = first // SAMPLE
+    losses = np.zeros(math.ceil((first + n_starts) / SAMPLE) - begin, dtype=int)
+    for x in draw_slabs(n_starts, seed, stride, first):
+        times = first_loss(x, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
+        count = losses_by_sample(np.isfinite(times)[None], first)[0]
+        losses[first // SAMPLE - begin :][: len(count)] += count
+        first += len(x)
+        if progress:
+            progress(len(x) / n_starts)
+    return xr.Dataset({"losses": ("sample", losses, {"units": "1", "long_name": "starts that lose static stability"})})
+
+
 def flss(
     controller: Controller,
     velocities: Sequence[float] | float,
     *,
-    n_starts: int = 7 * SAMPLE,
-    window: str | float = "walk",
-    seed: int = 0,
+    n_starts: int = KinematicFlss.n_starts,
+    window: str | float = KinematicFlss.window,
+    seed: int = KinematicFlss.seed,
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
-    threads: int | None = None,
-    progress: Progress | bool | None = None,
+    range_of: int = RANGE,
+    folder: Path | None = None,
+    **how: Unpack[Execution],
 ) -> "xr.Dataset":
     """Kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
-    Starts are drawn, walked and counted slab by slab; of 1000 starts 8 bytes a velocity are kept.  The time of
-    every loss is had from `first_loss` of `draw_starts`.
+    Of 1000 starts 8 bytes a velocity are kept.  The time of every loss is had from `first_loss` of `draw_starts`.
 
     Args:
-        controller: plans the walks.
-        velocities: V_r (when accelerating, its final value), one or several, each 0 <= V < 1.
+        controller: as of `KinematicFlss`, and so are `velocities` to `range_of`.
+        velocities: V_r, one or several.
         n_starts: N.
-        window: 'walk', 'start' or the observation time itself [time units].
+        window: observation time.
         seed: of the starts.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the result does not depend on it.
-        progress: True shows a bar; or a function that is told the fraction done since it was last called.
+        stride: of the plans.
+        acceleration: of Eq. 11.
+        range_of: starts of a range, which is computed and kept as one; the result does not depend on it.
+        folder: keeps what is finished, for a run that was stopped; None keeps nothing.
+        how: executor, threads and progress, see `sweeps.Execution`; the result does not depend on it.
 
     Returns:
         Over velocities: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples
         of 1000 starts, and the observation time `duration`.
+
+    Raises:
+        InputError: something that makes no sense, and what `sweeps.finish` raises.
     """
-    stride = given("stride", stride, Stride)
     check_controller_type(controller)
+    stride = given("stride", stride, Stride)
     n_starts, seed = check_draw(n_starts, seed)
-    v, duration = observed(velocities, window, stride, acceleration)
-    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-    counts = []
-    with shown(progress, "kinematic FLSS") as told:
-        for x in draw_slabs(n_starts, seed, stride):
-            lost = np.empty((len(v), len(x)), dtype=bool)
-            for i in range(len(v)):
-                lost[i] = np.isfinite(first_loss(x, controller, v[i], duration[i], **how))
-                if told:
-                    told(len(x) / n_starts / len(v))
-            counts.append(losses_by_sample(lost))
-    made = settings({controller.name: controller}, window, n_starts, seed, stride, acceleration)
-    table = frequency_table(np.concatenate(counts, axis=1), n_starts, v, duration)
-    return table.assign_attrs(attributes({"study": "flss"} | made))
+    v, _ = observed(velocities, window, stride, acceleration)
+    study = KinematicFlss(controller, v.tolist(), n_starts, window, seed, stride, acceleration, range_of)
+    return conduct(study, folder, **how)
 
 
 def flss_over_range(
@@ -167,45 +268,3 @@ def flss_over_range(
         lost = first_loss(x, controller, v, observation_time(window, v, stride), stride=stride, threads=threads)
         count += int(np.isfinite(lost).sum())
     return count / n_starts, wilson_interval(count, n_starts)
-
-
-def settings(
-    controllers: Mapping[str, Controller],
-    window: str | float,
-    n_starts: int,
-    seed: int,
-    stride: Stride,
-    acceleration: Acceleration | None,
-) -> dict[str, Any]:
-    """All that is needed to run a measure again, as plain data; every result has it, see `attributes.settings`."""
-    return {
-        "controllers": {name: settings_of(one) for name, one in controllers.items()},
-        "window": window,
-        "starts": n_starts,
-        "seed": seed,
-        "stride": asdict(stride),
-        "acceleration": asdict(acceleration) if acceleration else None,
-    }
-
-
-def losses_by_sample(lost: np.ndarray) -> np.ndarray:
-    """Number of losses in each sample of 1000 starts, (velocity, sample), from (velocity, start)."""
-    return np.add.reduceat(lost, np.arange(0, lost.shape[1], SAMPLE), axis=1, dtype=int)
-
-
-def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
-    """FLSS with its intervals, from the number of losses in each sample of `n_starts` starts, (velocity, sample)."""
-    import xarray as xr
-
-    total = losses.sum(axis=1)
-    low, high = wilson_intervals(total, n_starts)
-    samples = losses[:, : n_starts // SAMPLE] / SAMPLE
-    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
-    columns = {
-        "flss": (total / n_starts, "frequency of the loss of static stability"),
-        "low": (low, "lower end of the 95 % Wilson interval"),
-        "high": (high, "upper end of the 95 % Wilson interval"),
-        "sample_sd": (spread, "standard deviation over samples of 1000 starts"),
-    }
-    told = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
-    return xr.Dataset(told).assign(velocity_axis(velocities, duration))

@@ -73,12 +73,12 @@ def check_unedited(cell: Cell, record: str) -> None:
     """
     if (now := cell.record()) != record:
         raise InputError(
-            f"{cell.name}: {_difference(record, now)} was edited while it was in use; start again, and let fields"
+            f"{cell.name}: {difference(record, now)} was edited while it was in use; start again, and let fields"
             " name files that are read, not written"
         )
 
 
-def _difference(one: str, other: str) -> str:
+def difference(one: str, other: str) -> str:
     """The first thing in which two records differ, by the names that lead to it."""
     names, a, b = list[str](), json.loads(one), json.loads(other)
     while isinstance(a, dict) and isinstance(b, dict):

@@ -3,17 +3,20 @@
 import math
 import os
 import pickle
+import socket
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import prepare
+from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
-from hexmj.sweeps.cells import Cell, check_unedited
+from hexmj.sweeps.cells import Cell, check_unedited, difference
 from hexmj.sweeps.files import read, write
 
 if TYPE_CHECKING:
@@ -36,8 +39,8 @@ class Execution(TypedDict, total=False):
     """How cells are computed; what comes of them does not depend on it."""
 
     executor: Executor | None
-    """Computes them, in threads, processes or on other machines that see the folder; without one they are computed
-    here, one after another."""
+    """Computes them, in threads, processes or, such as `Client.get_executor` of Dask, on other machines that see the
+    folder; without one they are computed here, one after another."""
     progress: Progress | bool | None
     """True shows a bar; or a function that is told the fraction done since it was last called."""
     threads: int | None
@@ -82,8 +85,9 @@ def finish(
     paths = [
         folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
     ]
-    if folder and not all(path and os.path.exists(path) for path in paths):
-        prepare(folder)
+    if folder:
+        finished_all = all(path and os.path.exists(path) for path in paths)
+        (remove_leftovers if finished_all else prepare)(folder)
     whole = sum(cell.work for cell in cells)
     told = [0.0] * len(cells)
 
@@ -101,26 +105,15 @@ def finish(
             done = _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i))
             yield finished(i, done)
         return
-    waiting = []
+    waiting = list[int]()
     for i, path in enumerate(paths):
         if path and path.exists():
             yield finished(i, read(path, records[i]))
         else:
-            waiting.append((i, path, _parcel(cells[i])))
-    futures: dict[Future[xr.Dataset], int] = {}
-    try:
-        for i, path, parcel in waiting:
-            futures[_submitted(executor, parcel, path, records[i], threads or 1)] = i
-        for future in as_completed(futures):
-            yield finished(futures[future], future.result())
-    except BrokenExecutor:
-        raise InputError(
-            "a process that computed cells was killed, or could not be started; what is finished is kept:"
-            " start again, with fewer processes if the memory was full"
-        ) from None
-    finally:
-        for future in futures:
-            future.cancel()
+            waiting.append(i)
+    parcels = [_Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting]
+    for j, done in _by_others(executor, parcels, folder):
+        yield finished(waiting[j], done)
 
 
 def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
@@ -155,25 +148,77 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     return write(path, record, data)
 
 
-def _parcel(cell: Cell) -> bytes:
-    try:
-        return pickle.dumps(cell)
-    except Exception as error:
-        raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None
+@dataclass(frozen=True)
+class _Parcel:
+    """A cell on its way to a worker."""
+
+    pickled: bytes
+    record: str
+    path: Path | None
+    threads: int
+    mark: Path | None = None
+    """A file of the folder, which is there as long as somebody waits for the cell."""
+
+    def compute(self) -> "xr.Dataset":
+        """The cell's data, by a worker that sees what the cell was sent from: files, code, packages and folder."""
+        here = f"a worker on {socket.gethostname()}"
+        try:
+            cell = pickle.loads(self.pickled)
+            record = cell.record()
+        except InputError as error:
+            raise InputError(f"{here}: {error}") from None
+        except Exception as error:
+            raise InputError(
+                f"{here} cannot load a cell: {error}; expected the files and packages of the sender"
+            ) from None
+        if record != self.record:
+            other = difference(self.record, record)
+            raise InputError(f"{cell.name}: {here} has another {other} than the sender; start the worker again")
+        if self.mark and not self.mark.exists():
+            raise InputError(
+                f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
+            )
+        return _made(cell, self.path, record, threads=self.threads)
 
 
-def _submitted(executor: Executor, *parcel: Any) -> "Future[xr.Dataset]":
+def _by_others(
+    executor: Executor, parcels: Sequence[_Parcel], folder: Path | None
+) -> Iterator[tuple[int, "xr.Dataset"]]:
+    """What an executor's workers make of parcels, each with its place, as soon as it is there."""
+    futures: dict[Future[xr.Dataset], int] = {}
+    with marked(folder.absolute()) if folder and parcels else nullcontext() as mark:
+        try:
+            for i, parcel in enumerate(parcels):
+                path = parcel.path and parcel.path.absolute()
+                futures[_submitted(executor, replace(parcel, path=path, mark=mark))] = i
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenExecutor:
+            raise InputError(
+                "a process that computed cells was killed, or could not be started; what is finished is kept:"
+                " start again, with fewer processes if the memory was full"
+            ) from None
+        except CancelledError:
+            raise InputError(
+                "what computed cells has gone away, as a scheduler that is stopped; what is finished is kept:"
+                " start again"
+            ) from None
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _submitted(executor: Executor, parcel: _Parcel) -> "Future[xr.Dataset]":
     try:
-        return executor.submit(_sent, *parcel)
+        return executor.submit(parcel.compute)
     except BrokenExecutor:
         raise
     except RuntimeError as error:  # it was shut down
         raise InputError(f"executor = {executor!r:.80}: {error}") from None
 
 
-def _sent(parcel: bytes, path: Path | None, record: str, threads: int) -> "xr.Dataset":
-    """A cell computed by an executor's worker, if that has the code and packages that the cell is named by."""
-    cell = pickle.loads(parcel)
-    if path and cell.record() != record:
-        raise InputError(f"{cell.name}: a worker has other code or packages than it was sent from; start it again")
-    return _made(cell, path, record, threads=threads)
+def _pickled(cell: Cell) -> bytes:
+    try:
+        return pickle.dumps(cell)
+    except Exception as error:
+        raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None

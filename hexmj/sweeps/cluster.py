@@ -1,0 +1,85 @@
+"""Cells on a cluster: the workers of a Dask scheduler as an executor, whatever becomes of either."""
+
+import asyncio
+import logging
+import sys
+import warnings
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from hexmj.errors import InputError
+
+PATIENCE = 5.0
+"""How long an answer of the scheduler is waited for [s]."""
+
+
+@contextmanager
+def workers_of(address: str) -> Iterator[Executor]:
+    """An executor whose tasks are done by the workers of a Dask scheduler; without a worker they wait for one.
+
+    Args:
+        address: of the scheduler, such as 'tcp://127.0.0.1:8786'.
+
+    Raises:
+        InputError: Dask is not installed, the scheduler cannot be reached, or a cell killed its workers.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ModuleNotFoundError:
+        raise InputError('a scheduler needs the package distributed: pip install "hexmj[dask]"') from None
+    with _quiet():
+        if not _found(address)["workers"]:
+            print(f"hexmj: the scheduler at {address} has no workers yet; cells wait for them", file=sys.stderr)
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        try:
+            yield client.get_executor(pure=False)
+        except KilledWorker as error:
+            raise InputError(
+                f"a cell killed {error.allowed_failures + 1} workers, the last one at {error.last_worker.address}; what"
+                " is finished is kept: start again, with more memory for each worker if theirs was full"
+            ) from None
+        finally:
+            with suppress(Exception):  # of a scheduler that is gone
+                client.close(timeout=PATIENCE)
+
+
+def _found(address: str) -> dict[str, Any]:
+    """What a scheduler tells of itself; one that does not answer is not waited for, as a client would."""
+    expected = "a scheduler's, such as tcp://127.0.0.1:8786"
+    try:
+        told = asyncio.run(asyncio.wait_for(_identity(address), PATIENCE))
+    except (OSError, TimeoutError):
+        raise InputError(f"no scheduler answers at {address}; expected an address that is {expected}") from None
+    except (TypeError, ValueError) as error:
+        raise InputError(f"scheduler = {address!r}: {error}; expected an address that is {expected}") from None
+    if told.get("type") != "Scheduler":
+        raise InputError(f"scheduler = {address!r} is a {told.get('type')}'s address; expected {expected}")
+    return told
+
+
+async def _identity(address: str) -> dict[str, Any]:
+    """What a server of Dask tells of itself."""
+    from distributed.comm.core import connect
+    from distributed.core import send_recv
+    from distributed.security import Security
+
+    comm = await connect(address, timeout=PATIENCE, **Security().get_connection_args("client"))
+    try:
+        return await send_recv(comm, op="identity") or {}
+    finally:
+        comm.abort()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """While the block runs, what Dask tells at length does not reach the terminal; the sentences here tell it."""
+    before = logging.root.manager.disable
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="distributed")
+        logging.disable()
+        try:
+            yield
+        finally:
+            logging.disable(before)
