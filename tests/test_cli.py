@@ -53,7 +53,9 @@ def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
         assert set(told.stdout.split()) == known
 
 
-@pytest.mark.parametrize("words", [["--completion"], ["--completion", "ksh"], ["flss", "--tyro-print-completion", "sh"]])
+@pytest.mark.parametrize(
+    "words", [["--completion"], ["--completion", "ksh"], ["flss", "--tyro-print-completion", "sh"]]
+)
 def test_other_shells_are_refused_in_a_sentence(run, words):
     code, out, error = run(*words)
     assert (code, out) == (2, "")

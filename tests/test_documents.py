@@ -21,7 +21,8 @@ from hexmj.controllers.named import load_controller
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[1]
-PAGES = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")))}
+FILES = (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in FILES}
 LINES = dict.fromkeys(
     line for text in PAGES.values() for line in re.findall(r"^    hexmj (.+?)(?: +# (.+))?$", text, flags=re.MULTILINE)
 )
@@ -42,7 +43,7 @@ def blocks(page: str, language: str) -> list[str]:
 def folder(tmp_path_factory):
     """One working folder for all commands: some read what an earlier one wrote."""
     folder = tmp_path_factory.mktemp("documents")
-    (folder / "mine.py").write_text(blocks("first_controller.md", "python")[0])
+    (folder / "mine.py").write_text(blocks("docs/first_controller.md", "python")[0])
     shutil.copy(hexmj.STICK_INSECT.mjcf, folder / "beetle.xml")
     return folder
 
@@ -109,7 +110,7 @@ def test_python_of_a_page(page, here):
 
 def test_parameter_file(tmp_path):
     path = tmp_path / "model.toml"
-    path.write_text(blocks("commands.md", "toml")[0])
+    path.write_text(blocks("docs/commands.md", "toml")[0])
     read = load_controller(str(path))
     assert isinstance(read, Cruse1998)
     assert read.weights == LDVS.weights
