@@ -4,6 +4,8 @@
 # make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
 # make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types
+# make docs       the documentation, in results/site; `python3 -m http.server -d results/site` shows it
+# make gallery    the documentation's films of walks, in docs/gallery
 # PYTHON=...      the Python, 3.11 or newer, that .venv is made from
 
 PYTHON ?= python3
@@ -12,7 +14,7 @@ TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 
-.PHONY: compare test slow soak bench lint system browser
+.PHONY: compare test slow soak bench lint docs gallery system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
@@ -43,6 +45,12 @@ lint: .venv/dev
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/pyright
+
+docs: .venv/dev
+	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --quiet --strict
+
+gallery: .venv/project system
+	.venv/bin/python examples/gallery.py docs/gallery
 
 # Rendering without a screen; where it cannot be installed, the rest goes on without it.
 system:

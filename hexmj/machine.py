@@ -70,6 +70,8 @@ def versions() -> str:
     wrong = [] if SpecifierSet(wanted).contains(python) else [f"Python {python}, expected {wanted}"]
     found = {}
     for requirement in map(Requirement, requires("hexmj") or []):
+        if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
+            continue  # of an extra
         name, bounds = requirement.name, requirement.specifier
         try:
             found[name] = version(name)

@@ -26,7 +26,7 @@ FAR = 1e6
 
 @dataclass(frozen=True)
 class Stride:
-    """Where tips step and how time is divided, the same for every controller; all are inferred (README, table)."""
+    """Where tips step and how time is divided, the same for every controller; all are inferred (docs/constants.md)."""
 
     aep0: float = 10.0
     """Anterior extreme position without influences, on each leg's own axis [mm]."""

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,32 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
     assert code == 0
     assert "[mm/s]" in out
     assert "(default: 80.0)" in out
+
+
+def test_version_is_one_line(run):
+    assert run("--version") == (0, f"hexmj {version('hexmj')}\n", "")
+
+
+def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
+    code, script, _ = run("--completion", "bash")
+    assert code == 0
+    (tmp_path / "hexmj.bash").write_text(script)
+    for words, known in (("ren", {"render"}), ("flss --st", {"--starts", "--step-height", "--standing-height"})):
+        typed = ["hexmj", *words.split()]
+        ask = f"source hexmj.bash; COMP_WORDS=({' '.join(typed)}); COMP_CWORD={len(typed) - 1}; _tyro_hexmj"
+        told = subprocess.run(
+            ["bash", "-c", ask + '; echo "${COMPREPLY[@]}"'], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert set(told.stdout.split()) == known
+
+
+@pytest.mark.parametrize(
+    "words", [["--completion"], ["--completion", "ksh"], ["flss", "--tyro-print-completion", "sh"]]
+)
+def test_other_shells_are_refused_in_a_sentence(run, words):
+    code, out, error = run(*words)
+    assert (code, out) == (2, "")
+    assert error.startswith("hexmj: ") and error.endswith("expected one of bash, zsh, fish\n")
 
 
 def test_kinematic_side_never_imports_mujoco():

@@ -31,6 +31,12 @@ def a_missing_package(monkeypatch, tmp_path):
     monkeypatch.setattr(machine, "requires", lambda name: [*(metadata.requires(name) or []), "no-such-package"])
 
 
+def test_extras_need_not_be_installed(run, monkeypatch):
+    only(monkeypatch, "versions")
+    monkeypatch.setattr(machine, "requires", lambda name: ["mujoco", 'no-such-package; extra == "rl"'])
+    assert run("doctor")[0] == 0
+
+
 def an_old_python(monkeypatch, tmp_path):
     monkeypatch.setattr(machine.platform, "python_version", lambda: "3.10.4")
 

@@ -1,48 +1,72 @@
-"""Every command and snippet of the README, and every example, runs."""
+"""Every command and snippet of README and docs, and every example, runs; the site is whole and needs no other.
+
+A command stands on a line of its own, indented by four blanks.  Behind `# long` it is parsed and not run, behind
+`# refused` it ends with exit code 2.
+"""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import hexmj
+from hexmj.cli.main import options_of
+from hexmj.cli.words import checked
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"^    hexmj (.+)$", README, flags=re.MULTILINE)
+FILES = (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in FILES}
+LINES = dict.fromkeys(
+    line for text in PAGES.values() for line in re.findall(r"^    hexmj (.+?)(?: +# (.+))?$", text, flags=re.MULTILINE)
+)
+COMMANDS = [command for command, told in LINES if not told]
+LONG = [command for command, told in LINES if told.startswith("long")]
+REFUSED = [command for command, told in LINES if told == "refused"]
 FIRST = {command.split()[0]: command for command in reversed(COMMANDS)}
 """Name of a command -> the first line that has it."""
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
-SNIPPET, CONTROLLER = re.findall(r"```python\n(.+?)```", README, flags=re.DOTALL)
-(WEIGHTS,) = re.findall(r"```toml\n(.+?)```", README, flags=re.DOTALL)
+def blocks(page: str, language: str) -> list[str]:
+    """The fenced blocks of a page."""
+    return re.findall(rf"```{language}\n(.+?)```", PAGES[page], flags=re.DOTALL)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """One working folder for all commands: some read what an earlier one wrote."""
-    folder = tmp_path_factory.mktemp("readme")
-    (folder / "mine.py").write_text(CONTROLLER)
+    folder = tmp_path_factory.mktemp("documents")
+    (folder / "mine.py").write_text(blocks("docs/first_controller.md", "python")[0])
+    shutil.copy(hexmj.STICK_INSECT.mjcf, folder / "beetle.xml")
+    return folder
+
+
+@pytest.fixture
+def here(folder, monkeypatch, run):
+    """In the folder, where a first walk lies."""
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(folder)
+    if not Path("results/walk/manifest.json").exists():
+        assert run("walk", "--physical")[0] == 0
     return folder
 
 
 def test_there_is_something_to_run():
     assert len(COMMANDS) >= 10
     assert len(EXAMPLES) >= 4
+    assert all(told in ("", "refused") or told.startswith("long") for _, told in LINES)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(command, folder, run, monkeypatch):
+def test_command(command, here, run):
     """The first of each name in a new process, as it is typed; the others here, where all is imported."""
-    monkeypatch.chdir(folder)
-    if "results/walk" in command and not Path("results/walk/manifest.json").exists():
-        assert run("walk", "--physical")[0] == 0
     if command in FIRST.values():
         subprocess.run([sys.executable, "-m", "hexmj", *command.split()], check=True)
     else:
@@ -50,15 +74,43 @@ def test_command(command, folder, run, monkeypatch):
         assert code == 0, error
 
 
+@pytest.mark.parametrize("command", LONG)
+def test_a_long_command_has_options_that_exist(command):
+    assert options_of(checked(command.split()))
+
+
+@pytest.mark.parametrize("command", REFUSED)
+def test_refused(command, here, run):
+    assert run(*command.split())[0] == 2
+
+
+def test_targets_and_extras_exist():
+    text, makefile = "".join(PAGES.values()), (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in set(re.findall(r"(?:^    |`)make (\w+)", text, flags=re.MULTILINE)):
+        assert re.search(rf"^[\w ]*\b{target}\b[\w ]*:", makefile, flags=re.MULTILINE), target
+    extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8").partition("[project.optional-dependencies]")[2]
+    for extra in set(re.findall(r'pip install "(?:hexmj|\.)\[(\w+)\]"', text)):
+        assert f"\n{extra} = [" in extras, extra
+
+
 def test_snippet(folder):
-    done = subprocess.run([sys.executable, "-c", SNIPPET], cwd=folder, check=True, capture_output=True, text=True)
+    (snippet,) = blocks("README.md", "python")
+    done = subprocess.run([sys.executable, "-c", snippet], cwd=folder, check=True, capture_output=True, text=True)
     kinematic, physical = map(float, done.stdout.splitlines()[:2])
     assert 0 < physical < kinematic < 1
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "README.md" and blocks(page, "python")])
+def test_python_of_a_page(page, here):
+    """One program from top to bottom."""
+    names = {"__name__": page}
+    for block in blocks(page, "python"):
+        exec(compile(block, page, "exec"), names)
+
+
 def test_parameter_file(tmp_path):
     path = tmp_path / "model.toml"
-    path.write_text(WEIGHTS)
+    path.write_text(blocks("docs/commands.md", "toml")[0])
     read = load_controller(str(path))
     assert isinstance(read, Cruse1998)
     assert read.weights == LDVS.weights
@@ -67,3 +119,16 @@ def test_parameter_file(tmp_path):
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, folder):
     subprocess.run([sys.executable, str(example)], cwd=folder, check=True)
+
+
+def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):
+    """Warnings of MkDocs are errors: pages and anchors that are not there, docstrings that do not fit."""
+    build = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True)
+    pages = sorted(tmp_path.rglob("*.html"))
+    loading = re.compile(r"<(?:script|link|img|iframe|source|video)\b[^>]*(?:src|href)=[\"']?(?:https?:)?//")
+    assert len(pages) > len(PAGES)
+    for page in pages:
+        assert not loading.search(page.read_text(encoding="utf-8")), page
+    for sheet in tmp_path.rglob("*.css"):
+        assert not re.search(r"@import|url\([\"']?(?:https?:)?//", sheet.read_text(encoding="utf-8")), sheet

@@ -240,7 +240,7 @@ def test_a_posture_of_ones_own_is_honoured():
 
 @pytest.mark.parametrize("name", ["feeler", "turning"])
 def test_on_the_command_line(name, run):
-    """The README's commands try the tripod."""
+    """The documented commands try the tripod."""
     code, out, _ = run("flss", "--model", OWN[name], "--velocities", 0.5, "--starts", 4, "--window", 30,
                        "--physical", "--json")  # fmt: skip
     assert code == 0

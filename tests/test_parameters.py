@@ -201,7 +201,7 @@ def test_weights_copy_their_input():
     ],
 )
 def test_our_own_sets_beat_the_papers(window, names, velocities):
-    """On fresh starts; over the window `start` LDVS is better than `own` at V = 0.1 (README)."""
+    """On fresh starts; over the window `start` LDVS is better than `own` at V = 0.1 (docs/paper.md)."""
     for v in velocities:
         own, papers = (
             [flss(PRESETS[name.format(v)], [v], seed=7, window=window).flss.item() for name in group]

@@ -3,11 +3,12 @@
 import os
 import shlex
 import sys
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
-from io import TextIOWrapper
+from importlib.metadata import version
+from io import StringIO, TextIOWrapper
 from operator import or_
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +17,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
 from hexmj.cli import answers
-from hexmj.cli.words import checked, typed
+from hexmj.cli.words import checked, shell, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
 from hexmj.replay.film.gl import drop_vain_wish
@@ -27,7 +28,10 @@ NUMBA = (
     " NUMBA_CACHE_DIR), or set NUMBA_CACHE_DIR to a folder that can be written to"
 )
 
-ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice."
+ABOUT = (
+    "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice.\n\n"
+    "hexmj --version tells the version; hexmj --completion bash (zsh, fish) prints what completes words in a shell."
+)
 
 GOES_ON = "Repeat the command to go on"
 AGAIN = f"\n\n{GOES_ON} with a {{}} that was stopped."
@@ -77,6 +81,27 @@ class _Listed:
     """Stands for the options of a command that is only listed."""
 
 
+@dataclass(frozen=True)
+class _Version:
+    """`hexmj --version`."""
+
+    def run(self) -> None:
+        print(f"hexmj {version('hexmj')}")
+
+
+@dataclass(frozen=True)
+class _Completion:
+    """`hexmj --completion SHELL`: what makes the shell complete the words of `hexmj`."""
+
+    shell: str
+
+    def run(self) -> None:
+        with redirect_stdout(StringIO()) as script, suppress(SystemExit):
+            options_of(["--tyro-write-completion", self.shell, "-"])
+        for line in script.getvalue().splitlines():  # the shell would take a description's second line for a word
+            print(line.replace(r"\n", " ") if line.startswith("COMPLETION_SPEC") else line)
+
+
 def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
     drop_vain_wish()
@@ -123,6 +148,10 @@ def main() -> None:
 
 def options_of(words: list[str]) -> Any:
     """The options of the command that is asked for; no other is imported then, and none that are only listed."""
+    if words == ["--version"]:
+        return _Version()
+    if words[:1] == ["--completion"]:
+        return _Completion(shell(words[1:]))
     how: Any = {"config": (FlagCreatePairsOff,)}
     listed = words in (["--help"], ["-h"])
     if not listed:

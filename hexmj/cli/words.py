@@ -14,6 +14,9 @@ from hexmj.literal import literal
 INDIFFERENT = {"--out": 1, "--threads": 1, "--processes": 1, "--scheduler": 1, "--range-of": 1, "--json": 0}
 """Options on which no number depends -> how many words follow them."""
 
+SHELLS = ("bash", "zsh", "fish")
+"""Shells that can be told how the command goes on."""
+
 _TYPED: ContextVar[Sequence[str]] = ContextVar("typed", default=())
 _OWN: ContextVar[Mapping[Path, str]] = ContextVar("own", default=MappingProxyType({}))
 
@@ -22,17 +25,31 @@ def checked(words: list[str]) -> list[str]:
     """The words of a command line, if a person could have typed and read them.
 
     Raises:
-        InputError: a word that is empty, no print, or a book, or an option that is given twice.
+        InputError: a word that is empty, no print, or a book, or an option that is given twice or is tyro's own.
     """
     if alone := [word for word in words if word in ("", "--")]:
         raise InputError(f"{alone[0]!r} stands alone; expected options, each with its values")
     options = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
+    if any(option.startswith("--tyro-") for option in options):
+        raise InputError(f"options of tyro's own were given; for --completion, expected one of {', '.join(SHELLS)}")
     if twice := [one for i, one in enumerate(options) if one in options[:i]]:
         raise InputError(f"{literal(twice[0][:LONGEST])} was given twice; expected every option once")
     for word in words:
         if len(word) > LONGEST or not word.isprintable():
             raise InputError(f"{literal(word)}: expected words of at most {LONGEST} printable characters")
     return words
+
+
+def shell(words: Sequence[str]) -> str:
+    """The shell that stands behind `--completion`.
+
+    Raises:
+        InputError: it is not one of those that are known.
+    """
+    if len(words) != 1 or words[0] not in SHELLS:
+        given = " ".join(words) or "nothing"
+        raise InputError(f"--completion was given {literal(given)!r:.80}; expected one of {', '.join(SHELLS)}")
+    return words[0]
 
 
 @contextmanager

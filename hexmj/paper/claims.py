@@ -355,4 +355,4 @@ IN_PHYSICS = {
         "'it is more realistic to consider dynamic stability': how many of the walks lost on paper it saves",
     ),
 }
-"""Section 6's words that no plan can answer -> the command that does, and what it is about (README, "Experiments")."""
+"""Section 6's words that no plan can answer -> the command that does, and what it is about (docs/experiments.md)."""

@@ -103,7 +103,7 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     lines += [line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
     lines += ["", "## Rules and commands", "", line(("the paper", "agrees if", "command")), line(["---"] * 3)]
     lines += [line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
-    lines += ["", "## Judged in physics", "", "What a plan knows nothing of; the README has the answers.", ""]
+    lines += ["", "## Judged in physics", "", "What a plan knows nothing of; docs/experiments.md has the answers.", ""]
     lines += [f"- {name} (Section 6): {told}; `{command}`" for name, (command, told) in IN_PHYSICS.items()]
     return "\n".join(lines) + "\n"
 

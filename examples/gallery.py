@@ -1,0 +1,55 @@
+"""The pictures of the documentation's gallery: short films of walks, as animated WebP, in `results/gallery`.
+
+`make gallery` puts them into `docs/gallery` instead.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from imageio_ffmpeg import get_ffmpeg_exe
+from xarray import Dataset
+
+import hexmj
+
+FILM = hexmj.Film(width=360, height=270, fps=15.0, slow_motion=2.0)
+SIDE = hexmj.Film(width=480, height=270, fps=15.0, slow_motion=1.0, camera="side")
+GAITS = ("graham", "walknet-reacog", "own-0.5")
+
+
+def walked(name: str, velocity: float, duration: float, start: int = 0, **conditions: object) -> Dataset:
+    """One start of seed 0 in physics, recorded."""
+    starts = hexmj.draw_starts(start + 1, seed=0)[start:]
+    how = hexmj.Conditions.of(**conditions)
+    walk = hexmj.physical_walk(starts, hexmj.load_controller(name), velocity, duration, conditions=how)
+    return hexmj.record(walk, title=name)
+
+
+def planned(name: str, velocity: float, duration: float) -> Dataset:
+    """The same start on paper."""
+    plan = hexmj.walk(hexmj.draw_starts(1, seed=0), hexmj.load_controller(name), velocity, duration)
+    return hexmj.record_plan(plan, hexmj.Conditions(), hexmj.Stride(), title=f"{name}, planned")
+
+
+def film(recordings: list[Dataset], path: Path, how: hexmj.Film) -> None:
+    """Render the recordings side by side into an animated picture that begins anew when it ends."""
+    with TemporaryDirectory() as folder:
+        video = Path(folder) / "film.mp4"
+        frames = hexmj.render(recordings, video, how)
+        convert = ["-i", video, "-loop", "0", "-quality", "50", "-compression_level", "4", path]
+        subprocess.run([get_ffmpeg_exe(), "-loglevel", "error", "-y", *map(str, convert)], check=True)
+    print(f"{path}: {frames} frames, {path.stat().st_size / 1000:.0f} kB")
+
+
+def main() -> None:
+    out = Path(sys.argv[1] if sys.argv[1:] else "results/gallery")
+    out.mkdir(parents=True, exist_ok=True)
+    film([planned("ldvs", 0.4, 140.0), walked("ldvs", 0.4, 140.0)], out / "walk.webp", FILM)
+    film([walked("uncoordinated", 0.5, 60.0), walked("ldvs", 0.5, 60.0)], out / "fall.webp", FILM)
+    film([walked("ldvs", 0.4, 300.0, ground="step", ground_height=3.0, ground_at=60.0)], out / "step.webp", SIDE)
+    film([walked(name, 0.5, 80.0) for name in GAITS], out / "gaits.webp", FILM)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The animal beside the machine: forces, torques, gait, posture and work."""

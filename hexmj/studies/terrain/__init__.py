@@ -1,0 +1,1 @@
+"""Real obstacles: steps, gaps, hurdles and rough ground."""

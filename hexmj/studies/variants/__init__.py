@@ -1,0 +1,1 @@
+"""Sets of weights under every variant of what the paper leaves open."""
