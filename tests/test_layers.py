@@ -25,7 +25,7 @@ FLOORS = (
     ("physics",),
     ("measures",),
     ("paper", "search", "studies"),
-    ("environments", "replay"),
+    ("environments", "replay", "view"),
     ("machine",),
     ("__main__", "cli"),
 )
