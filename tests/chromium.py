@@ -25,7 +25,7 @@ OPTIONS = (
 OFF = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
 """No name is found, so nothing but this machine is reached."""
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 """How long an answer may take [s]."""
 
 

@@ -25,7 +25,7 @@ FLOORS = (
     ("physics",),
     ("measures",),
     ("paper", "search", "studies"),
-    ("environments", "plots", "replay"),
+    ("environments", "plots", "replay", "view"),
     ("machine",),
     ("__main__", "cli"),
 )

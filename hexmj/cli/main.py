@@ -45,6 +45,8 @@ COMMANDS = {
     "render": "A gait video, from recordings or from a walk that is recorded first.",
     "page": "One HTML file that plays a recording, or two side by side: 3D, footfall diagram and stability margin; it"
     " needs no network.",
+    "view": "Look at an insect while it walks, or at a recording: in MuJoCo's viewer where there is a screen, else in a"
+    " browser.",
     "search": "Parameters that minimise the FLSS: a population with few starts, then the downhill simplex with"
     f" many.{AGAIN.format('search')}",
     "reproduce": "The paper's Section 5: every claim with our number and verdict, Figures 2-6, phase histograms,"

@@ -1,0 +1,114 @@
+"""A walk or a recording in MuJoCo's own viewer, whose camera follows the insect."""
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.loading import compile_body
+from hexmj.conditions import Conditions
+from hexmj.errors import RenderingError
+from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.stability import support_polygon
+from hexmj.view.session import LiveSession, ReplaySession, ticks
+
+KEYS = "space pauses, up and down change V, left and right push, enter takes the next start"
+
+SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
+"""Keys as GLFW numbers them."""
+
+IMPULSE = 20.0
+"""Of a push, in multiples of the body's mass times V_p."""
+
+
+def screen() -> bool:
+    """Whether there is a screen to open a window on."""
+    return sys.platform != "linux" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def view_live(session: LiveSession) -> None:
+    """Walk until the window is closed."""
+    walk, wishes = session.walk, SimpleQueue[int]()
+    with _window(walk.conditions, wishes.put) as window:
+        for passed in ticks():
+            if not window.is_running():
+                return
+            with suppress(Empty):
+                _obey(session, wishes.get_nowait())
+            moment = session.tick(passed)
+            seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
+            state = f"fell on {walk.fell_on}" if walk.fell_on else f"margin {moment.margin:+.1f} mm"
+            _show(window, walk.conditions, moment.qpos, moment.margin, seen, f"V = {walk.velocity:.2f}, {state}")
+
+
+def view_recording(session: ReplaySession) -> None:
+    """Play until the window is closed."""
+    take, wishes = session.take, SimpleQueue[int]()
+    with _window(take.conditions, wishes.put) as window:
+        for passed in ticks():
+            if not window.is_running():
+                return
+            with suppress(Empty):
+                session.paused ^= wishes.get_nowait() == SPACE
+            row = session.tick(passed)
+            seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
+            text = f"{take.title}, half speed, margin {take.margin[row]:+.1f} mm"
+            _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
+
+
+def _obey(session: LiveSession, key: int) -> None:
+    """Do what a key stands for."""
+    walk, faster = session.walk, {UP: 0.05, DOWN: -0.05}.get(key)
+    if key == SPACE:
+        session.paused = not session.paused
+    elif key == ENTER:
+        session.begin(session.start + 1)
+    elif faster:
+        walk.steer(velocity=float(np.clip(walk.velocity + faster, 0.0, 0.95)))
+    elif key in (LEFT, RIGHT):
+        walk.push(IMPULSE if key == LEFT else -IMPULSE)
+
+
+def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
+    """MuJoCo's viewer of a body, to be closed by whoever opened it.
+
+    Raises:
+        RenderingError: no window can be opened.
+    """
+    import mujoco.viewer
+
+    compiled = compile_body(conditions)
+    try:
+        window = mujoco.viewer.launch_passive(
+            compiled.model, mujoco.MjData(compiled.model), key_callback=on_key, show_left_ui=False, show_right_ui=False
+        )
+    except RuntimeError as error:  # as on macOS, where only mjpython may open it
+        raise RenderingError(f"no window can be opened ({error}); --browser shows the walk in a browser") from None
+    size = conditions.body.lengths.shortest_leg
+    window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, compiled.root
+    window.cam.distance, window.cam.azimuth, window.cam.elevation = 5 * size, 60.0, -25.0
+    return window
+
+
+def _show(window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str) -> None:
+    """Put the body into a pose, and the marks of a film beside it."""
+    (feet, stance, centre, tips), body, scene = seen, conditions.body, window.user_scn
+    with window.lock():
+        window.d.qpos[:] = qpos
+        mujoco.mj_forward(window.m, window.d)
+        polygon, stable = support_polygon(feet, stance), bool(margin > 0.0)
+        level = float(ground_level(conditions.ground, body.lengths, np.vstack([polygon, centre[:2]])).max())
+        scene.ngeom = 0
+        mark_support(scene, body.marks, polygon, level, stable)
+        mark_centre_of_mass(scene, body.marks, centre, level, stable)
+        mark_planned_tips(scene, body.marks, tips)
+    sign = "within the polygon" if stable else "NOT within the polygon"
+    corner = mujoco.mjtGridPos.mjGRID_TOPLEFT
+    window.set_texts((mujoco.mjtFontScale.mjFONTSCALE_150, corner, f"{text}, {sign}", ""))
+    window.sync()

@@ -1,0 +1,249 @@
+"""One insect that walks on and on, by a controller and conditions that may change while it goes.
+
+Knows nothing of who looks at it, nor of the time on the wall.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexmj.bodies.description import ROOT_QPOS
+from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin, tell
+from hexmj.controllers.protocol import (
+    Controller,
+    Plan,
+    ReadingPlan,
+    Sensed,
+    SteerableController,
+    SteerablePlan,
+)
+from hexmj.physics.chunks import PUSH_LASTS, Chunk, Insects, Push
+from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
+from hexmj.physics.outcomes import measured_walk
+from hexmj.physics.settling import settle
+from hexmj.rotations import rotated
+from hexmj.stability import walk_margin
+from hexmj.timing import MOST_STEPS, Stride
+from hexmj.walks import PlannedWalk, joined, part_of
+
+ONLY = np.array([0])
+"""The index of the only insect."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What is seen of an insect at the end of a step."""
+
+    seconds: float
+    """Since the walk began [s]."""
+    velocity: float
+    """Commanded V_r, a fraction of V_p."""
+    qpos: np.ndarray
+    """(position,) as MuJoCo has them."""
+    feet: np.ndarray
+    """(leg, 3) in the world [mm]."""
+    planned_tips: np.ndarray
+    """(leg, 3) where the tips shall be, in the world [mm]."""
+    centre_of_mass: np.ndarray
+    """(3,) in the world [mm]."""
+    stance: np.ndarray
+    """(leg,) which feet stand."""
+    planned_stance: np.ndarray
+    """(leg,) which legs retract in the plan."""
+    margin: float
+    """Measured stability margin [mm]."""
+    planned_margin: float
+    """Of the plan [mm]."""
+
+
+class Steered:
+    """A `protocol.ReadingPlan` of one start around whatever plan goes on at the moment, whose steps are counted on."""
+
+    def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
+        """Begin at `starts`, (1, leg) [mm]."""
+        self.starts, self.stride, self.done = starts, stride, 0
+        self._plan: Plan = begin(controller, starts, velocity, stride, threads=1)
+
+    @property
+    def reads(self) -> bool:
+        """Whether the plan wants to be told of the legs before each step."""
+        return isinstance(self._plan, ReadingPlan)
+
+    def sense(self, sensed: Sensed) -> None:
+        """Hand on what is known."""
+        if isinstance(self._plan, ReadingPlan):
+            tell(self._plan, sensed)
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """The next steps of the plan that goes on now."""
+        walk = self._plan.advance(steps)  # checked by whoever asks
+        self.done += steps
+        return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
+
+    def hand_over(self, controller: Controller, velocity: float) -> bool:
+        """Let a controller go on at V_r from the legs as they are: their tips, and whether they stand.
+
+        What else the last plan remembers is forgotten, as is the influence on a leg of the step before.
+
+        Returns:
+            Whether both the last plan and the controller can do so; else nothing has changed.
+        """
+        if not (isinstance(self._plan, SteerablePlan) and isinstance(controller, SteerableController)):
+            return False
+        tips, standing = self._plan.tips, self._plan.standing
+        plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
+        plan.see(tips, standing)
+        self._plan = plan
+        return True
+
+
+class LiveWalk:
+    """The insect, wherever its steps have brought it."""
+
+    moment: Moment
+    """What is seen now."""
+    trace: list[Moment]
+    """Every step since `advance` was last called, the last one is `moment`."""
+    fell_on: str
+    """Part of the trunk that has touched the ground; nothing while it walks."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        velocity: float,
+        start: np.ndarray,
+        conditions: Conditions | None = None,
+        stride: Stride | None = None,
+    ) -> None:
+        """Settle at a start and be about to walk.
+
+        Args:
+            controller: plans the walk.
+            velocity: V_r as a fraction of V_p.
+            start: tips on their own axes, all standing, (leg,) [mm].
+            conditions: of the walk.
+            stride: of the plan.
+
+        Raises:
+            InputError: a value that makes no sense.
+        """
+        self.controller, self.velocity, self.start = controller, velocity, np.array(start, dtype=float)
+        self.conditions, self.stride = conditions or Conditions(), stride or Stride()
+        self.begin()
+
+    def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
+        """Begin again, at another start or under other conditions where these are given."""
+        start, conditions = self.start if start is None else start, conditions or self.conditions
+        settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
+        self._plan = Steered(self.controller, settled.starts, self.velocity, self.stride)
+        self._push = Push(np.zeros(1), np.zeros(1))
+        self._insects = Insects(settled, self._push, threads=1)
+        self._orders = OrdersFromPlan(settled, self._plan, MOST_STEPS * self.stride.dt)
+        self.start, self.conditions, self.settled = start, conditions, settled
+        self.trace, self.fell_on = [], ""
+        self._before: PlannedWalk | None = None
+        self._left = 0.0
+        self._walk(2)  # shows the end of the first
+
+    def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
+        """Change V_r, the controller, or both.
+
+        They take effect from the next step on, the legs as they are (`Steered.hand_over`).  Where a controller cannot
+        go on from legs as they are, the walk begins again at its start.
+
+        Returns:
+            Whether the walk went on.
+
+        Raises:
+            InputError: a velocity or controller that makes no sense; the walk goes on as it was.
+        """
+        velocity = self.velocity if velocity is None else velocity
+        controller = controller or self.controller
+        begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # refuses what makes no sense
+        self.velocity, self.controller = velocity, controller
+        if self._plan.hand_over(controller, velocity):
+            return True
+        self.begin()
+        return False
+
+    def push(self, impulse: float) -> None:
+        """Push from the side at the root, within the next `PUSH_LASTS` or two.
+
+        Args:
+            impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
+        """
+        vp, lasts = self.conditions.time.vp, max(1, round(PUSH_LASTS / self.conditions.time.seconds(self.stride)))
+        self._push.impulse[:] = impulse * self.conditions.body.mass * vp
+        self._push.time[:] = (self._plan.done // lasts + 1) * lasts * self.stride.dt
+
+    def advance(self, seconds: float) -> Moment:
+        """Walk on by so much time, in whole steps of the plan; what is left over is made up for by later calls.
+
+        Returns:
+            What is seen then; of an insect that has fallen, what was seen last.
+
+        Raises:
+            InputError: it walks off the ground that was laid, or its controller fails.
+            SimulationError: the simulation diverged.
+        """
+        self._left += seconds
+        self.trace = []
+        step = self.conditions.time.seconds(self.stride)
+        steps = int(self._left / step + 1e-9)
+        self._left -= steps * step
+        while steps > 0 and not self.fell_on:
+            now = min(steps, steps_in_chunk(self.settled.substeps))
+            self._walk(now)
+            steps -= now
+        return self.moment
+
+    def _walk(self, steps: int) -> None:
+        """A few steps."""
+        chunk = self._insects.carry_out(self._ordered(steps), steps)
+        if chunk.fell.any():
+            trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
+            self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]
+        self.trace += self._moments(chunk)
+        if self.trace:
+            self.moment = self.trace[-1]
+
+    def _ordered(self, steps: int) -> Iterator[Orders]:
+        """Orders for the next steps; to a plan that reads, one by one, from what the last has brought about."""
+        if not self._plan.reads:
+            yield self._orders_for(steps)
+            return
+        for _ in range(steps):
+            self._plan.sense(self._insects.sensed(ONLY))
+            yield self._orders_for(1)
+
+    def _orders_for(self, steps: int) -> Orders:
+        orders = self._orders.ahead(ONLY, steps)
+        assert orders, "a walk of MOST_STEPS outlives who looks at it"
+        return orders
+
+    def _moments(self, chunk: Chunk) -> Iterator[Moment]:
+        """What a chunk shows: the insect, and what was planned, as each but the first step begins, until it falls."""
+        columns, walk, centre = measured_walk(chunk, self.settled)
+        margins = walk_margin(walk, threads=1)[:, 0]
+        plan = joined([self._before or part_of(chunk.plan, slice(1)), chunk.plan])
+        self._before = part_of(chunk.plan, slice(-1, None))
+        planned_margins = walk_margin(plan, threads=1)[:, 0]
+        feet = chunk.sensors[0, :, self.settled.compiled.columns.foot].reshape(-1, 6, 3)
+        roots = chunk.qpos[0, :, None, :ROOT_QPOS]
+        tips = roots[..., :3] + rotated(roots[..., 3:], chunk.targets[0])
+        for n, column in enumerate(columns[columns < chunk.valid[0]]):
+            step = column // self.settled.substeps
+            yield Moment(
+                seconds=float(walk.time[n]) / self.conditions.time.vp,
+                velocity=float(plan.velocity[step, 0]),
+                qpos=chunk.qpos[0, column],
+                feet=feet[column],
+                planned_tips=tips[column],
+                centre_of_mass=centre[n, 0],
+                stance=walk.stance[n, 0],
+                planned_stance=plan.stance[step, 0],
+                margin=float(margins[n]),
+                planned_margin=float(planned_margins[step]),
+            )

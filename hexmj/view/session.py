@@ -1,0 +1,95 @@
+"""What every viewer shows: a live walk or a recording, in the time on the wall."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from hexmj.bodies.loading import compile_body
+from hexmj.errors import InputError, SimulationError
+from hexmj.replay.take import Take
+from hexmj.view.live import LiveWalk, Moment
+
+HZ = 30.0
+"""Pictures in a second."""
+
+LONGEST = 0.1
+"""Most time that is made up for at once [s]; who is slower than that falls behind the time on the wall."""
+
+LIES = 1.5
+"""How long a fallen insect lies until it begins at the next start [s]."""
+
+RECENT = 60
+"""Pictures over which the factor is measured."""
+
+
+def ticks(hz: float = HZ) -> Iterator[float]:
+    """Seconds since the last picture, whenever one is due, for ever."""
+    last = time.perf_counter()
+    while True:
+        time.sleep(max(0.0, last + 1.0 / hz - time.perf_counter()))
+        now = time.perf_counter()
+        yield now - last
+        last = now
+
+
+class LiveSession:
+    """A live walk in the time on the wall; one that has fallen begins again, at the next start."""
+
+    def __init__(self, walk: LiveWalk, start: int, starts: Callable[[int], np.ndarray]) -> None:
+        """Around a walk from the start of this number; `starts` tells a start, (leg,) [mm], by its number."""
+        self.walk, self.start, self._starts, self._lies = walk, start, starts, 0.0
+        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)
+        self.paused, self.told = False, ""
+
+    @property
+    def factor(self) -> float:
+        """Seconds walked for a second on the wall, lately."""
+        wall = sum(one for one, _ in self._recent)
+        return sum(one for _, one in self._recent) / wall if wall else 1.0
+
+    def tick(self, passed: float) -> Moment:
+        """Let so much time pass [s]."""
+        if self.paused:
+            return self.walk.moment
+        before = self.walk.moment.seconds
+        if not self.walk.fell_on:
+            if not self.attempt(lambda: self.walk.advance(min(passed, LONGEST))):
+                self.begin()
+            self._recent.append((passed, max(0.0, self.walk.moment.seconds - before)))
+        elif (lies := self._lies + passed) < LIES:
+            self._lies = lies
+        else:
+            self.begin(self.start + 1)
+        return self.walk.moment
+
+    def begin(self, start: int | None = None) -> None:
+        """Begin again, at the start of another number where one is given."""
+        self.start, self._lies = self.start if start is None else start, 0.0
+        self.walk.begin(self._starts(self.start))
+        self._recent.clear()
+
+    def attempt(self, change: Callable[[], object]) -> bool:
+        """Do something to the walk, and tell why where that makes no sense; whether it did."""
+        try:
+            change()
+        except (InputError, SimulationError) as error:
+            self.told = str(error)
+            return False
+        return True
+
+
+class ReplaySession:
+    """A recording in the time on the wall, again and again."""
+
+    def __init__(self, take: Take, slow_motion: float = 2.0) -> None:
+        """Play a take `slow_motion` times as slowly as it was."""
+        self.take, self._slow, self._seconds, self.paused = take, slow_motion, 0.0, False
+        self.compiled = compile_body(take.conditions)
+
+    def tick(self, passed: float) -> int:
+        """Let so much time pass [s]; tells the step that is seen."""
+        if not self.paused:
+            self._seconds = (self._seconds + passed / self._slow) % (self.take.duration + LIES)
+        return self.take.row(self._seconds)

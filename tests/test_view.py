@@ -1,0 +1,253 @@
+"""Live walks: the same bits as measured ones, changed while they go; and what shows them in a browser."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+
+from chromium import tab
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Symmetric
+from hexmj.controllers.named import load_controller
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.errors import InputError
+from hexmj.measures.kinematic import walk
+from hexmj.measures.physical import physical_walk
+from hexmj.replay.recording import record, save_recording
+from hexmj.starts import draw_starts
+from hexmj.view.browser import BrowserView, footfall
+from hexmj.view.live import LiveWalk
+from hexmj.view.session import LIES, LiveSession
+
+STARTS = draw_starts(8, seed=1)
+
+
+def begun(controller: Controller = LDVS, velocity: float = 0.4) -> LiveWalk:
+    """A live walk from one of the starts."""
+    return LiveWalk(controller, velocity, STARTS[0])
+
+
+@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS), load_controller("graham")], ids=lambda one: one.name)
+def test_a_walk_that_is_left_alone_is_the_measured_one(controller):
+    """To the last bit, however it is divided into pictures."""
+    live, shown = begun(controller), []
+    for seconds in (0.03, 0.001, 0.1, 0.0333, 0.05):
+        live.advance(seconds)
+        shown += live.trace
+    measured = physical_walk(STARTS[:1], controller, 0.4, 24.0)
+    rows = np.rint(np.array([one.seconds for one in shown]) * 80.0 / 0.1).astype(int) - 1
+    assert len(shown) > 150
+    assert (np.diff(rows) == 1).all()
+    for name, values in {
+        "qpos": measured.qpos[:, 0],
+        "centre_of_mass": measured.centre_of_mass[:, 0],
+        "stance": measured.measured.stance[:, 0],
+        "planned_stance": measured.ordered.stance[:, 0],
+    }.items():
+        np.testing.assert_array_equal([getattr(one, name) for one in shown], values[rows])
+
+
+def test_a_changed_velocity_and_changed_weights_go_on_from_the_legs_as_they_are():
+    live = begun(velocity=0.2)
+    live.advance(0.2)
+    before, seconds = live.moment, live.moment.seconds
+    assert live.steer(velocity=0.6)
+    assert live.steer(controller=HWS)
+    live.advance(0.02)
+    after = live.trace
+    assert after[0].seconds == pytest.approx(seconds + 0.00125)
+    assert np.abs(after[0].qpos - before.qpos).max() < 1.0
+    assert live.moment.velocity == 0.6
+    assert live.controller == HWS
+    stood = [one.planned_stance for one in after]
+    assert (stood[1] == before.planned_stance).sum() >= 4
+
+
+def test_a_handed_over_plan_is_walked_as_the_new_controller_plans_it():
+    """On paper: from time 0 on it is just the walk of the new controller."""
+    live = begun(UNCOORDINATED, 0.3)
+    plan = live._plan
+    fresh = type(plan)(UNCOORDINATED, STARTS[:1], 0.3, live.stride)
+    assert fresh.hand_over(LDVS, 0.5)
+    np.testing.assert_array_equal(fresh.advance(400).x, walk(STARTS[:1], LDVS, 0.5, 40.0).x)
+
+
+def test_a_controller_that_cannot_go_on_begins_again():
+    live = begun(ReadsLegs(LDVS))
+    live.advance(0.1)
+    assert not live.steer(velocity=0.5)
+    assert live.moment.seconds < 0.01
+    assert live.velocity == 0.5
+
+
+def test_what_makes_no_sense_changes_nothing():
+    live = begun()
+    live.advance(0.1)
+    before = live.moment
+    with pytest.raises(InputError, match="expected 0 <= V < 1"):
+        live.steer(velocity=1.5)
+    assert live.velocity == 0.4
+    assert live.moment is before
+
+
+def test_a_push_moves_the_insect_to_its_side():
+    aside = []
+    for impulse in (0.0, 6.0, -6.0):
+        live = begun()
+        live.advance(0.05)
+        live.push(impulse)
+        live.advance(0.1)
+        aside.append(live.moment.qpos[1])
+    assert aside[1] > aside[0] + 0.3
+    assert aside[2] < aside[0] - 0.3
+
+
+def test_other_conditions_begin_again():
+    live = begun()
+    live.advance(0.1)
+    live.begin(conditions=Conditions.of(vp=160.0))
+    assert live.moment.seconds < 0.01
+    live.advance(0.1)
+    assert live.moment.qpos[0] > 3.0
+
+
+def test_a_fallen_insect_lies_for_a_while_and_begins_at_the_next_start():
+    session = LiveSession(begun(UNCOORDINATED, 0.9), 0, STARTS.__getitem__)
+    for _ in range(100):
+        session.tick(0.05)
+        if session.walk.fell_on:
+            break
+    assert session.walk.fell_on in session.walk.conditions.body.trunk
+    seen = session.walk.moment
+    assert session.tick(0.5 * LIES) is seen
+    session.tick(0.6 * LIES)
+    assert session.start == 1
+    assert not session.walk.fell_on
+
+
+def test_a_paused_walk_stands_still():
+    session = LiveSession(begun(), 0, STARTS.__getitem__)
+    session.paused = True
+    before = session.walk.moment
+    assert session.tick(0.05) is before
+
+
+def test_the_footfall_diagram_has_a_bar_for_every_swing():
+    off = np.zeros((100, 6), dtype=bool)
+    off[10:20, 0] = off[40:60, 0] = off[90:, 5] = True
+    assert footfall(np.arange(1, 101) / 80, off).count("<rect") == 3
+
+
+@pytest.fixture
+def view() -> Iterator[BrowserView]:
+    """A view of a walk at a port of its own."""
+    opened = BrowserView(LiveSession(begun(velocity=0.3), 0, STARTS.__getitem__), port=0)
+    yield opened
+    opened.server.stop()
+
+
+def weight(walk: LiveWalk) -> float:
+    """One of the weights that the insect walks by."""
+    controller = walk.controller
+    assert isinstance(controller, Cruse1998)
+    assert isinstance(controller.weights, Symmetric)
+    return controller.weights.p1_i
+
+
+def until(view: BrowserView, done: Callable[[], bool]) -> None:
+    """Go on until something is so; what sliders do is done by threads."""
+    end = time.monotonic() + 20.0
+    while not done():
+        assert time.monotonic() < end
+        view.step(0.02)
+
+
+def test_a_page_is_served_the_walk_goes_on_and_sliders_change_it(view):
+    with urlopen(view.address) as answer:
+        assert answer.status == 200
+        assert b"<html" in answer.read(1000)
+    walked = view.session.walk
+    for _ in range(5):
+        view.step(0.02)
+    assert walked.moment.seconds > 0.09
+    view.controls["V"].value = 0.6
+    until(view, lambda: walked.moment.velocity == 0.6)
+    view.controls["p1_i"].value = 3.0
+    until(view, lambda: weight(walked) == 3.0)
+    seconds = walked.moment.seconds
+    assert seconds > 0.1
+    view.controls["V_p"].value = 120.0
+    until(view, lambda: walked.conditions.time.vp == 120.0)
+    assert walked.moment.seconds < seconds
+    assert "margin" in view._readout.content
+
+
+def test_weights_of_other_controllers_have_no_sliders():
+    opened = BrowserView(LiveSession(begun(load_controller("graham")), 0, STARTS.__getitem__), port=0)
+    try:
+        assert set(opened.controls) == {"V", "V_p"}
+    finally:
+        opened.server.stop()
+
+
+def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        code, _, error = run("view", "--browser", "--port", taken.getsockname()[1])
+        assert (code, error.count("\n")) == (2, 1)
+        assert "expected a free port" in error
+    monkeypatch.setitem(sys.modules, "viser", None)
+    code, _, error = run("view", "--browser", "--port", 0)
+    assert code == 2
+    assert 'pip install "hexmj[view]"' in error
+    code, _, error = run("view", "recording.nc", "--velocity", 0.5)
+    assert code == 2
+    assert "--velocity was given with a recording" in error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("recorded", [False, True])
+def test_the_command_serves_until_ctrl_c(recorded, tmp_path):
+    words = ["view", "--browser", "--port", "0"]
+    if recorded:
+        measured = physical_walk(STARTS[:1], LDVS, 0.4, 10.0)
+        words.append(str(save_recording(record(measured, 0, "a walk"), tmp_path / "recording.nc")))
+    command = [sys.executable, "-P", "-m", "hexmj", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as going:
+        assert going.stdout
+        assert going.stderr
+        told = going.stdout.readline()
+        while "http://" not in told or "Ctrl-C" not in told:
+            told += going.stdout.readline()
+        address = told.partition("http://")[2].partition(";")[0]
+        with urlopen(f"http://{address.strip()}") as answer:
+            assert b"</html>" in answer.read()
+        going.send_signal(signal.SIGINT)
+        assert going.wait(30) == 130
+        assert going.stderr.read() == "hexmj: stopped\n"
+
+
+@pytest.mark.slow
+def test_a_browser_shows_the_walk(view):
+    """What it says of the walk changes as the walk goes on; nothing comes from elsewhere."""
+    view.step(0.02)
+    with tab() as opened:
+        opened.resize(640, 480)
+        opened.open(view.address)
+        opened.wait("document.body.innerText.includes('margin')")
+        before = view.session.walk.moment.seconds
+        for _ in range(10):
+            view.step(0.1)
+        assert view.session.walk.moment.seconds > before
+        opened.wait(f"document.body.innerText.includes('{view.session.walk.moment.seconds:.2f} s')")
+        assert opened.value("document.querySelectorAll('canvas').length") >= 1
+        assert all(one.startswith((view.address, "data:", "blob:")) for one in opened.requests)
