@@ -27,11 +27,12 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
     Raises:
         InputError: it is none of these.
     """
-    if typed("progress", progress, Progress | bool | None) is True:
+    given = typed("progress", progress, Progress | bool | None)
+    if given is True:
         with progress_bar(label) as told:
             yield told
     else:
-        yield progress or None
+        yield given or None
 
 
 @contextmanager

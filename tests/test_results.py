@@ -65,7 +65,7 @@ def study(name: str) -> xr.Dataset:
         "disturb": lambda: DisturbedWalks(hexmj.LDVS, [0.6], ["halt"], n_starts=2, window=20.0),
         "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=10),
         "biology": lambda: Biology(hexmj.LDVS, 4, n_starts=2),
-        "league": lambda: League(entrants(["ldvs"]), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
+        "league": lambda: League(entrants(("ldvs",)), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
         "ablate": lambda: Ablation({"ldvs": switched("ldvs")}, [0.5], n_starts=5, n_physical=2, periods=12),
     }
     return conduct(small[name]())
@@ -116,7 +116,15 @@ def test_settings_are_told_as_they_were_given():
 
 def test_the_title_tells_what_was_chosen():
     title = hexmj.plot(compared()).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
-    for words in ("3 starts", "seed 0", "window 20", "= 200 mm/s", "friction 0.5", "ground: step", "a = 0.01"):
+    for words in (
+        "3 starts",
+        "seed 0",
+        "window of 20 time units",
+        "= 200 mm/s",
+        "friction 0.5",
+        "ground: step",
+        "a = 0.01",
+    ):
         assert words in title
     assert "height" not in title, "what is as usual is not told"
     assert "ldvs, reading the legs" in hexmj.plot(flss()).get_suptitle()

@@ -117,7 +117,7 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen
 def test_a_gif_plays_the_same_walk(fallen, tmp_path):
     frames = render([fallen], tmp_path / "film.gif", Film(width=320, height=240, fps=10, slow_motion=4.0))
     with Image.open(tmp_path / "film.gif") as film:
-        assert (film.n_frames, film.size) == (frames, (320, 240))
+        assert (getattr(film, "n_frames", 1), film.size) == (frames, (320, 240))
         assert sum(film.info["duration"] for film in ImageSequence.Iterator(film)) == pytest.approx(1200, abs=100)
 
 
