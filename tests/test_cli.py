@@ -455,6 +455,8 @@ NONSENSE = [
     (["render", "a.nc", "--beside", "planned"], "--beside was given with recordings"),
     (["render", "--slow-motion", "1e12"], "expected 0.001 to 1000"),
     (["render", "--camera", "behind"], "following"),
+    (["render", "--format", "avi"], "gif"),
+    (["flss", "--format", "pdf"], "--format pdf without --out; expected it where a figure is written"),
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
     (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),
