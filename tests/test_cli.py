@@ -214,17 +214,21 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     walk = ["--velocity", 0.5, "--window", 16]
     run("walk", *walk, "--physical", "--out", tmp_path / "walk")
     for name, words, width in (
-        ("file", [tmp_path / "walk" / "recording.nc"], 320),
-        ("plan", [*walk, "--beside", "planned"], 640),
-        ("model", [*walk, "--beside", "uncoordinated"], 640),
+        ("ldvs-V-0.5", [tmp_path / "walk" / "recording.nc"], 320),
+        ("ldvs-V-0.5-beside-planned", [*walk, "--beside", "planned"], 640),
+        ("ldvs-V-0.5-beside-uncoordinated", [*walk, "--beside", "uncoordinated"], 640),
     ):
         film = ["--width", 320, "--height", 240, "--fps", 20, "--slow-motion", 4]
-        code, text, _ = run("render", *words, *film, "--json", "--out", tmp_path / name)
+        code, text, _ = run("render", *words, *film, "--json", "--out", tmp_path / "films")
         assert code == 0
-        video, fps = read_film(tmp_path / name / "gait.mp4")
+        video, fps = read_film(tmp_path / "films" / f"{name}.mp4")
         assert fps == 20
         assert json.loads(text)["frames"] == len(video) == round(16 / 80 * 4 * 20)
         assert video.shape[1:] == (240, width, 3)
+    assert len([*(tmp_path / "films").glob("*.mp4")]) == len([*(tmp_path / "films").glob("*-manifest.json")]) == 3
+    code, _, error = run("render", tmp_path / "walk" / "recording.nc", *film, "--out", tmp_path / "films")
+    assert code == 0
+    assert "ldvs-V-0.5.mp4 was there; the new film takes its place" in error
 
 
 SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "start", "--starts", 40, "--budget", 40,
@@ -478,6 +482,8 @@ NONSENSE = [
     (["render", "a.nc", "--beside", "planned"], "--beside was given with recordings"),
     (["render", "--slow-motion", "1e12"], "expected 0.001 to 1000"),
     (["render", "--camera", "behind"], "following"),
+    (["render", "--format", "avi"], "gif"),
+    (["flss", "--format", "pdf"], "--format pdf without --out; expected it where a figure is written"),
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
     (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),

@@ -58,14 +58,15 @@ def study(name: str) -> xr.Dataset:
     from hexmj.studies.terrain.study import Terrain
     from hexmj.studies.variants.study import Variants
 
+    conditions = hexmj.Conditions.of(vp=200.0)
     small: dict[str, Callable[[], Study]] = {
         "map": lambda: StabilityMap(hexmj.LDVS, "vp", [80.0, 320.0], [0.5], n_starts=2, window=10.0),
         "converge": lambda: StaticLimit(hexmj.LDVS, vps=[320.0], n_starts=2, window=10.0),
         "terrain": lambda: Terrain(hexmj.LDVS, [0.6], ["step"], [3.0], grasps=[0.0], n_starts=2),
         "disturb": lambda: DisturbedWalks(hexmj.LDVS, [0.6], ["halt"], n_starts=2, window=20.0),
-        "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=10),
+        "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=2, window=5.0, conditions=conditions),
         "biology": lambda: Biology(hexmj.LDVS, 4, n_starts=2),
-        "league": lambda: League(entrants(["ldvs"]), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
+        "league": lambda: League(entrants(("ldvs",)), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
         "ablate": lambda: Ablation({"ldvs": switched("ldvs")}, [0.5], n_starts=5, n_physical=2, periods=12),
     }
     return conduct(small[name]())
@@ -103,6 +104,13 @@ def test_a_study_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(study(name), tmp_path)
 
 
+def test_one_velocity_is_a_list_of_one():
+    alone, listed = (hexmj.flss(hexmj.LDVS, v, n_starts=5) for v in (0.3, [0.3]))
+    assert alone.identical(listed)
+    alone, listed = (hexmj.compare(hexmj.LDVS, v, n_starts=2, window=5.0) for v in (0.3, [0.3]))
+    assert alone.identical(listed)
+
+
 def test_settings_are_told_as_they_were_given():
     told = hexmj.settings(compared())
     assert told["study"] == "compare"
@@ -116,7 +124,15 @@ def test_settings_are_told_as_they_were_given():
 
 def test_the_title_tells_what_was_chosen():
     title = hexmj.plot(compared()).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
-    for words in ("3 starts", "seed 0", "window 20", "= 200 mm/s", "friction 0.5", "ground: step", "a = 0.01"):
+    for words in (
+        "3 starts",
+        "seed 0",
+        "window of 20 time units",
+        "= 200 mm/s",
+        "friction 0.5",
+        "ground: step",
+        "a = 0.01",
+    ):
         assert words in title
     assert "height" not in title, "what is as usual is not told"
     assert "ldvs, reading the legs" in hexmj.plot(flss()).get_suptitle()

@@ -75,7 +75,8 @@ def test_a_notebook_shows_two_periods_of_a_gait(found: Gait):
 
 
 def test_nothing_that_can_be_shown_is_no_error():
-    empty = hexmj.Walk(np.zeros(0), np.zeros((0, 0)), *np.zeros((2, 0, 0, 6)), np.zeros((0, 0, 6), dtype=bool))
+    tips = np.zeros((0, 0, 6))
+    empty = hexmj.Walk(np.zeros(0), np.zeros((0, 0)), tips, tips, tips.astype(bool))
     assert repr(empty) == "Walk(0 steps, 0 starts, V = unknown)"
     assert empty._repr_html_() is None
 

@@ -3,22 +3,28 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image, ImageSequence
 
 from film_reader import read_film
+from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
-from hexmj.replay.film.video import render
+from hexmj.replay.film.overlay import Overlay
+from hexmj.replay.film.video import _view, render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.replay.schema import MEASURED, PLANNED
+from hexmj.replay.take import Take
 from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s
@@ -108,11 +114,44 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen
     assert np.abs(left[5] - left[2]).mean() > 2 * np.abs(left[17] - left[14]).mean(), "the shorter one freezes"
 
 
+def test_a_gif_plays_the_same_walk(fallen, tmp_path):
+    frames = render([fallen], tmp_path / "film.gif", Film(width=320, height=240, fps=10, slow_motion=4.0))
+    with Image.open(tmp_path / "film.gif") as film:
+        assert (getattr(film, "n_frames", 1), film.size) == (frames, (320, 240))
+        assert sum(film.info["duration"] for film in ImageSequence.Iterator(film)) == pytest.approx(1200, abs=100)
+
+
+def test_what_is_stable_is_told_without_colours(fallen):
+    """By a sign and by words, of now and of what was before; the bar of the scale is as long as it says."""
+    take = Take.of(fallen)
+    overlay = Overlay(take, Film(slow_motion=4.0), take.duration)
+    unstable = int(np.argmax(take.margin <= 0))
+    again = replace(take, margin=np.abs(take.margin))
+    states = [overlay._state(row, seconds)[0] for row, seconds in ((0, 0.0), (unstable, take.lost), (0, take.fell))]
+    assert [state[0] for state in states] == ["●", "▲", "■"]
+    assert "stable, but lost at" in Overlay(again, Film(), 1.0)._state(unstable, take.lost)[0]
+    frame = np.full((480, 640, 3), 200, dtype=np.uint8)
+    overlay.draw(frame, 0, 0.0, 5.0)
+    strip = frame[400 - 9]
+    assert (strip[10:300, 0] < 60).argmin() == 101, "20 mm at 5 pixels/mm, from end to end"
+
+
+def test_the_scale_is_that_of_the_camera(plan):
+    """From above, a mm near the ground is as many pixels as the MJCF's camera says."""
+    take = Take.of(plan)
+    film, model = Film(camera="top"), compile_body(take.conditions).model
+    model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
+    with gl.renderer(model, film.height, film.width) as renderer:
+        _, scale = _view(renderer, mujoco.MjData(model), "top", take, 0)
+    height = model.cam("top").pos[2]  # above the centre of mass of what it tracks
+    assert scale == pytest.approx(480 / (2 * height * np.tan(np.radians(model.cam("top").fovy[0] / 2))), rel=0.05)
+
+
 def test_high_quality_has_shadows(fallen, tmp_path):
     dark = {}
     for film in (Film(quality="fast", slow_motion=0.2), Film(quality="high", slow_motion=0.2)):
         render([fallen], tmp_path / "film.mp4", film)
-        shot = scene(read_film(tmp_path / "film.mp4")[0][0])
+        shot = scene(read_film(tmp_path / "film.mp4")[0][0])[:-18]  # without the words at the scale
         dark[film.quality] = ((shot < 150).all(axis=-1) & (np.ptp(shot, axis=-1) < 25)).mean()
     assert dark["high"] > 2 * dark["fast"]
 
@@ -135,8 +174,8 @@ def test_films_that_make_no_sense(fallen, tmp_path):
         render([fallen], tmp_path / "film.mp4", Film(camera="behind"))
     with pytest.raises(InputError, match="7 recordings were given; expected 1 to 6"):
         render([fallen] * 7, tmp_path / "film.mp4")
-    for path in (tmp_path / "film.gif", tmp_path / "nowhere" / "film.mp4"):
-        with pytest.raises(InputError, match=r"expected a name with \.mp4 in a folder that exists"):
+    for path in (tmp_path / "film.avi", tmp_path / "nowhere" / "film.mp4"):
+        with pytest.raises(InputError, match=r"expected a name with \.mp4 or \.gif in a folder that exists"):
             render([fallen], path)
     with pytest.raises(InputError, match="'a fall' holds no pose"):
         poses = [name for name, one in (PLANNED | MEASURED).items() if one.gaps == "after a fall"]

@@ -1,8 +1,11 @@
 """`hexmj render`."""
 
+import re
+import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional
 
@@ -14,12 +17,16 @@ from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
+from hexmj.literal import literal
 from hexmj.progress import progress_bar
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.results import results_folder
 
 if TYPE_CHECKING:
     import xarray as xr
+
+LONGEST_NAME = 120
+"""Characters of a file's name that titles make."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +43,10 @@ class Render(WalkingCommand):
     """Side by side on the same start: 'planned' (the plan, with its polygon) or a second controller."""
     start: int = 0
     """Which of the seed's random starts."""
+    format: Literal["mp4", "gif"] = "mp4"
+    """Format of the video."""
     out: Path = Path("results/render")
-    """Folder for the video and its recordings."""
+    """Folder for the video and its recordings, whose names tell what they show."""
     film: OmitArgPrefixes[Film] = field(default_factory=Film)
     workers: OmitArgPrefixes[Workers] = field(default_factory=Workers)
 
@@ -51,18 +60,22 @@ class Render(WalkingCommand):
         beside = [] if self.beside in (None, "planned") else [self.beside]
         controllers = self.controlled.controllers([self.model, *beside])
         shown = [load_recording(path) for path in self.recordings]
-        out = results_folder(self.out, ("gait.mp4", "recording-1.nc", "recording-2.nc", MANIFEST))
+        name = self._name(shown)
+        video, manifest = f"{name}.{self.format}", f"{name}-{MANIFEST}"
+        out = results_folder(self.out, (video, f"{name}-1.nc", f"{name}-2.nc", manifest))
         if sentence := gl.missing():
             raise RenderingError(sentence)
         files, settings = [], {"film": asdict(self.film)}
         if not shown:
-            shown, files = self._recorded(controllers, out)
+            shown, files = self._recorded(controllers, out / name)
             settings |= self._walked(controllers)
         out.mkdir(parents=True, exist_ok=True)
+        if (out / video).exists():
+            print(f"hexmj: {literal(str(out / video))} was there; the new film takes its place", file=sys.stderr)
         with progress_bar("rendering") as progress:
-            frames = render(shown, out / "gait.mp4", self.film, progress)
-        files.append(out / "gait.mp4")
-        files.append(save_manifest(self, settings, files, out / MANIFEST))
+            frames = render(shown, out / video, self.film, progress)
+        files.append(out / video)
+        files.append(save_manifest(self, settings, files, out / manifest))
         if self.json:
             summary = {"frames": frames, "film": asdict(self.film), "files": files}
             print_json(summary | {"recordings": [walk_summary(one) for one in shown]})
@@ -76,12 +89,20 @@ class Render(WalkingCommand):
         self.film.check_camera(STICK_INSECT)
         if len(self.recordings) > MOST_PANELS:
             raise InputError(f"{len(self.recordings)} recordings were given; expected 1 to {MOST_PANELS}")
-        obeyed = Render(recordings=self.recordings, out=self.out, json=self.json, film=self.film)
+        kept = {name: getattr(self, name) for name in ("recordings", "format", "out", "json", "film")}
+        obeyed = Render(**kept)
         if self.recordings and (names := list(changed(self, obeyed))):
             raise InputError(
                 f"--{names[0].replace('_', '-')} was given with recordings; expected more recordings for side by"
                 " side, and options of walks only where one is recorded first"
             )
+
+    def _name(self, shown: "Sequence[xr.Dataset]") -> str:
+        """What the film shows, as its file is called."""
+        told = [one.attrs["title"] for one in shown] or [f"{self.model} V {self.velocity:g}", self.beside or ""]
+        camera = "" if self.film.camera == Film.camera else f" {self.film.camera}"
+        words = " beside ".join(filter(None, told))[:LONGEST_NAME] + camera
+        return re.sub(r"[^A-Za-z0-9.+-]+", "-", words).strip(".-") or "film"
 
     def _walked(self, controllers: dict[str, Controller]) -> dict[str, Any]:
         """Settings of the walks that are recorded first."""
@@ -91,7 +112,7 @@ class Render(WalkingCommand):
         told = {"velocity": self.velocity, "start": self.start, "beside": self.beside}
         return told | walks | {"conditions": self.conditions.settings()}
 
-    def _recorded(self, controllers: dict[str, Controller], out: Path) -> "tuple[list[xr.Dataset], list[Path]]":
+    def _recorded(self, controllers: dict[str, Controller], path: Path) -> "tuple[list[xr.Dataset], list[Path]]":
         """The walks that are to be seen, recorded, and their files."""
         from hexmj.replay.recording import save_recording
 
@@ -103,4 +124,4 @@ class Render(WalkingCommand):
             recorded(self, one, self.velocity, self.start, physical=physical, title=title, threads=self.workers.threads)
             for one, title, physical in walked
         ]
-        return shown, [save_recording(one, out / f"recording-{i + 1}.nc") for i, one in enumerate(shown)]
+        return shown, [save_recording(one, Path(f"{path}-{i + 1}.nc")) for i, one in enumerate(shown)]

@@ -36,6 +36,9 @@ WORDS = {
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """Between a condition's number and its unit, which stay in one line."""
 
+WALKS = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
+"""What is told of the walks."""
+
 FEW = 3
 """Most controllers whose names a title tells."""
 
@@ -46,13 +49,13 @@ def caption(result: "xr.Dataset") -> str:
     return "; ".join(filter(None, [controllers(told), *_walks(told), conditions(told)]))
 
 
-def controllers(told: Mapping[str, Any]) -> str:
+def controllers(told: dict[str, Any]) -> str:
     """The names of a result's controllers as they stand in figures, with what is not as printed in 1998; few only."""
     several = told.get("controllers", {})
     return ", ".join(f"{in_figure(name)}{_rules(one)}" for name, one in several.items()) if len(several) <= FEW else ""
 
 
-def conditions(told: Mapping[str, Any]) -> str:
+def conditions(told: dict[str, Any]) -> str:
     """V_p and the conditions that are not the usual ones; nothing of a result on paper."""
     given = told.get("conditions") or {}
     usual, obeyed = Conditions().settings(), OBEYED[given.get("ground", "flat")]
@@ -61,10 +64,11 @@ def conditions(told: Mapping[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _walks(told: Mapping[str, Any]) -> list[str]:
+def _walks(told: dict[str, Any]) -> list[str]:
     """Starts, window, seed and acceleration, as far as a result has them."""
-    words = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
-    found = [word.format(told[name]) for name, word in words.items() if name in told]
+    window = told.get("window")
+    own = {"window": f"of {window:g} time units"} if isinstance(window, float) else {}
+    found = [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
     if acceleration := told.get("acceleration"):
         found.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
     return found

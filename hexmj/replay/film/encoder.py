@@ -1,8 +1,9 @@
-"""Frames to an MP4 file, by mediapy and ffmpeg."""
+"""Frames to an MP4 or GIF file, by mediapy and ffmpeg."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import imageio_ffmpeg
 import mediapy
@@ -11,7 +12,11 @@ import numpy as np
 from hexmj.errors import RenderingError
 from hexmj.signals import unheard_by_children
 
-FILM = "-preset veryfast -movflags +faststart"
+HOW: dict[str, dict[str, Any]] = {
+    ".mp4": {"crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
+    ".gif": {"codec": "gif"},
+}
+"""End of a film's name -> how it is encoded."""
 
 
 @contextmanager
@@ -19,7 +24,7 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
     """What takes the frames of a film, (height, width, 3) of bytes, one after the other.
 
     Args:
-        path: of the film; what stands there is overwritten.
+        path: of the film, with an ending of `HOW`; what stands there is overwritten.
         height: of a frame [pixels], even.
         width: of a frame [pixels], even.
         fps: frames per second.
@@ -28,7 +33,7 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
         OSError: the film cannot be written; with what ffmpeg says of it.
         RenderingError: there is no ffmpeg.
     """
-    writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, crf=20, ffmpeg_args=FILM)
+    writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, **HOW[path.suffix])
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
         with unheard_by_children():

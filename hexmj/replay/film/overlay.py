@@ -1,4 +1,4 @@
-"""What is drawn on the frames of a film: a caption above, and a footfall diagram that grows below."""
+"""What is drawn on the frames of a film: a caption above, a scale, and a footfall diagram that grows below."""
 
 from functools import cache
 from pathlib import Path
@@ -8,38 +8,50 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
+from hexmj.replay.film.film import Film
 from hexmj.replay.take import Take
 
 INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
-GREEN, RED = (22, 122, 56), (192, 28, 22)
+GREEN, RED = (0, 112, 72), (190, 56, 0)
+"""Of what is stable and what is not; their words and signs differ, too."""
 
-MINUS = "\N{MINUS SIGN}"
+MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
 CAPTION, DIAGRAM = 48, 80
 """Heights on a frame of 640 x 480 pixels, to which all sizes here refer.  The insect's cameras leave them free."""
+
+BAR = 110
+"""Longest bar of the scale."""
 
 
 class Overlay:
     """Caption and diagram of one take, for frames of one size."""
 
-    def __init__(self, take: Take, width: int, height: int, duration: float) -> None:
+    def __init__(self, take: Take, film: Film, duration: float) -> None:
         """Draw the whole diagram once.
 
         Args:
             take: what is shown.
-            width: of the frames [pixels].
-            height: of the frames [pixels].
+            film: tells the size of the frames and the speed of play.
             duration: time that the diagram's axis spans [s].
         """
-        self._take, self._duration = take, duration
+        self._take, self._duration, width, height = take, duration, film.width, film.height
+        self._speed = "in real time" if film.slow_motion == 1 else f"at {1 / film.slow_motion:.2g} {TIMES} speed"
         self._scale = min(width / 640, height / 480)
         self._top, self._bottom = self._pixels(CAPTION), height - self._pixels(DIAGRAM)
         self._left, self._right = self._pixels(30), width - self._pixels(12)
         self._blank = self._axes(width, height - self._bottom)
         self._full = self._bars(self._blank.copy())
 
-    def draw(self, frame: np.ndarray, row: int, seconds: float) -> None:
-        """Draw on a frame, (height, width, 3), the state at the end of step `row` and the clock."""
+    def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
+        """Draw on a frame, (height, width, 3), the state at the end of step `row` and the clock.
+
+        Args:
+            frame: with the scene in it.
+            row: of the take.
+            seconds: on the clock [s].
+            scale: of the scene at the centre of mass [pixels/mm].
+        """
         now = self._column(seconds)
         diagram = frame[self._bottom :]
         diagram[:] = self._blank
@@ -47,36 +59,53 @@ class Overlay:
         cursor = self._pixels(1)
         diagram[: self._row(6), now : now + cursor] = INK
         frame[: self._top] = self._caption(frame[: self._top], row, seconds)
+        strip = frame[self._bottom - self._pixels(18) : self._bottom]
+        strip[:] = self._strip(strip, scale)
+
+    def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
+        """A bar of a round length, as long as it would be at the centre of mass, and what the diagram's bars are."""
+        image = Image.fromarray(background)
+        draw, font, edge = ImageDraw.Draw(image), _font(self._pixels(11)), self._pixels(10)
+        length = _round(self._pixels(BAR) / scale)
+        end, middle = edge + round(length * scale), image.height // 2
+        draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
+        for x in (edge, end):
+            draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
+        draw.text((end + self._pixels(5), middle), f"{length:g} mm", INK, font, anchor="lm")
+        legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
+        draw.text((image.width - edge, middle), legend, INK, font, anchor="rm")
+        return np.asarray(image)
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
         take, size, edge = self._take, self._pixels(15), self._pixels(10)
         image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
         draw = ImageDraw.Draw(image)
         first, second = round(0.29 * self._top), round(0.75 * self._top)
-        state, colour = self._state(seconds)
+        state, colour = self._state(row, seconds)
         bold = _font(size, bold=True)
         free = image.width - 3 * edge - draw.textlength(state, bold)
         draw.text((edge, first), _shortened(take.title, bold, free), INK, bold, anchor="lm")
         draw.text((image.width - edge, first), state, colour, bold, anchor="rm")
         margin = f"{take.margin[row]:+.1f} mm".replace("-", MINUS) if seconds < take.fell else "unknown"
         fields = (
-            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units",
+            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
             f"V = {take.velocity[row]:.2f}",
             f"Vₚ = {take.conditions.time.vp:g} mm/s",
             f"margin {margin}",
         )
-        for place, text in zip((0.0, 0.42, 0.57, 0.77), fields, strict=True):
+        for place, text in zip((0.0, 0.51, 0.615, 0.79), fields, strict=True):
             x = edge + place * (image.width - 2 * edge)
-            draw.text((x, second), text, INK, _font(self._pixels(13)), anchor="lm")
+            draw.text((x, second), text, INK, _font(self._pixels(12)), anchor="lm")
         return np.asarray(image)
 
-    def _state(self, seconds: float) -> tuple[str, tuple[int, int, int]]:
-        take = self._take
+    def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
+        """What is now, in its colour, and what was before."""
+        take, lost = self._take, f"{1000 * self._take.lost:.0f} ms"
         if seconds >= take.fell:
-            return f"fell on {take.part} at {1000 * take.fell:.0f} ms", RED
-        if seconds >= take.lost:
-            return f"stability lost at {1000 * take.lost:.0f} ms", RED
-        return "stable", GREEN
+            return f"■ fell on {take.part} at {1000 * take.fell:.0f} ms", RED
+        if take.margin[row] <= 0:
+            return f"▲ unstable, first at {lost}" if seconds >= take.lost else "▲ unstable", RED
+        return f"● stable, but lost at {lost}" if seconds >= take.lost else "● stable", GREEN
 
     def _axes(self, width: int, height: int) -> np.ndarray:
         """The diagram without bars, (height, width, 3)."""
@@ -87,15 +116,12 @@ class Overlay:
             middle = (self._row(leg) + self._row(leg + 1)) / 2
             draw.text((self._left - self._pixels(6), middle), name, INK, font, anchor="rm")
             draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
-        legend = "black: foot off ground" if self._take.physical else "black: protraction"
         baseline = (self._row(6) + height) / 2
         draw.text((self._left - self._pixels(6), baseline), "ms", FAINT, font, anchor="rm")
-        draw.text((self._right, baseline), legend, INK, font, anchor="rm")
-        free = self._right - draw.textlength(f"{legend} 0000", font)
         for milliseconds in _ticks(1000 * self._duration):
             x = self._column(milliseconds / 1000)
             draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
-            if x < free:
+            if x + draw.textlength(f"{milliseconds:g}", font) / 2 < width:
                 draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
         return np.asarray(image)
 
@@ -136,6 +162,12 @@ def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
     while text and font.getlength(f"{text}…") > width:
         text = text[:-1]
     return f"{text}…"
+
+
+def _round(most: float) -> float:
+    """The greatest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2 ...) that is not above `most`."""
+    power = 10.0 ** np.floor(np.log10(most))
+    return max(float(power * part) for part in (1, 2, 5) if power * part <= most)
 
 
 def _ticks(end: float) -> np.ndarray:

@@ -7,9 +7,13 @@ import numpy as np
 
 from hexmj.bodies.description import Marks
 
-STABLE = (0.10, 0.55, 0.24)
-UNSTABLE = (0.80, 0.12, 0.10)
-"""Colours of the support polygon, here and in the overlay: red, green, blue from 0 to 1."""
+STABLE = (0.05, 0.55, 0.32)
+UNSTABLE = (0.84, 0.24, 0.02)
+"""Colours of the support polygon: red, green, blue from 0 to 1.  Told apart without colours, too: an unstable one is
+empty, and its outline is stronger."""
+
+STRONGER = 1.8
+"""Outline of an unstable polygon over that of a stable one."""
 
 CENTRE = (0.98, 0.72, 0.10)
 TIP = (0.13, 0.36, 0.72)
@@ -22,11 +26,11 @@ def mark_support(scene: mujoco.MjvScene, marks: Marks, corners: np.ndarray, leve
     """The support polygon at the level of the ground [mm], by its corners in order, (corner, 2) [mm]."""
     colour = STABLE if stable else UNSTABLE
     points = np.column_stack([corners, np.full(len(corners), level + marks.fill_height)])
-    for second, third in pairwise(points[1:]):
+    for second, third in pairwise(points[1:]) if stable else ():
         _triangle(scene, points[0], second, third, (*colour, 0.35))
     for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
         if (a != b).any():
-            _rod(scene, a, b, marks.outline, (*colour, 1.0))
+            _rod(scene, a, b, marks.outline * (1.0 if stable else STRONGER), (*colour, 1.0))
 
 
 def mark_centre_of_mass(scene: mujoco.MjvScene, marks: Marks, centre: np.ndarray, level: float, stable: bool) -> None:

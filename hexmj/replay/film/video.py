@@ -18,7 +18,7 @@ from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
 from hexmj.progress import Progress, shown
 from hexmj.replay.film import gl
-from hexmj.replay.film.encoder import encoder
+from hexmj.replay.film.encoder import HOW, encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
@@ -48,7 +48,7 @@ def render(
 
     Args:
         recordings: one to six; from four on they stand in two rows.
-        path: of the film, an MP4 file; it appears whole or not at all.
+        path: of the film, which ends with .mp4 or .gif; it appears whole or not at all.
         film: how it is filmed.
         progress: True shows a bar; or a function that is told the fraction done since it was last called.
         body: the description of what was recorded.
@@ -57,8 +57,8 @@ def render(
         The number of frames: the duration of the longest walk, at `Film.fps`.
 
     Raises:
-        InputError: no recording or too many, no MP4 file in a folder that exists, a recording without a pose, or a
-            film that cannot be written.
+        InputError: no recording or too many, no MP4 or GIF file in a folder that exists, a recording without a pose,
+            or a film that cannot be written.
         RenderingError: nothing can be rendered here; says what brings it.
     """
     film, path = given("film", film, Film), path_of(path)
@@ -66,8 +66,9 @@ def render(
     if not 1 <= len(recordings) <= MOST_PANELS:
         raise InputError(f"{len(recordings)} recordings were given; expected 1 to {MOST_PANELS}")
     film.check_camera(typed("body", body, Body))
-    if path.suffix != ".mp4" or not path.parent.is_dir():
-        raise InputError(f"the film cannot be written to {path}; expected a name with .mp4 in a folder that exists")
+    if path.suffix not in HOW or not path.parent.is_dir():
+        ends = " or ".join(HOW)
+        raise InputError(f"the film cannot be written to {path}; expected a name with {ends} in a folder that exists")
     if reason := gl.missing():
         raise RenderingError(reason)
     try:
@@ -85,7 +86,7 @@ def render(
 def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress: Progress | None) -> None:
     """Film the takes side by side."""
     duration = max(take.duration for take in takes)
-    overlays = [Overlay(take, film.width, film.height, duration) for take in takes]
+    overlays = [Overlay(take, film, duration) for take in takes]
     rows = 1 if len(takes) <= IN_A_ROW else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
@@ -101,8 +102,8 @@ def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress:
             seconds = frame / (film.fps * film.slow_motion)
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
-                panel[:] = _view(*stages[take.conditions], film.camera, take, row)
-                overlay.draw(panel, row, seconds)
+                panel[:], scale = _view(*stages[take.conditions], film.camera, take, row)
+                overlay.draw(panel, row, seconds, scale)
             add(picture)
             if progress:
                 progress(1 / frames)
@@ -125,8 +126,10 @@ def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:
     return model
 
 
-def _view(renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Take, row: int) -> np.ndarray:
-    """The scene at the end of step `row`, (height, width, 3)."""
+def _view(
+    renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Take, row: int
+) -> tuple[np.ndarray, float]:
+    """The scene at the end of step `row`, (height, width, 3), and its pixels per mm at the centre of mass."""
     data.qpos[:] = take.qpos[row]
     mujoco.mj_kinematics(renderer.model, data)
     mujoco.mj_comPos(renderer.model, data)
@@ -138,4 +141,11 @@ def _view(renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Tak
     mark_support(renderer.scene, body.marks, corners, level, stable)
     mark_centre_of_mass(renderer.scene, body.marks, centre, level, stable)
     mark_planned_tips(renderer.scene, body.marks, take.planned_tip[row])
-    return renderer.render()
+    return renderer.render(), _pixels_per_mm(renderer, centre)
+
+
+def _pixels_per_mm(renderer: mujoco.Renderer, point: np.ndarray) -> float:
+    """Of a length across the view at a point, (3,) [mm]."""
+    camera = renderer.scene.camera[0]
+    near = (camera.frustum_top - camera.frustum_bottom) / camera.frustum_near
+    return float(renderer.height / (near * np.dot(point - camera.pos, camera.forward)))

@@ -117,8 +117,9 @@ class Variants:
                 table[name + end] = count.copy(data=values).assign_attrs(units="1")
         table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
         table["instead"] = lost.copy(data=self._instead()).assign_attrs(units="1")
-        told = ("window", "n_starts", "seed", "acceleration", "conditions", "networks")
+        told = ("window", "n_starts", "seed", "acceleration", "networks")
         settings = {name: plain(getattr(self, name)) for name in told} | self._stride
+        settings["conditions"] = self.conditions.settings() if self.conditions else None
         return table.assign_attrs(attributes({"study": "variants"} | settings))
 
     def _instead(self) -> np.ndarray:

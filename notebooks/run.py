@@ -1,0 +1,27 @@
+"""Run the notebooks anew and store what they show: `python notebooks/run.py`."""
+
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+
+FOLDER = Path(__file__).parent
+LIMIT = 120
+"""Time for a cell [s]."""
+
+
+def executed(path: Path) -> Any:
+    """A notebook with what its cells show, without the times at which they ran."""
+    book = nbformat.read(path, as_version=4)
+    NotebookClient(book, timeout=LIMIT, record_timing=False, resources={"metadata": {"path": str(FOLDER)}}).execute()
+    for cell in book.cells:
+        cell.metadata.pop("execution", None)
+    book.metadata.language_info = {"name": "python"}
+    return book
+
+
+if __name__ == "__main__":
+    for path in sorted(FOLDER.glob("*.ipynb")):
+        nbformat.write(executed(path), path)
+        print(path.name, f"{path.stat().st_size / 1000:.0f} kB")
