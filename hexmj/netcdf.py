@@ -2,9 +2,8 @@
 
 import io
 import math
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -45,8 +44,12 @@ def encode(data: "xr.Dataset") -> bytes:
 def _no_lock_of_dask() -> Iterator[None]:
     """While the block runs, xarray asks no Dask cluster for a lock that this process works for: nobody else writes to
     its memory, and the cluster does not know such a file."""
-    dask = sys.modules.get("dask")
-    with _ENCODING, dask.config.set(scheduler="synchronous") if dask else nullcontext():
+    try:
+        import dask
+    except ImportError:
+        yield
+        return
+    with _ENCODING, dask.config.set(scheduler="synchronous"):
         yield
 
 
