@@ -2,10 +2,11 @@
 
 import io
 import math
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hexmj.errors import InputError
 
@@ -44,9 +45,8 @@ def encode(data: "xr.Dataset") -> bytes:
 def _no_lock_of_dask() -> Iterator[None]:
     """While the block runs, xarray asks no Dask cluster for a lock that this process works for: nobody else writes to
     its memory, and the cluster does not know such a file."""
-    try:
-        import dask
-    except ImportError:
+    dask: Any = sys.modules.get("dask")
+    if not dask:
         yield
         return
     with _ENCODING, dask.config.set(scheduler="synchronous"):

@@ -15,9 +15,9 @@ import numpy as np
 from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
+from hexmj.diagrams import spans
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.measures.figures import spans
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
 from hexmj.stability import support_polygon
