@@ -11,7 +11,7 @@ from typing import Any
 
 from hexmj.errors import InputError
 
-PATIENCE = 5.0
+PATIENCE = 10.0
 """How long an answer of the scheduler is waited for [s]."""
 
 
