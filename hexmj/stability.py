@@ -93,6 +93,13 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
         return points
 
 
+def margins(feet: np.ndarray, stance: np.ndarray) -> np.ndarray:
+    """`stability_margin` of feet that are somewhere, (n, leg, 2) and (n, leg), unchecked and on this thread, (n,)."""
+    margin = np.empty(len(feet))
+    _margins(np.ascontiguousarray(feet), stance, margin)
+    return margin
+
+
 @njit(cache=True, nogil=True)
 def _margins(feet: Any, stance: Any, margin: Any) -> None:
     """`stability_margin` of postures (posture, leg, 2).

@@ -1,0 +1,86 @@
+"""A single body that steps by itself, by MuJoCo's own step: for one insect a batch would only cost time."""
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.physics.backend import AFTER, STATE, Diverged, Rolled
+from hexmj.physics.callbacks import stopped_clock, unlogged
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that a step goes on from, the time included."""
+
+
+class Alone:
+    """An `Engine` of one body, to the same bits as `physics.backend.MujocoBatch`; every `ids` is [0].
+
+    Between two steps the first half of the next is done already, so that places are current.
+    """
+
+    def __init__(self, compiled: CompiledBody) -> None:
+        """At home."""
+        self.model, self.data = compiled.model, mujoco.MjData(compiled.model)
+        model, data = self.model, self.data
+        self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
+        self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
+        self.sensors = data.sensordata[np.newaxis]
+        self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
+        self._foot, self._feet = compiled.columns.foot, data.sensordata[compiled.columns.foot].reshape(6, 3)
+        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
+
+    def states(self, ids: np.ndarray) -> np.ndarray:
+        """See `backend.Engine.states`."""
+        self._before = states = np.empty((1, self._size))
+        mujoco.mj_getState(self.model, self.data, states[0], _STATE)
+        return states
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        """See `backend.Engine.put`."""
+        mujoco.mj_setState(self.model, self.data, states[0], _STATE)
+        mujoco.mj_step1(self.model, self.data)
+
+    def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
+        """Put the body where it stands at rest, (1, state), by its controls, (1, actuator)."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, states[0], AFTER)
+        self._control[:] = control[0]
+        mujoco.mj_step1(self.model, self.data)
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
+        """See `backend.Engine.roll`; nothing is kept of the states, since a plan's step is all that is taken at once."""
+        with stopped_clock(), unlogged():
+            if parts == 1:
+                return self._roll(control[0])
+            model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
+            model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
+            try:
+                mujoco.mj_step1(model, self.data)
+                return self._roll(control[0])
+            finally:
+                model.opt.timestep, model.pair_solref[:] = timestep, usual
+                mujoco.mj_step1(model, self.data)
+
+    def _roll(self, control: np.ndarray) -> Rolled:
+        """One step for each row of the controls, (step, actuator)."""
+        count, model, data = len(control), self.model, self.data
+        feet = np.empty((1, count + 1, 6, 3))
+        sensors, force = np.empty((1, count, len(self._sensors))), np.empty((1, count, len(self._force)))
+        feet[0, 0] = self._feet
+        for k in range(count):
+            self._control[:] = control[k]
+            mujoco.mj_step2(model, data)
+            sensors[0, k], force[0, k] = self._sensors, self._force
+            mujoco.mj_step1(model, data)
+            feet[0, k + 1] = self._feet
+        if self._warned.any() or not np.isfinite(self.qpos).all():
+            raise self._diverged(control)
+        return Rolled(feet, sensors, force, after=np.empty((1, count, 0)))
+
+    def _diverged(self, control: np.ndarray) -> Diverged:
+        """What happened, with the state before and the controls since, (step, actuator)."""
+        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
+        before, model = mujoco.MjData(self.model), self.model
+        mujoco.mj_setState(model, before, self._before[0], _STATE)
+        state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
+        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
+        return Diverged(0, ", ".join(kinds) or "a state that is not finite", state | now)
