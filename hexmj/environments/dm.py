@@ -1,8 +1,8 @@
 """The insect as a dm_env environment on dm_control; what an episode is stands in `task`.
 
-Actions are in the units of the joints and tips: targets [rad] within the joints' ranges, or offsets [mm]: forward, left,
-up.  A fall ends an episode with discount 0, its time or the end of the ground with discount 1.  A simulation that
-diverges raises dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
+Actions have units here: targets [rad] within the joints' ranges, or offsets [mm]: forward, left, up.  A fall ends an
+episode with discount 0, its time or the end of the ground with discount 1.  A simulation that diverges raises
+dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
 """
 
 import os
@@ -266,7 +266,9 @@ class Walking(control.Task):
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Bounds of an action; the names of its numbers are joined by tabs."""
         low, _, high = action_bounds(physics.compiled, self.task)
-        return specs.BoundedArray(low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task)))
+        return specs.BoundedArray(
+            low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task))
+        )
 
     def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.BoundedArray]:
         """The specs of all observations by their names."""

@@ -4,7 +4,7 @@ What an episode is stands in `task`.  Actions are normalised: 0 is the usual one
 are the ends of the joints' ranges or the largest offsets.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -26,7 +26,7 @@ RENDER_MODES = [None, "rgb_array"]
 class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One insect that walks in an episode of its own."""
 
-    metadata = {"render_modes": RENDER_MODES[1:], "render_fps": 800}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES[1:], "render_fps": 800}  # pyright: ignore
 
     def __init__(self, *, render_mode: str | None = None, **task: Any) -> None:
         """Its settings are those of `task.Task`.
@@ -42,9 +42,9 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         compiled, self.render_mode = compiled_for(self.task), checked_mode(render_mode)
         self.metadata = metadata_of(self.task)
         self.observation_space, self.action_space = spaces_of(compiled, self.task)
-        self._body = Alone(compiled)
+        self._body = Alone(compiled, self.task.stride)
         self.model, self.data = self._body.model, self._body.data
-        self._walkers = Walkers(self.task, compiled, self._body, count=1, threads=1)
+        self._walkers = Walkers(self.task, compiled, self._body, self._body.take, count=1, threads=1)
         self._frames = Frames(self.task.conditions)
 
     def reset(
@@ -117,7 +117,8 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         InputError: something else.
     """
-    actions = numbers("action", actions)
+    if not (isinstance(actions, np.ndarray) and actions.dtype == float):
+        actions = numbers("action", actions)
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
     return actions

@@ -43,7 +43,7 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.stability import margins
+from hexmj.stability import stability_margin
 from hexmj.timing import Stride, steps_within
 
 Actions = Literal["joints", "tips"]
@@ -204,7 +204,7 @@ def tips(seen: Seen) -> np.ndarray:
 
 def margin(seen: Seen, standing: np.ndarray, compiled: CompiledBody) -> np.ndarray:
     """Stability margin on the feet that stand, (n, leg), seen from the centre of mass, (n,) [mm]."""
-    found = margins((seen.feet - seen.centre_of_mass[:, np.newaxis])[:, :, :2], standing)
+    found = stability_margin((seen.feet - seen.centre_of_mass[:, np.newaxis])[:, :, :2], standing, threads=1)
     return np.maximum(found, compiled.body.lengths.no_foot_margin)
 
 

@@ -19,6 +19,7 @@ from hexmj.environments.task import Task
 from hexmj.environments.walkers import Walkers
 from hexmj.errors import InputError
 from hexmj.physics.backend import MujocoBatch
+from hexmj.physics.fine_steps import FineSteps
 
 MOST = 10**6
 """Most insects in one environment; they take tens of gigabytes."""
@@ -58,7 +59,8 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._bodies = MujocoBatch(compiled, self.num_envs, threads)
-        self._walkers = Walkers(self.task, compiled, self._bodies, self.num_envs, threads)
+        take = FineSteps.of(self._bodies, self.task.substeps, compiled).take
+        self._walkers = Walkers(self.task, compiled, self._bodies, take, self.num_envs, threads)
         self._rngs: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, dtype=bool)
@@ -87,24 +89,23 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def step(self, actions: np.ndarray) -> tuple[Observations, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One step of all insects; `autoreset_mode` says what becomes of those whose episode is over.
 
-        In the mode 'SameStep' the last observations of episodes that ended are in `final_obs`.
+        In the mode 'SameStep' the last observations of episodes that ended are in `final_obs`; in the mode 'Disabled'
+        an insect stays as it is from then on, without rewards, until it is reset.
 
         Raises:
-            InputError: actions out of bounds, or in the mode 'Disabled' insects whose episode is over.
+            InputError: actions out of bounds.
             SimulationError: a simulation that diverged.
         """
         actions = checked_actions(actions, self.action_space.shape)
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
-            over = np.flatnonzero(self._ended).tolist()
-            raise InputError(f"the episodes of the insects {over} are over; expected a reset with a reset_mask of them")
-        again = self._ended
-        acted = self._walkers.act(actions)
-        self._ended, infos = acted.terminated | acted.truncated, {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            infos = self._final()
-            again, self._ended = self._ended, np.zeros(self.num_envs, dtype=bool)
-        if again.any():
-            self._begin(again)
+        acted, before = self._walkers.act(actions), self._ended
+        ended, infos = acted.terminated | acted.truncated, {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            infos = self._final(ended)
+            self._begin(ended)
+        elif self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            self._ended = ended
+            if before.any():
+                self._begin(before)
         return self._observations(), acted.reward, acted.terminated, acted.truncated, infos
 
     def render(self) -> tuple[np.ndarray, ...] | None:
@@ -144,13 +145,13 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _observations(self) -> Observations:
         return self._walkers.named(self._walkers.observations())
 
-    def _final(self) -> dict[str, Any]:
+    def _final(self, ended: np.ndarray) -> dict[str, Any]:
         """The last observations of those whose episode is over."""
         last, observations, infos = self._walkers.observations(), np.full(self.num_envs, None, dtype=object), {}
-        for i in np.flatnonzero(self._ended).tolist():
+        for i in np.flatnonzero(ended).tolist():
             observations[i] = self._walkers.named(last[i].copy())
             infos = self._add_info(infos, {"final_info": {}}, i)
-        return infos | {"final_obs": observations, "_final_obs": self._ended.copy()}
+        return infos | {"final_obs": observations, "_final_obs": ended}
 
 
 def _mode(mode: AutoresetMode | str) -> AutoresetMode:

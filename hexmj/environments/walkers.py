@@ -5,6 +5,7 @@ steps ahead; one that reads the legs is told of them before each step.  No insec
 depends neither on how many there are nor on who began with it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -13,35 +14,36 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.controllers.asking import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
+from hexmj.environments.passes import judge, keep, observe, order, within
 from hexmj.environments.task import (
     Seen,
     Task,
     action_bounds,
     action_names,
     at_the_end,
-    fallen,
     observation_bounds,
-    own_observations,
-    rewards,
 )
 from hexmj.errors import InputError
-from hexmj.physics.backend import Diverged, Engine
+from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
-from hexmj.physics.fine_steps import FineSteps
+from hexmj.physics.fine_steps import Shown
 from hexmj.physics.foot_path import TipTargets, standing_tips
-from hexmj.physics.orders import hold
 from hexmj.physics.sensing import Senses
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.settling import settle
 
-AHEAD = 64
+AHEAD = 128
 """Steps for which a plan that reads nothing is asked at once."""
 
 ROUNDING = 1e-6
 """Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
 
 
-class Bodies(Engine, Protocol):
-    """An engine whose bodies can be looked at; `physics.backend.MujocoBatch` is one."""
+Take = Callable[[np.ndarray, np.ndarray], Shown]
+"""One step of some bodies, (n,), with these controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
+
+
+class Bodies(Protocol):
+    """What insects are made of: they can be looked at, and put where they stand."""
 
     @property
     def qpos(self) -> np.ndarray:
@@ -100,30 +102,42 @@ class Together:
 class Walkers:
     """Some insects, each in an episode of its own."""
 
-    def __init__(self, task: Task, compiled: CompiledBody, bodies: Bodies, count: int, threads: int | None) -> None:
-        """As many insects, none of which has begun; `threads` settle them, one per core unless given."""
+    def __init__(
+        self, task: Task, compiled: CompiledBody, bodies: Bodies, take: Take, count: int, threads: int | None
+    ) -> None:
+        """As many insects, none of which has begun.
+
+        Args:
+            task: what an episode is.
+            compiled: the body.
+            bodies: as many of it.
+            take: one step of some of them.
+            count: how many.
+            threads: settle them, one per core unless given.
+        """
         self._task, self._compiled, self._bodies, self._threads = task, compiled, bodies, threads
-        self._fine = FineSteps.of(bodies, task.substeps, compiled)
+        self._take = take
+        self._steps, self._substeps = task.steps, task.substeps
         self._everyone, self._ids = np.arange(count), np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self._of: list[Together | None] = count * [None]
         self._together: list[Together] = []
-        self._tips, self._stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
-        self._at = np.zeros(count, dtype=int)  # the step of these that comes next
+        tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
+        self._ahead = tips, stance, np.zeros(count, dtype=int)  # as planned, and the step of these that comes next
         self._joints = np.empty((count, 6, compiled.joints // 6))
-        self._shown = {
-            "command": np.full((count, 1), task.command),
-            "planned_stance": np.ones((count, 6)),
-            "planned_tips": np.empty((count, 6, 3)),
-            "out_of_reach": np.zeros((count, 6)),
-        }
+        self._planned = np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6))  # stance, tips, out of reach
         low, self._usual, high = action_bounds(compiled, task)
-        self._above, self._below = high - self._usual, self._usual - low
+        self._span = self._usual - low, high - self._usual
         bounds = observation_bounds(compiled, task)
-        self._least, self._most = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
+        least, most = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
+        self._bounds = least, most, compiled.body.lengths.no_foot_margin
+        self._body = bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors
+        columns = compiled.columns
+        self._layout = compiled.joints, columns.foot.start, columns.centre_of_mass.start, task.command
+        self._trunk = columns.trunk.start, columns.trunk.stop
         ends = np.cumsum([least.size for least, _ in bounds.values()]).tolist()
         self._fields = [
-            (name, slice(end - least.size, end), least.shape)
+            (name, slice(end - least.size, end), least.shape if least.ndim > 1 else ())
             for (name, (least, _)), end in zip(bounds.items(), ends, strict=True)
         ]
 
@@ -149,8 +163,9 @@ class Walkers:
             self._senses.restart(ids, settled)
         self._joints[ids] = settled.ctrl[:, self._compiled.columns.ctrl].reshape(len(ids), 6, -1)
         standing = standing_tips(settled.starts, task.conditions.path.standing_height, task.stride)
-        self._shown["planned_tips"][ids], self._shown["planned_stance"][ids] = standing, 1.0
-        self._shown["out_of_reach"][ids], self._done[ids], self._walking[ids] = 0.0, 0, True
+        for shown, now in zip(self._planned, (1.0, standing, 0.0), strict=True):
+            shown[ids] = now
+        self._done[ids], self._walking[ids] = 0, True
         self._ids = np.flatnonzero(self._walking)
 
     def act(self, actions: np.ndarray) -> Acted:
@@ -161,31 +176,32 @@ class Walkers:
             InputError: actions out of bounds, or a plan that makes no sense.
             SimulationError: an insect that diverged.
         """
-        ids, fell = self._ids, np.zeros(len(self._everyone), dtype=bool)
-        wanted = self._wanted(actions[ids])
-        self._plan_ahead()
-        sensors = self._carry_out(ids, self._control(ids, wanted))
+        ids, task, count = self._ids, self._task, len(self._everyone)
+        reward, fell = np.zeros(count), np.zeros(count, dtype=bool)
+        if len(ids) == 0:
+            return Acted(reward, fell, fell.copy())
+        sensors = self._carry_out(ids, self._control(ids, actions))
         self._done[ids] += 1
-        seen = self._seen()
-        fell[ids] = fallen(sensors, self._compiled)
-        reward = rewards(seen, fell, self._task) * self._walking
-        over = ((self._done == self._task.steps) | at_the_end(seen, self._task)) & self._walking & ~fell
-        self._leave(np.flatnonzero(fell | over))
-        return Acted(reward, fell, over)
+        any_fell = judge(*self._body[1:3], ids, sensors, self._trunk, task.command, reward, fell)
+        over = (self._done == self._steps) & self._walking
+        if task.conditions.ground.ground != "flat":
+            over |= at_the_end(self._seen(), task) & self._walking
+        if any_fell or over.any():
+            self._leave(np.flatnonzero(fell | over))
+        return Acted(reward, fell, over & ~fell)
 
     def observations(self) -> np.ndarray:
         """Everything observed of all insects, (insect, number); `named` says what it is."""
-        count, seen, standing = len(self._everyone), self._seen(), self._senses.standing(self._everyone)
-        values = own_observations(seen, standing, self._compiled) | self._shown
-        flat = np.empty((count, len(self._least)))
-        for name, columns, _ in self._fields:
-            flat[:, columns] = values[name].reshape(count, -1)
-        np.maximum(flat, self._least, out=flat)
-        return np.minimum(flat, self._most, out=flat)
+        flat, standing = np.empty((len(self._everyone), len(self._bounds[0]))), self._senses.standing(self._everyone)
+        observe(self._body, self._compiled.trunk_corners, standing, self._planned, self._bounds, self._layout, flat)
+        return flat
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """What was observed, (..., number), by name and in its shape."""
-        return {name: flat[..., columns].reshape(*flat.shape[:-1], *shape) for name, columns, shape in self._fields}
+        return {
+            name: flat[..., columns].reshape(*flat.shape[:-1], *shape) if shape else flat[..., columns]
+            for name, columns, shape in self._fields
+        }
 
     def _leave(self, ids: np.ndarray) -> None:
         """The episodes of some insects are over."""
@@ -201,14 +217,6 @@ class Walkers:
         for i in ids.tolist():
             self._of[i] = None
 
-    def _wanted(self, actions: np.ndarray) -> np.ndarray:
-        """What actions ask for, (n, number): targets [rad], or offsets [mm]."""
-        if not (np.abs(actions) <= 1.0 + ROUNDING).all():
-            row, i = np.argwhere(~(np.abs(actions) <= 1.0 + ROUNDING))[0]
-            name = action_names(self._compiled, self._task)[i]
-            raise InputError(f"the action's {name} = {actions[row, i]}; expected -1 to 1")
-        return self._usual + actions * np.where(actions > 0, self._above, self._below)
-
     def _plan_ahead(self) -> None:
         """Plan the next steps of those that have none left."""
         for group in self._together:
@@ -217,40 +225,42 @@ class Walkers:
             group.ahead -= 1
 
     def _plan(self, group: Together) -> None:
-        ids, rows, steps = group.ids, group.rows, min(AHEAD, self._task.steps - group.plan.done)
+        ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
         if group.reading:
             here = self._bodies.qpos[ids], self._bodies.qvel[ids]
             tell(group.reading, replace(self._senses.sensed(ids, *here), ids=rows.copy()))
             steps = 1
         walk = advanced(group.plan, steps)
         tips = group.targets.follow(walk, rows)
-        self._tips[ids, :steps] = tips.reshape(len(ids), steps, -1, 6, 3)
-        self._stance[ids, :steps] = walk.stance[:, rows].swapaxes(0, 1)
-        self._at[ids], group.ahead = 0, steps
+        tips_ahead, stance_ahead, at = self._ahead
+        tips_ahead[ids, :steps] = tips.reshape(len(ids), steps, -1, 6, 3)
+        stance_ahead[ids, :steps] = walk.stance[:, rows].swapaxes(0, 1)
+        at[ids], group.ahead = 0, steps
 
-    def _control(self, ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """Of some insects for one step, (n, substep, actuator); a leg whose tip is out of reach keeps its last angles."""
-        at, shown, substeps = self._at[ids], self._shown, self._task.substeps
-        tips, stance = self._tips[ids, at], self._stance[ids, at]
-        self._at[ids] = at + 1
-        shown["planned_tips"][ids], shown["planned_stance"][ids] = tips[:, -1], stance
-        if self._task.actions == "joints":
-            control = wanted[:, np.newaxis].repeat(substeps, axis=1)
-        else:
-            joints, reachable = self._compiled.inverse(tips + wanted.reshape(-1, 1, 6, 3))
-            missed = substeps - reachable.sum(axis=1)
-            for i in np.flatnonzero(missed.any(axis=1)):
-                hold(joints[i], self._joints[ids[i]])
-            self._joints[ids], shown["out_of_reach"][ids] = joints[:, -1], missed
+    def _control(self, ids: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Of some insects for one step, (n, substep, actuator); a leg that cannot reach its tip keeps its angles."""
+        if not within(actions, ids, 1.0 + ROUNDING):
+            row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
+            name = action_names(self._compiled, self._task)[i]
+            raise InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
+        self._plan_ahead()
+        offset, substeps = self._task.actions == "tips", self._substeps
+        wanted, tips = order(actions, ids, self._usual, self._span, self._ahead, self._planned[:2], offset)
+        if offset:
+            joints, reachable = self._compiled.inverse(tips)
+            keep(joints, reachable, ids, self._joints, self._planned[2])
             control = joints.reshape(len(ids), substeps, -1)
+        else:
+            control = wanted[:, np.newaxis].repeat(substeps, axis=1)
         if self._task.conditions.contact.grasp:
-            control = np.concatenate([control, stance[:, np.newaxis].repeat(substeps, axis=1)], axis=2)
+            stance = self._planned[0][ids, np.newaxis]
+            control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
         return control
 
     def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> np.ndarray:
         """One step of some insects; what their sensors have shown, (n, substep, column)."""
         try:
-            shown = self._fine.take(ids, control)
+            shown = self._take(ids, control)
         except Diverged as error:
             time, conditions = float(self._done[error.start] * self._task.stride.dt), self._task.conditions
             raise walk_error(error, "acting", time, conditions) from None
