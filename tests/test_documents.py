@@ -17,7 +17,8 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    hexmj (.+)$", README, flags=re.MULTILINE)
 FIRST = {command.split()[0]: command for command in reversed(COMMANDS)}
 """Name of a command -> the first line that has it."""
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+EXAMPLES = sorted(one for one in (ROOT / "examples").glob("*.py") if not one.name.startswith("train_"))
+"""Those that train for minutes are in `test_learned`, made small."""
 
 
 SNIPPET, CONTROLLER = re.findall(r"```python\n(.+?)```", README, flags=re.DOTALL)

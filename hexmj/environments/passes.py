@@ -41,7 +41,7 @@ def order(actions: Any, ids: Any, usual: Any, span: Any, ahead: Any, planned: An
         What actions ask for, (n, number), and where the tips shall be, (n, substep, leg, axis) [mm].
     """
     tips_ahead, stance_ahead, at = ahead
-    wanted, tips = np.empty((len(ids), actions.shape[1])), np.empty((len(ids), *tips_ahead.shape[2:]))
+    wanted, tips = np.empty((len(ids), actions.shape[1])), np.empty((len(ids), tips_ahead.shape[2], 6, 3))
     for i, n in enumerate(ids):
         for j in range(actions.shape[1]):
             wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0][j]

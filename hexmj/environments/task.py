@@ -216,12 +216,12 @@ def rewards(seen: Seen, fell: np.ndarray, task: Task) -> np.ndarray:
 
 def fallen(sensors: np.ndarray, compiled: CompiledBody) -> np.ndarray:
     """Whether the trunk has touched the ground in any of the substeps, from (n, substep, column) to (n,)."""
-    return (sensors[:, :, compiled.columns.trunk] > 0).any(axis=(1, 2))
+    return np.any(sensors[:, :, compiled.columns.trunk] > 0, axis=(1, 2))
 
 
 def at_the_end(seen: Seen, task: Task) -> np.ndarray:
     """Whether a foot has come to the end of the ground that was laid, (n,)."""
-    return beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, seen.feet).any(axis=1)
+    return np.any(beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, seen.feet), axis=1)
 
 
 def _alike(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:

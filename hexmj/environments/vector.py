@@ -15,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 from hexmj.checks import whole
 from hexmj.environments.frames import Frames
 from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, drawn, metadata_of, spaces_of
-from hexmj.environments.task import Task
+from hexmj.environments.task import Task, action_names
 from hexmj.environments.walkers import Walkers
 from hexmj.errors import InputError
 from hexmj.physics.backend import MujocoBatch
@@ -52,7 +52,8 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             InputError: a value that makes no sense.
         """
         self.task, self.num_envs = Task(**task), whole("num_envs", num_envs, 1, MOST)
-        compiled, self.render_mode = compiled_for(self.task), checked_mode(render_mode)
+        self._compiled = compiled = compiled_for(self.task)
+        self.render_mode = checked_mode(render_mode)
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = metadata_of(self.task) | {"autoreset_mode": self.autoreset_mode}
         self.single_observation_space, self.single_action_space = spaces_of(compiled, self.task)
@@ -96,7 +97,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             InputError: actions out of bounds.
             SimulationError: a simulation that diverged.
         """
-        actions = checked_actions(actions, self.action_space.shape)
+        actions = checked_actions(actions, (self.num_envs, len(action_names(self._compiled, self.task))))
         acted, before = self._walkers.act(actions), self._ended
         ended, infos = acted.terminated | acted.truncated, {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():

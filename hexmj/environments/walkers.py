@@ -120,7 +120,7 @@ class Walkers:
         self._steps, self._substeps = task.steps, task.substeps
         self._everyone, self._ids = np.arange(count), np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
-        self._of: list[Together | None] = count * [None]
+        self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
         self._ahead = tips, stance, np.zeros(count, dtype=int)  # as planned, and the step of these that comes next
@@ -154,8 +154,7 @@ class Walkers:
         self._leave(ids)
         group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, ReadingPlan) else None)
         self._together.append(group)
-        for i in ids.tolist():
-            self._of[i] = group
+        self._of |= dict.fromkeys(ids.tolist(), group)
         self._bodies.stand(ids, settled.state, settled.ctrl)
         if len(ids) == len(self._everyone):
             self._senses = Senses(settled)
@@ -209,13 +208,11 @@ class Walkers:
             return
         self._walking[ids] = False
         self._ids = np.flatnonzero(self._walking)
-        for group in {one for one in (self._of[i] for i in ids.tolist()) if one}:
+        for group in {self._of.pop(i) for i in ids.tolist() if i in self._of}:
             still = self._walking[group.ids]
             group.ids, group.rows = group.ids[still], group.rows[still]
             if not still.any():
                 self._together.remove(group)
-        for i in ids.tolist():
-            self._of[i] = None
 
     def _plan_ahead(self) -> None:
         """Plan the next steps of those that have none left."""

@@ -4,7 +4,6 @@ Another engine is another module with an `Engine` in it.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import mujoco
@@ -101,7 +100,7 @@ class MujocoBatch:
         for values, now in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
             now[ids] = values
 
-    @cached_property
+    @property
     def rotation(self) -> np.ndarray:
         """From the root frames to the world, (start, axis, axis), where places are current."""
         return self._batch.bind("xmat")[:, self._root].reshape(-1, 3, 3)
