@@ -40,8 +40,10 @@ class Policy(Protocol):
 
 
 def felt(*parts: np.ndarray) -> np.ndarray:
-    """What policies see, (n, `FELT`): tilt, velocity, turning, contact, planned stance and tips, each (n, ...), divided by
-    their usual sizes.  Tilt is that of the vertical, ahead and to the left."""
+    """What policies see, (n, `FELT`): tilt ahead and to the left, velocity, turning, contact, planned stance and tips.
+
+    Each is (n, ...), and divided by its usual size.
+    """
     count = len(parts[0])
     return np.concatenate([one.reshape(count, -1) / size for one, size in zip(parts, USUAL, strict=True)], axis=1)
 
@@ -88,14 +90,13 @@ class OffsetPlan:
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
         self._tips = standing_tips(plan.starts, conditions.path.standing_height, plan.stride)
         self._stance = np.ones(plan.starts.shape)
-        self._felt: np.ndarray | None = None
+        self._felt, self._told = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
 
     def sense(self, sensed: Sensed) -> None:
         """Take in what the policy sees, and what the plan reads if it reads the legs."""
         if isinstance(self._plan, ReadingPlan):
             self._plan.sense(sensed)
-        if self._felt is None:
-            self._felt = np.zeros((len(self.starts), FELT))
+        self._told[sensed.ids] = True
         planned = self._stance[sensed.ids], self._tips[sensed.ids]
         self._felt[sensed.ids] = felt(sensed.tilt, sensed.velocity, sensed.turning, sensed.contact, *planned)
 
@@ -105,7 +106,7 @@ class OffsetPlan:
 
     def _step(self) -> PlannedWalk:
         step, count = self._plan.advance(1), len(self.starts)
-        seen = self._upright(step.velocity[0]) if self._felt is None else self._felt
+        seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
         offset = np.clip(self._policy(seen), -1.0, 1.0).reshape(count, 6, 3)
         offset = self._conditions.body.lengths.largest_tip_offset * offset
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
