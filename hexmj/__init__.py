@@ -4,12 +4,14 @@ Units are mm, g, s and radians; velocities V are fractions of the protraction ve
 unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import hexmj.as_run  # noqa: F401  # from now on
+import hexmj.as_run  # from now on
 
 if TYPE_CHECKING:
+    from hexmj import environments as environments
     from hexmj.attributes import settings as settings
     from hexmj.bodies.description import Body as Body
     from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
@@ -91,13 +93,19 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
+if "gymnasium" in sys.modules:  # whoever has imported it finds the environments' ids in it
+    import hexmj.environments  # noqa: F401
+
+
 def __getattr__(name: str) -> Any:
+    if name == "environments":
+        return import_module("hexmj.environments")
     if name not in _HOME:
-        raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__all__)}")
+        raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__dir__())}")
     value = getattr(import_module(f"hexmj.{_HOME[name]}"), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return [*__all__, "environments"]

@@ -46,7 +46,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     margin = np.empty(len(points))
 
     def work(begin: int, end: int) -> None:
-        _margins(points[begin:end], stands[begin:end], margin[begin:end])
+        margins(points[begin:end], stands[begin:end], margin[begin:end])
 
     run_blocks(work, len(points), 4096, threads)
     return margin.reshape(shape)
@@ -94,8 +94,8 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _margins(feet: Any, stance: Any, margin: Any) -> None:
-    """`stability_margin` of postures (posture, leg, 2).
+def margins(feet: Any, stance: Any, margin: Any) -> None:
+    """`stability_margin` of postures (posture, leg, 2), for compiled code.
 
     The line through two standing feet carries an edge of the polygon if all others lie on one side of it.
     """

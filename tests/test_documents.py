@@ -31,7 +31,8 @@ LONG = [command for command, told in LINES if told.startswith("long")]
 REFUSED = [command for command, told in LINES if told == "refused"]
 FIRST = {command.split()[0]: command for command in reversed(COMMANDS)}
 """Name of a command -> the first line that has it."""
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+EXAMPLES = sorted(one for one in (ROOT / "examples").glob("*.py") if not one.name.startswith("train_"))
+"""Those that train for minutes are in `test_learned`, made small."""
 
 
 def blocks(page: str, language: str) -> list[str]:

@@ -93,7 +93,7 @@ def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
         np.testing.assert_array_equal(contact, standing[start, m - 1 : m * count : m])
         same = (contact == walked.measured.stance[:count, start]).all(axis=1)
         assert same.mean() > 0.95
-        margin = np.array([o["margin"] for o in seen])[:count]
+        margin = np.array([o["margin"][0] for o in seen])[:count]
         np.testing.assert_allclose(margin[same], margins[:count, start][same], rtol=0, atol=1e-9)
         assert sum(o["out_of_reach"].sum() for o in seen) == walked.outcomes.unreachable[start]
         fall = walked.outcomes.fall[start]

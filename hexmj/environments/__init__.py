@@ -1,11 +1,20 @@
-"""The insect as an environment for learning and control."""
+"""The insect as an environment for learning and control: `dm` for dm_env, `gym` and `vector` for Gymnasium.
 
-import os
-import warnings
+Where Gymnasium is installed, its ids are registered when this package is imported.
+"""
 
-import glfw
+from importlib.util import find_spec
 
-with warnings.catch_warnings():
-    if "MUJOCO_GL" not in os.environ:  # without a screen GLFW only warns, and dm_control would never come to EGL
-        warnings.simplefilter("error", glfw.GLFWError)
-    import dm_control.mujoco  # noqa: F401
+IDS = {"hexmj/StickInsect-v0": "joints", "hexmj/StickInsectTips-v0": "tips"}
+"""What an action means, by Gymnasium's ids."""
+
+if find_spec("gymnasium"):
+    import gymnasium
+
+    for _id, _actions in IDS.items():
+        gymnasium.register(
+            _id,
+            entry_point="hexmj.environments.gym:StickInsect",
+            vector_entry_point="hexmj.environments.vector:StickInsects",
+            kwargs={"actions": _actions},
+        )

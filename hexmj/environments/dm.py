@@ -1,64 +1,57 @@
-"""The insect as a dm_env environment on dm_control: walk straight ahead at a commanded velocity.
+"""The insect as a dm_env environment on dm_control; what an episode is stands in `task`.
 
-An episode begins at a random start in S, settled as for a physical walk.  One step of the environment is one
-step of the plan, with its substeps.  The controller runs along and its plan is observed whatever the actions
-are: the targets of all joints, held for the step ('joints'), or offsets to the tips that the controller plans
-('tips'), so that zeros are its own walk, bit for bit that of `measures.physical.physical_walk`.
-
-Observations, all float64:
-
-- joint_angles, joint_velocities: (leg * joint,) [rad], [rad/s], in the order of `ctrl`
-- orientation: unit quaternion of the root, (w, x, y, z); the walk should go along the world's x
-- velocity: of the root, ahead, to the left and up, seen from its heading [mm/s]
-- angular_velocity: of the root, in its own frame [rad/s]
-- clearance: height of the trunk's lowest point [mm]
-- tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `Numerics.contact_gap`
-- margin: measured stability margin [mm], from the feet in contact and the insect's own centre of mass;
-  `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
-- command: velocity to walk at [mm/s]
-- planned_stance: (leg,) 1 where the plan lets the leg stand
-- planned_tips: in the root frame, (leg, axis) [mm], without offsets
-- out_of_reach, with 'tips' only: (leg,) substeps of the last step in which the leg kept its last angles,
-  because its planned tip with the offset could not be reached
-
-The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the
-step, the command c and the upward component u of the body's vertical; it is 0 on a fall.  An episode ends on a
-fall, when the trunk touches the ground, with discount 0; with discount 1 after its duration, or where a foot comes to
-the end of a step, gap or hurdle.  A simulation that diverges raises dm_control's PhysicsError.  Contacts are those of
-the last substep, known once it is done.
+Actions have units here: targets [rad] within the joints' ranges, or offsets [mm]: forward, left, up.  A fall ends an
+episode with discount 0, its time or the end of the ground with discount 1.  A simulation that diverges raises
+dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
 """
 
+import os
+import warnings
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import Literal
 
+import glfw
 import numpy as np
-from dm_control import mujoco
+
+with warnings.catch_warnings():
+    if "MUJOCO_GL" not in os.environ:  # without a screen GLFW only warns, and dm_control would never come to EGL
+        warnings.simplefilter("error", glfw.GLFWError)
+    from dm_control import mujoco
 from dm_control.mujoco import wrapper
 from dm_control.rl import control
-from dm_control.utils import rewards
 from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
-from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.bodies.loading import compile_body
-from hexmj.checks import given, numbers, typed
+from hexmj.checks import given, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type
+from hexmj.controllers.protocol import Controller, ReadingPlan
+from hexmj.environments.task import (
+    Actions,
+    Seen,
+    Task,
+    action_bounds,
+    action_names,
+    at_the_end,
+    clearance,
+    fallen,
+    margin,
+    observation_bounds,
+    own_observations,
+    rewards,
+    tips,
+    velocity_from_heading,
+)
 from hexmj.errors import InputError
-from hexmj.legs import LEGS
 from hexmj.physics.backend import AFTER, Rolled
 from hexmj.physics.fine_steps import FineSteps, Shown
 from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import settle
-from hexmj.stability import stability_margin
-from hexmj.starts import draw_starts
-from hexmj.timing import Stride, steps_within
+from hexmj.starts import check_draw
+from hexmj.timing import Stride
 
 ROUNDING = 1e-6
 """Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
@@ -70,28 +63,10 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that a step goes on from, the solver's warm start included."""
 
 
-def observation_specs(joints: int) -> tuple[specs.Array, ...]:
-    """The specs of what is observed of a body with so many joints."""
-    return (
-        specs.Array((joints,), float, "joint_angles"),
-        specs.Array((joints,), float, "joint_velocities"),
-        specs.Array((4,), float, "orientation"),
-        specs.Array((3,), float, "velocity"),
-        specs.Array((3,), float, "angular_velocity"),
-        specs.Array((), float, "clearance"),
-        specs.Array((6, 3), float, "tips"),
-        specs.BoundedArray((6,), float, 0.0, 1.0, "contact"),
-        specs.Array((), float, "margin"),
-        specs.BoundedArray((), float, 0.0, np.inf, "command"),
-        specs.BoundedArray((6,), float, 0.0, 1.0, "planned_stance"),
-        specs.Array((6, 3), float, "planned_tips"),
-    )
-
-
 def load(
     velocity: float = 0.3,
     *,
-    actions: Literal["joints", "tips"] = "joints",
+    actions: Actions = "joints",
     controller: Controller = LDVS,
     conditions: Conditions | None = None,
     stride: Stride | None = None,
@@ -114,16 +89,11 @@ def load(
         InputError: a value that makes no sense; here, or for an action in `step`.
     """
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
-    if not 0 < (velocity := typed("velocity", velocity, float)) < 1:
-        raise InputError(f"velocity = {velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p")
-    typed("actions", actions, Literal["joints", "tips"])
-    check_controller_type(controller)
-    whole = float(steps_within(typed("duration", duration, float), stride) * stride.dt)
-    task = TASKS[actions](velocity, controller, conditions, stride, whole, seed)
+    task = Task(velocity, actions, controller, conditions, stride, duration)
     compiled = compile_body(conditions, conditions.timestep(stride))
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
     physics.compiled = compiled
-    return control.Environment(physics, task, n_sub_steps=conditions.substeps(stride))
+    return control.Environment(physics, KINDS[actions](task, seed), n_sub_steps=task.substeps)
 
 
 class InsectPhysics(mujoco.Physics):
@@ -201,31 +171,32 @@ class InsectPhysics(mujoco.Physics):
         seen = (np.array(values)[np.newaxis] for values in (feet, sensors, force))
         return Rolled(*seen, after=np.empty((1, len(control), 0)))
 
-    def rotation(self) -> np.ndarray:
-        """From the root frame to the world, (axis, axis)."""
-        return self.data.xmat[self.compiled.root].reshape(3, 3)
+    def seen(self) -> Seen:
+        """The insect as it is now, the only one."""
+        data, columns = self.data, self.compiled.columns
+        return Seen(
+            qpos=data.qpos[np.newaxis],
+            qvel=data.qvel[np.newaxis],
+            rotation=data.xmat[self.compiled.root].reshape(1, 3, 3),
+            feet=self._feet()[np.newaxis],
+            centre_of_mass=data.sensordata[np.newaxis, columns.centre_of_mass],
+        )
 
     def velocity_from_heading(self) -> np.ndarray:
         """Velocity of the root ahead, to the left and up, (axis,) [mm/s]."""
-        angle = np.arctan2(self.rotation()[1, 0], self.rotation()[0, 0])
-        x, y, up = self.data.qvel[:3]
-        return np.array([np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x, up])
+        return velocity_from_heading(self.seen())[0]
 
     def clearance(self) -> np.ndarray:
         """Height of the trunk's lowest point over the ground [mm]."""
-        corners, radii = self.compiled.trunk_corners
-        return np.array((self.data.qpos[2] + corners @ self.rotation()[2] - radii).min())
+        return clearance(self.seen(), self.compiled)[0]
 
     def tips(self) -> np.ndarray:
         """Tips in the root frame, (leg, axis) [mm]."""
-        return (self._feet() - self.data.qpos[:3]) @ self.rotation()
+        return tips(self.seen())[0]
 
     def margin(self, standing: np.ndarray) -> np.ndarray:
         """Stability margin on the feet that stand, (leg,), seen from the centre of mass [mm]."""
-        if not standing.any():
-            return np.array(self.compiled.body.lengths.no_foot_margin)
-        centre = self.data.sensordata[self.compiled.columns.centre_of_mass]
-        return stability_margin((self._feet() - centre)[:, :2], standing, threads=1)
+        return margin(self.seen(), standing[np.newaxis], self.compiled)[0]
 
     def _feet(self) -> np.ndarray:
         return self.data.sensordata[self.compiled.columns.foot].reshape(6, 3).copy()
@@ -233,31 +204,27 @@ class InsectPhysics(mujoco.Physics):
 
 @dataclass(eq=False)
 class Walking(control.Task):
-    """Walk straight ahead; subclasses say what an action means.  The arguments are those of `load`."""
+    """Walk straight ahead; subclasses say what an action means.
 
-    velocity: float
-    controller: Controller
-    conditions: Conditions
-    stride: Stride
-    duration: float
+    Starts are drawn from `_random`, which may be replaced by any of NumPy's generators, as wrappers of dm_control do.
+    """
+
+    task: Task
     seed: int
 
     def __post_init__(self) -> None:
-        """Draw the first starts."""
-        self._starts, self._episodes = draw_starts(16, self.seed, self.stride), 0
-        self._command = self.velocity * self.conditions.time.vp
+        """Draw the starts of `draw_starts` by the seed."""
+        self._random = np.random.default_rng(check_draw(1, self.seed)[1])
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
-        if self._episodes == len(self._starts):
-            self._starts = draw_starts(2 * self._episodes, self.seed, self.stride)
-        start = self._starts[[self._episodes]]
-        self._episodes += 1
-        settled = settle(start, self.conditions, self.stride, threads=1)
+        task, stride = self.task, self.task.stride
+        start = self._random.uniform(stride.pep0, stride.aep0, (1, 6))
+        settled = settle(start, task.conditions, stride, threads=1)
         mujoco.mj_setState(physics.model.ptr, physics.data.ptr, settled.state[0], AFTER)
         physics.set_control(settled.ctrl[0])
-        plan = begin(self.controller, start, self.velocity, self.stride, threads=1)
-        self._orders, self._senses = OrdersFromPlan(settled, plan, self.duration), Senses(settled)
+        plan = begin(task.controller, start, task.velocity, stride, threads=1)
+        self._orders, self._senses = OrdersFromPlan(settled, plan, task.steps * stride.dt), Senses(settled)
         self._reading = plan if isinstance(plan, ReadingPlan) else None
         self._planned_stance, self._out_of_reach = np.ones(6), np.zeros(6)
         self._fell = False
@@ -292,56 +259,49 @@ class Walking(control.Task):
 
     def after_step(self, physics: InsectPhysics) -> None:
         """Note which feet stand, whether the trunk has touched the ground, and whether that ends here."""
-        columns, sensors = physics.compiled.columns, physics.shown["sensors"]
-        self._senses.feel(ONLY, sensors, physics.shown["force"][:, :, columns.ctrl])
-        self._fell = bool((sensors[:, :, columns.trunk] > 0).any())
-        feet, conditions = sensors[0, :, columns.foot].reshape(-1, 6, 3), self.conditions
-        self._at_the_end = bool(beyond_the_ground(conditions.ground, conditions.body.lengths, feet).any())
+        sensors, force = physics.shown["sensors"], physics.shown["force"]
+        self._senses.feel(ONLY, sensors, force[:, :, physics.compiled.columns.ctrl])
+        self._fell = bool(fallen(sensors, physics.compiled)[0])
 
-    def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
+    def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
+        """Bounds of an action; the names of its numbers are joined by tabs."""
+        low, _, high = action_bounds(physics.compiled, self.task)
+        return specs.BoundedArray(
+            low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task))
+        )
+
+    def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.BoundedArray]:
         """The specs of all observations by their names."""
-        return OrderedDict((spec.name, spec) for spec in observation_specs(physics.compiled.joints))
+        bounds = observation_bounds(physics.compiled, self.task)
+        return OrderedDict(
+            (name, specs.BoundedArray(low.shape, float, low, high, name)) for name, (low, high) in bounds.items()
+        )
 
     def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
         """The observations, in the order of their specs."""
-        qpos, qvel = physics.position(), physics.velocity()
-        standing = self._senses.standing(ONLY)[0]
-        return OrderedDict(
-            joint_angles=qpos[physics.compiled.columns.qpos],
-            joint_velocities=qvel[physics.compiled.columns.qvel],
-            orientation=qpos[3:ROOT_QPOS],
-            velocity=physics.velocity_from_heading(),
-            angular_velocity=qvel[3:ROOT_QVEL],
-            clearance=physics.clearance(),
-            tips=physics.tips(),
-            contact=standing.astype(float),
-            margin=physics.margin(standing),
-            command=np.array(self._command),
-            planned_stance=self._planned_stance,
-            planned_tips=self._orders.tips[0].copy(),
-        )
+        own = own_observations(physics.seen(), self._senses.standing(ONLY), physics.compiled)
+        observed = {name: values[0].astype(float) for name, values in own.items()} | {
+            "command": np.array([self.task.command]),
+            "planned_stance": self._planned_stance,
+            "planned_tips": self._orders.tips[0],
+            "out_of_reach": self._out_of_reach,
+        }
+        bounds = observation_bounds(physics.compiled, self.task)
+        return OrderedDict((name, np.clip(observed[name], low, high)) for name, (low, high) in bounds.items())
 
     def get_reward(self, physics: InsectPhysics) -> float:
-        """max(0, 1 - |v - c| / c) max(0, u), and 0 on a fall."""
-        v, c, upright = float(physics.data.qvel[0]), self._command, float(physics.rotation()[2, 2])
-        at_speed = rewards.tolerance(v, bounds=(c, c), margin=c, sigmoid="linear", value_at_margin=0.0)
-        return 0.0 if self._fell else at_speed * max(0.0, upright)
+        """See `task`."""
+        return float(rewards(physics.seen(), np.array([self._fell]), self.task)[0])
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""
         if self._fell:
             return 0.0
-        return 1.0 if self._at_the_end or not self._orders.steps_ahead() else None
+        return 1.0 if at_the_end(physics.seen(), self.task)[0] or not self._orders.steps_ahead() else None
 
 
 class JointTargets(Walking):
     """An action gives the targets of all joints, held for the step."""
-
-    def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
-        """Bounded by the joints' ranges [rad]; the actuators' names are joined by tabs."""
-        compiled = physics.compiled
-        low, high = physics.model.actuator_ctrlrange[compiled.columns.ctrl].T
-        return specs.BoundedArray((compiled.joints,), float, low, high, name="\t".join(compiled.body.joints))
 
     def joint_targets(self, action: np.ndarray, planned: np.ndarray) -> np.ndarray:
         """The action itself, throughout."""
@@ -351,26 +311,10 @@ class JointTargets(Walking):
 class TipOffsets(Walking):
     """An action gives offsets to the tips that the controller plans."""
 
-    def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
-        """Bounded by `Lengths.largest_tip_offset` [mm]; the names are joined by tabs."""
-        names = "\t".join(f"{leg}_{axis}" for leg in LEGS for axis in ("forward", "left", "up"))
-        bound = np.full(3 * len(LEGS), physics.compiled.body.lengths.largest_tip_offset)
-        return specs.BoundedArray(bound.shape, float, -bound, bound, name=names)
-
     def tip_offsets(self, action: np.ndarray) -> np.ndarray:
         """The action itself; a leg whose tip is out of reach keeps its last angles."""
         return action.reshape(6, 3)
 
-    def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.Array]:
-        """The specs of all observations by their names."""
-        most = float(self.conditions.substeps(self.stride))
-        spec = specs.BoundedArray((6,), float, 0.0, most, "out_of_reach")
-        return super().observation_spec(physics) | {"out_of_reach": spec}
 
-    def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
-        """The observations, in the order of their specs."""
-        return super().get_observation(physics) | {"out_of_reach": self._out_of_reach}
-
-
-TASKS: dict[str, type[Walking]] = {"joints": JointTargets, "tips": TipOffsets}
-"""Kinds of actions by their names."""
+KINDS: dict[Actions, type[Walking]] = {"joints": JointTargets, "tips": TipOffsets}
+"""Tasks by what an action means."""

@@ -79,7 +79,8 @@ class MujocoBatch:
 
     def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
         """As many bodies; `threads` step them, one per core unless given."""
-        self._model = model = compiled.model
+        self._model, self._root = compiled.model, compiled.root
+        model = compiled.model
         self._batch = Batch(model, count, thread_count(threads))
         self._timestep, self._contact = self._batch.expand("opt.timestep"), self._batch.expand("pair_solref")
         self._state = [self._batch.bind(name) for name in STATE]
@@ -98,6 +99,19 @@ class MujocoBatch:
         """See `Engine.put`."""
         for values, now in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
             now[ids] = values
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """From the root frames to the world, (start, axis, axis), where places are current."""
+        return self._batch.bind("xmat")[:, self._root].reshape(-1, 3, 3)
+
+    def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
+        """Put some bodies where they stand at rest, (n, state), by controls, (n, actuator); their places are current.
+
+        Controls are those of the steps to come, so nothing is kept of these.
+        """
+        self.put(ids, states)
+        self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
 
     def rest(self, control: np.ndarray, steps: int) -> None:
         """Step all bodies with one control, (start, actuator), and make everything that they show current.

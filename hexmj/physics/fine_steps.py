@@ -10,8 +10,10 @@ diverges ends everything even in steps that would have been taken again.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.backend import Diverged, Engine
@@ -120,11 +122,23 @@ def strikes(depth: np.ndarray, substeps: int, allowed: float) -> np.ndarray:
     Returns:
         (..., step)
     """
-    after, before, last = depth[..., 1:, :], depth[..., :-1, :], slice(substeps - 1, None, substeps)
-    one_later = after + np.where(after > 0, BRAKED, 1.0) * (after - before)
-    deepest = after.copy()
-    deepest[..., last, :] = np.maximum(after, one_later)[..., last, :]
-    return deepest.max(axis=-1) > allowed
+    rows = np.ascontiguousarray(depth).reshape(-1, *depth.shape[-2:])
+    return _strikes(rows, substeps, allowed).reshape(*depth.shape[:-2], -1)
+
+
+@njit(cache=True, nogil=True)
+def _strikes(depth: Any, substeps: int, allowed: float) -> Any:
+    """`strikes` of (n, 1 + step, leg)."""
+    struck = np.zeros((depth.shape[0], depth.shape[1] - 1), dtype=np.bool_)
+    for n in range(struck.shape[0]):
+        for step in range(struck.shape[1]):
+            for leg in range(depth.shape[2]):
+                after = depth[n, step + 1, leg]
+                struck[n, step] |= after > allowed
+                if step % substeps == substeps - 1:
+                    sinks = after - depth[n, step, leg]
+                    struck[n, step] |= after + (BRAKED if after > 0 else 1.0) * sinks > allowed
+    return struck
 
 
 def in_whole_steps(sensors: np.ndarray, fine: int, touch: slice) -> np.ndarray:

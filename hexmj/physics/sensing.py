@@ -22,6 +22,11 @@ class Senses:
         self._before = np.ones(settled.starts.shape, dtype=bool)
         self._load, self._torques = settled.load.copy(), settled.torques.copy()
 
+    def restart(self, ids: np.ndarray, settled: Settled) -> None:
+        """Some starts stand at rest again, as others that were settled, (n,)."""
+        self._unloaded[ids], self._before[ids] = 0, True
+        self._load[ids], self._torques[ids] = settled.load, settled.torques
+
     def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Which feet of some starts stand after each of the next substeps, (n, substep, leg).
 

@@ -1,0 +1,60 @@
+"""Environments: one insect against a bare loop of MuJoCo's steps, many against the package's own physical walks.
+
+A row is one insect's steps a second; a step is one of the plan, with two physics steps.
+"""
+
+import mujoco
+import numpy as np
+import pytest
+
+from hexmj import LDVS, draw_starts
+from hexmj.environments.gym import StickInsect
+from hexmj.environments.vector import StickInsects
+from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.settling import settle
+
+VELOCITY, STEPS = 0.1, 1000  # nobody falls, so both loops take the same steps
+MANY, FEW_STEPS = 1000, 100
+
+
+@pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls"])
+def test_one(measure, who):
+    """The bare loop plans, observes and measures nothing."""
+    walking, controls = StickInsect(actions="tips", velocity=VELOCITY), []
+    walking.reset(seed=0)
+    for _ in range(STEPS):
+        walking.step(np.zeros(18))
+        controls.append(walking.data.ctrl.copy())
+
+    def ours() -> None:
+        walking.reset(seed=0)
+        for _ in range(STEPS):
+            walking.step(np.zeros(18))
+
+    def bare() -> None:
+        walking.reset(seed=0)
+        for now in controls:
+            walking.data.ctrl[:] = now
+            for _ in range(walking.task.substeps):
+                mujoco.mj_step(walking.model, walking.data)
+
+    work = ours if who == "hexmj" else bare
+    measure(work, "environment, 1 insect", who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
+
+
+@pytest.mark.parametrize("who", ["hexmj", "hexmj's own physical walks"])
+def test_many(measure, who):
+    settled = settle(draw_starts(MANY, 0))
+    walking = StickInsects(MANY, actions="tips", velocity=VELOCITY, duration=1e4, threads=2)
+    walking.reset(seed=0)
+
+    def ours() -> None:
+        for _ in range(FEW_STEPS):
+            walking.step(np.zeros((MANY, 18)))
+
+    def own() -> None:
+        physical_outcomes(settled, LDVS, VELOCITY, FEW_STEPS * settled.stride.dt, threads=2)
+
+    work = ours if who == "hexmj" else own
+    what = f"environment, {MANY} insects"
+    measure(work, what, who, amount=MANY * FEW_STEPS, unit="steps/s", ratio=0.8, rounds=5)

@@ -1,0 +1,101 @@
+"""A single body that steps by itself, by MuJoCo's own step: for one insect a batch would only cost time."""
+
+import math
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.physics.backend import AFTER, STATE, Diverged, Rolled
+from hexmj.physics.fine_steps import FineSteps, Shown, strikes
+from hexmj.timing import Stride
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that a step goes on from, the time included."""
+
+
+class Alone:
+    """An `Engine` of one body, to the same bits as `physics.backend.MujocoBatch`; every `ids` is [0].
+
+    Between two steps the first half of the next is done already, so that places are current.
+    """
+
+    def __init__(self, compiled: CompiledBody, stride: Stride) -> None:
+        """At home; it will take a step of the stride at once."""
+        self.model, self.data = compiled.model, mujoco.MjData(compiled.model)
+        model, data = self.model, self.data
+        self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
+        self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
+        self.sensors = data.sensordata[np.newaxis]
+        self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
+        self._foot, self._feet = compiled.columns.foot, data.sensordata[compiled.columns.foot].reshape(6, 3)
+        self._fine = FineSteps.of(self, compiled.conditions.substeps(stride), compiled)
+        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
+
+    def states(self, ids: np.ndarray) -> np.ndarray:
+        """See `backend.Engine.states`."""
+        self._before = states = np.empty((1, self._size))
+        mujoco.mj_getState(self.model, self.data, states[0], _STATE)
+        return states
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        """See `backend.Engine.put`."""
+        mujoco.mj_setState(self.model, self.data, states[0], _STATE)
+        mujoco.mj_step1(self.model, self.data)
+
+    def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
+        """Put the body where it stands at rest, (1, state), by its controls, (1, actuator)."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, states[0], AFTER)
+        self._control[:] = control[0]
+        mujoco.mj_step1(self.model, self.data)
+
+    def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
+        """See `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
+        before, seen, fine = self.states(ids), self._roll(control[0]), self._fine
+        feet, sensors, force = seen
+        if strikes(fine.depth_of(feet), fine.substeps, fine.allowed).any():
+            self.put(ids, before)
+            return fine.take(ids, control)
+        return {"sensors": sensors, "force": force}
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
+        """See `backend.Engine.roll`; no states are kept, since a plan's step is all that is taken at once."""
+        if parts == 1:
+            seen = self._roll(control[0])
+        else:
+            model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
+            model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
+            try:
+                mujoco.mj_step1(model, self.data)
+                seen = self._roll(control[0])
+            finally:
+                model.opt.timestep, model.pair_solref[:] = timestep, usual
+            mujoco.mj_step1(model, self.data)
+        return Rolled(*seen, after=np.empty((1, control.shape[1], 0)))
+
+    def _roll(self, control: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""
+        count, model, data, step1, step2 = len(control), self.model, self.data, mujoco.mj_step1, mujoco.mj_step2
+        control_now, feet_now, sensors_now, force_now = self._control, self._feet, self._sensors, self._force
+        feet = np.empty((1, count + 1, 6, 3))
+        sensors, force = np.empty((1, count, len(sensors_now))), np.empty((1, count, len(force_now)))
+        feet[0, 0] = feet_now
+        for k in range(count):
+            control_now[:] = control[k]
+            step2(model, data)
+            sensors[0, k], force[0, k] = sensors_now, force_now
+            step1(model, data)
+            feet[0, k + 1] = feet_now
+        if not math.isfinite(self.qpos[0] @ self.qpos[0]) or self._warned.any():
+            raise self._diverged(control)
+        return feet, sensors, force
+
+    def _diverged(self, control: np.ndarray) -> Diverged:
+        """What happened, with the state before and the controls since, (step, actuator)."""
+        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
+        before, model = mujoco.MjData(self.model), self.model
+        mujoco.mj_setState(model, before, self._before[0], _STATE)
+        state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
+        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
+        return Diverged(0, ", ".join(kinds) or "a state that is not finite", state | now)

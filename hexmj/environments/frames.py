@@ -1,0 +1,46 @@
+"""Frames of an insect, drawn without a screen; a GL is chosen when the first one is drawn."""
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.loading import compile_body
+from hexmj.conditions import Conditions
+from hexmj.replay.film import gl
+
+if TYPE_CHECKING:
+    from mujoco import Renderer
+
+SIZE = 480, 640
+"""Height and width [pixels]."""
+
+
+class Frames:
+    """Draws a body wherever it is, by the camera that is first in its description, which follows the stick insect."""
+
+    def __init__(self, conditions: Conditions) -> None:
+        """Nothing is drawn yet."""
+        self._conditions, self._renderer = conditions, None
+
+    def draw(self, qpos: np.ndarray) -> np.ndarray:
+        """The body at some `qpos`, (height, width, 3) of uint8."""
+        renderer = self._begun()
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(renderer.model, self._data)
+        mujoco.mj_comPos(renderer.model, self._data)
+        mujoco.mj_camlight(renderer.model, self._data)
+        renderer.update_scene(self._data, *self._conditions.body.cameras[:1])
+        return renderer.render()
+
+    def close(self) -> None:
+        """Free the GL; it may be called again."""
+        if self._renderer:
+            self._renderer.close()
+        self._renderer = None
+
+    def _begun(self) -> "Renderer":
+        if self._renderer is None:
+            model = compile_body(self._conditions).model
+            self._data, self._renderer = mujoco.MjData(model), gl.renderer(model, *SIZE)
+        return self._renderer

@@ -1,0 +1,124 @@
+"""One insect as a Gymnasium environment: `hexmj/StickInsect-v0` and `hexmj/StickInsectTips-v0`.
+
+What an episode is stands in `task`.  Actions are normalised: 0 is the usual one, posture home or no offset, -1 and 1
+are the ends of the joints' ranges or the largest offsets.
+"""
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.loading import compile_body
+from hexmj.checks import numbers
+from hexmj.environments.alone import Alone
+from hexmj.environments.frames import Frames
+from hexmj.environments.task import Task, action_names, observation_bounds
+from hexmj.environments.walkers import Walkers
+from hexmj.errors import InputError
+
+RENDER_MODES = [None, "rgb_array"]
+"""How it can be drawn."""
+
+
+class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
+    """One insect that walks in an episode of its own."""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES[1:], "render_fps": 800}  # pyright: ignore
+
+    def __init__(self, *, render_mode: str | None = None, **task: Any) -> None:
+        """Its settings are those of `task.Task`.
+
+        Args:
+            render_mode: 'rgb_array' for `render`.
+            task: velocity, actions, controller, conditions, stride, duration.
+
+        Raises:
+            InputError: a value that makes no sense.
+        """
+        self.task = Task(**task)
+        compiled, self.render_mode = compiled_for(self.task), checked_mode(render_mode)
+        self.metadata = metadata_of(self.task)
+        self.observation_space, self.action_space = spaces_of(compiled, self.task)
+        self._body = Alone(compiled, self.task.stride)
+        self.model, self.data = self._body.model, self._body.data
+        self._walkers = Walkers(self.task, compiled, self._body, self._body.take, count=1, threads=1)
+        self._frames = Frames(self.task.conditions)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Begin an episode.  With a seed it takes the first of `hexmj.draw_starts` by that seed, then its next ones."""
+        super().reset(seed=seed)
+        self._walkers.begin(np.arange(1), drawn(self.np_random, self.task))
+        return self._observation(), {}
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+        """One step of the plan, with its substeps.
+
+        Raises:
+            InputError: an action out of bounds.
+            SimulationError: a simulation that diverged.
+        """
+        acted = self._walkers.act(checked_actions(action, self.action_space.shape)[np.newaxis])
+        return self._observation(), float(acted.reward[0]), bool(acted.terminated[0]), bool(acted.truncated[0]), {}
+
+    def render(self) -> np.ndarray | None:
+        """A frame, (height, width, 3), if it was asked for by `render_mode`."""
+        return self._frames.draw(self.data.qpos) if self.render_mode else None
+
+    def close(self) -> None:
+        """Free the GL, if one was chosen."""
+        self._frames.close()
+
+    def _observation(self) -> dict[str, np.ndarray]:
+        return self._walkers.named(self._walkers.observations()[0])
+
+
+def compiled_for(task: Task) -> CompiledBody:
+    """The body of a task, without what is only to look at."""
+    return compile_body(task.conditions, task.conditions.timestep(task.stride), looks=False)
+
+
+def spaces_of(compiled: CompiledBody, task: Task) -> tuple[spaces.Dict, spaces.Box]:
+    """Of one insect's observations and actions."""
+    bounds = observation_bounds(compiled, task)
+    observed = {name: spaces.Box(low, high, dtype=np.float64) for name, (low, high) in bounds.items()}
+    return spaces.Dict(observed), spaces.Box(-1.0, 1.0, (len(action_names(compiled, task)),), np.float32)
+
+
+def metadata_of(task: Task) -> dict[str, Any]:
+    """What Gymnasium wants to know; frames are drawn in real time if one is drawn after each step."""
+    fps = max(1, round(1.0 / task.conditions.time.seconds(task.stride)))
+    return {"render_modes": RENDER_MODES[1:], "render_fps": fps}
+
+
+def drawn(rng: np.random.Generator, task: Task) -> np.ndarray:
+    """The next start of one insect, (1, leg) [mm]; those of `draw_starts` if the generator has the same seed."""
+    return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))
+
+
+def checked_mode(render_mode: str | None) -> str | None:
+    """A way to be drawn.
+
+    Raises:
+        InputError: no such way.
+    """
+    if render_mode not in RENDER_MODES:
+        raise InputError(f"render_mode = {render_mode!r:.80}; valid names: rgb_array, or None")
+    return render_mode
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Actions as numbers in their shape; whether they are within bounds is seen when they are carried out.
+
+    Raises:
+        InputError: something else.
+    """
+    if not (isinstance(actions, np.ndarray) and actions.dtype == float):
+        actions = numbers("action", actions)
+    if actions.shape != shape:
+        raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
+    return actions

@@ -1,0 +1,122 @@
+"""What was learned, as a controller: a policy adds offsets to the tips that another controller plans.
+
+A policy sees what a robot feels (`felt`), in an environment from its observations, in a walk of the package from
+`Sensed`; and it answers with actions of the environment whose actions are offsets, each from -1 to 1.  So what was
+trained there walks wherever a controller does, in the league too.  On paper nobody feels anything: there the insect is
+upright, as fast as it is told and stands on the feet that it plans to stand on.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.physics.foot_path import TipTargets, standing_tips
+from hexmj.rotations import lean
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk, joined
+
+TILT, VELOCITY, TURNING = slice(0, 2), slice(2, 5), slice(5, 8)
+CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
+"""Columns of what is felt; see `felt`."""
+
+FELT = 38
+"""Numbers that are felt."""
+
+USUAL = 0.1, 50.0, 2.0, 1.0, 1.0, 10.0
+"""Usual sizes of tilt [rad], velocity [mm/s], turning [rad/s], contact, stance and tips [mm]; what is felt is of the
+size of 1."""
+
+
+class Policy(Protocol):
+    """A frozen dataclass of plain data that answers what is felt, (n, `FELT`), with actions, (n, leg * axis)."""
+
+    def __call__(self, felt: np.ndarray) -> np.ndarray:
+        """Offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`; cut off at -1 and 1."""
+        ...
+
+
+def felt(*parts: np.ndarray) -> np.ndarray:
+    """What policies see, (n, `FELT`): tilt ahead and to the left, velocity, turning, contact, planned stance and tips.
+
+    Each is (n, ...), and divided by its usual size.
+    """
+    count = len(parts[0])
+    return np.concatenate([one.reshape(count, -1) / size for one, size in zip(parts, USUAL, strict=True)], axis=1)
+
+
+def felt_in(observations: dict[str, np.ndarray]) -> np.ndarray:
+    """The same from the observations of a vector environment."""
+    tilt = np.arcsin(np.clip(lean(observations["orientation"])[0], -1.0, 1.0))
+    names = "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
+    return felt(tilt, *(observations[name] for name in names))
+
+
+@dataclass(frozen=True)
+class WithOffsets:
+    """A controller whose plan's tips are offset by a policy."""
+
+    policy: Policy
+    """What was learned."""
+    controller: Controller = LDVS
+    """What plans."""
+    vp: float = 80.0
+    """V_p for which the feet are lifted and lowered as the body would [mm/s]."""
+    name: str = field(default="learned")
+
+    def begin(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> "OffsetPlan":
+        """See `protocol.Controller.begin`."""
+        plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+        return OffsetPlan(plan, self.policy, Conditions.of(vp=self.vp))
+
+
+class OffsetPlan:
+    """A `protocol.ReadingPlan`: another plan's tips with a policy's offsets, and the heights that a body gives them."""
+
+    def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
+        """Around a plan at time 0."""
+        self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
+        self._plan, self._policy, self._conditions = plan, policy, conditions
+        self._targets = TipTargets(plan.starts, conditions, plan.stride)
+        self._tips = standing_tips(plan.starts, conditions.path.standing_height, plan.stride)
+        self._stance = np.ones(plan.starts.shape)
+        self._felt, self._told = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
+
+    def sense(self, sensed: Sensed) -> None:
+        """Take in what the policy sees, and what the plan reads if it reads the legs."""
+        if isinstance(self._plan, ReadingPlan):
+            self._plan.sense(sensed)
+        self._told[sensed.ids] = True
+        planned = self._stance[sensed.ids], self._tips[sensed.ids]
+        self._felt[sensed.ids] = felt(sensed.tilt, sensed.velocity, sensed.turning, sensed.contact, *planned)
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """The next steps, each with the offsets that the policy gives for what is felt then."""
+        return joined([self._step() for _ in range(steps)])
+
+    def _step(self) -> PlannedWalk:
+        step, count = self._plan.advance(1), len(self.starts)
+        seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
+        offset = np.clip(self._policy(seen), -1.0, 1.0).reshape(count, 6, 3)
+        offset = self._conditions.body.lengths.largest_tip_offset * offset
+        self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
+        self.done = self._plan.done
+        x, y, up = np.moveaxis(self._tips + offset, -1, 0)
+        x, height = x - np.array(self.stride.geometry.origin), up + self._conditions.path.standing_height
+        return replace(step, x=x[None], y=y[None], height=height[None])
+
+    def _upright(self, velocity: np.ndarray) -> np.ndarray:
+        """What is felt on paper."""
+        still = np.zeros((len(self.starts), 3))
+        ahead = np.stack([velocity * self._conditions.time.vp, still[:, 0], still[:, 0]], axis=1)
+        return felt(still[:, :2], ahead, still, self._stance, self._stance, self._tips)

@@ -1,0 +1,181 @@
+"""Compiled passes over all insects: what actions ask for, what is observed, and what a step was worth.
+
+The formulas of observations and rewards are those of `task`, which dm_env's environment uses as they stand there; for
+one insect a dozen of NumPy's calls take as long as its physics.  A test holds the two against each other.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.stability import margins
+
+
+@njit(cache=True, nogil=True)
+def within(actions: Any, ids: Any, most: float) -> bool:
+    """Whether all numbers of some insects' actions, (insect, number), are from -most to most."""
+    for n in ids:
+        for action in actions[n]:
+            if not abs(action) <= most:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def order(actions: Any, ids: Any, usual: Any, span: Any, ahead: Any, planned: Any, offset: bool) -> tuple[Any, Any]:
+    """What some insects shall do in their next step, and what is planned for it.
+
+    Args:
+        actions: of all insects, (insect, number) from -1 to 1.
+        ids: which insects, (n,).
+        usual: what 0 asks for, (number,).
+        span: how far it is from there to the least and to the greatest, each (number,).
+        ahead: tips (insect, step, substep, leg, axis) and stance (insect, step, leg) as planned, and the next step of
+            these, (insect,), which goes on.
+        planned: stance and tips of all insects, which take up what is planned.
+        offset: whether actions are offsets to the tips.
+
+    Returns:
+        What actions ask for, (n, number), and where the tips shall be, (n, substep, leg, axis) [mm].
+    """
+    tips_ahead, stance_ahead, at = ahead
+    wanted, tips = np.empty((len(ids), actions.shape[1])), np.empty((len(ids), tips_ahead.shape[2], 6, 3))
+    for i, n in enumerate(ids):
+        for j in range(actions.shape[1]):
+            wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0][j]
+        step = at[n]
+        for leg in range(6):
+            planned[0][n, leg] = stance_ahead[n, step, leg]
+            for axis in range(3):
+                beside = wanted[i, 3 * leg + axis] if offset else 0.0
+                for sub in range(tips.shape[1]):
+                    tips[i, sub, leg, axis] = tips_ahead[n, step, sub, leg, axis] + beside
+                planned[1][n, leg, axis] = tips_ahead[n, step, tips.shape[1] - 1, leg, axis]
+        at[n] = step + 1
+    return wanted, tips
+
+
+@njit(cache=True, nogil=True)
+def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
+    """Legs that cannot reach their tips keep their last angles.
+
+    Args:
+        joints: that put the tips where they shall be, (n, substep, leg, joint) [rad]; the last angles where none do.
+        reachable: whether they do, (n, substep, leg).
+        ids: which insects, (n,).
+        last: angles of all insects, (insect, leg, joint), which go on.
+        missed: substeps in which a leg cannot reach its tip, (insect, leg), made anew.
+    """
+    for i, n in enumerate(ids):
+        for leg in range(6):
+            missed[n, leg] = 0.0
+            for sub in range(joints.shape[1]):
+                missed[n, leg] += not reachable[i, sub, leg]
+                for j in range(joints.shape[3]):
+                    if reachable[i, sub, leg]:
+                        last[n, leg, j] = joints[i, sub, leg, j]
+                    else:
+                        joints[i, sub, leg, j] = last[n, leg, j]
+
+
+@njit(cache=True, nogil=True)
+def observe(body: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
+    """Write everything that is observed into `flat`, (n, number), cut off at its bounds.
+
+    Args:
+        body: positions, velocities, rotations and sensors, as `task.Seen` and `walkers.Bodies` have them.
+        corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
+        standing: which feet do, (n, leg).
+        planned: stance (n, leg), tips (n, leg, axis), and out of reach (n, leg).
+        bounds: least and most of every number, and the margin that stands for no foot.
+        layout: joints, where feet and centre of mass begin among the sensors, the command.
+    """
+    qpos, qvel, rotation, sensors = body
+    stance, tips, missed = planned
+    least, most, no_foot = bounds
+    joints, foot, centre, command = layout
+    feet, margin = np.empty((1, 6, 2)), np.empty(1)
+    for n in range(len(flat)):
+        seen, turn, q, v, s = flat[n], rotation[n], qpos[n], qvel[n], sensors[n]
+        at = 0
+        for j in range(joints):
+            seen[at + j] = q[ROOT_QPOS + j]
+            seen[at + joints + j] = v[ROOT_QVEL + j]
+        at += 2 * joints
+        for k in range(4):
+            seen[at + k] = q[3 + k]
+        at += 4
+        angle = np.arctan2(turn[1, 0], turn[0, 0])
+        cosine, sine = np.cos(angle), np.sin(angle)
+        seen[at] = cosine * v[0] + sine * v[1]
+        seen[at + 1] = cosine * v[1] - sine * v[0]
+        seen[at + 2] = v[2]
+        at += 3
+        for k in range(3):
+            seen[at + k] = v[3 + k]
+        at += 3
+        lowest = np.inf
+        for c in range(len(corners[0])):
+            corner = corners[0][c]
+            up = turn[2, 0] * corner[0] + turn[2, 1] * corner[1] + turn[2, 2] * corner[2]
+            lowest = min(lowest, q[2] + up - corners[1][c])
+        seen[at] = lowest
+        at += 1
+        for leg in range(6):
+            here = s[foot + 3 * leg : foot + 3 * leg + 3]
+            for k in range(3):
+                seen[at + k] = 0.0
+                for axis in range(3):
+                    seen[at + k] += (here[axis] - q[axis]) * turn[axis, k]
+            at += 3
+            feet[0, leg, 0], feet[0, leg, 1] = here[0] - s[centre], here[1] - s[centre + 1]
+        for leg in range(6):
+            seen[at + leg] = standing[n, leg]
+        at += 6
+        margins(feet, standing[n : n + 1], margin)
+        seen[at] = max(margin[0], no_foot)
+        seen[at + 1] = command
+        at += 2
+        for leg in range(6):
+            seen[at + leg] = stance[n, leg]
+        at += 6
+        for leg in range(6):
+            for k in range(3):
+                seen[at + k] = tips[n, leg, k]
+            at += 3
+        for i in range(at, len(seen)):
+            seen[i] = missed[n, i - at]
+        for i in range(len(seen)):
+            seen[i] = min(max(seen[i], least[i]), most[i])
+
+
+@njit(cache=True, nogil=True)
+def judge(qvel: Any, rotation: Any, ids: Any, sensors: Any, trunk: Any, command: float, reward: Any, fell: Any) -> bool:
+    """Write the rewards of those that have walked, and whether their trunks have touched the ground, both (insect,).
+
+    Args:
+        qvel: velocities, (insect, velocity).
+        rotation: from root frames to the world, (insect, axis, axis).
+        ids: which have walked, (n,).
+        sensors: over the step, (n, substep, column).
+        trunk: first column of contacts of the trunk's parts, and the one after the last.
+        command: velocity to walk at [mm/s].
+        reward: of all insects, 0.
+        fell: of all insects, False.
+
+    Returns:
+        Whether any fell.
+    """
+    any_fell = False
+    for i, n in enumerate(ids):
+        for t in range(sensors.shape[1]):
+            for part in range(trunk[0], trunk[1]):
+                fell[n] |= sensors[i, t, part] > 0
+        if fell[n]:
+            any_fell = True
+        else:
+            off = abs(qvel[n, 0] - command) / command
+            reward[n] = max(1.0 - off, 0.0) * max(rotation[n, 2, 2], 0.0)
+    return any_fell

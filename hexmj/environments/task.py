@@ -1,0 +1,228 @@
+"""What an episode is, whoever asks for it: actions, observations and rewards as functions of many insects at once.
+
+The insect shall walk straight ahead at a commanded velocity.  An episode begins at a random start in S, settled as for
+a physical walk.  One step of an environment is one step of the plan, with its substeps.  The controller runs along and
+its plan is observed whatever the actions are: targets of all joints, held for the step ('joints'), or offsets to the
+tips that the controller plans ('tips'), so that no offsets are its own walk, bit for bit that of
+`measures.physical.physical_walk`.
+
+Observations, all float64 and cut off at their bounds (`observation_bounds`):
+
+- joint_angles, joint_velocities: (leg * joint,) [rad], [rad/s], in the order of `ctrl`
+- orientation: unit quaternion of the root, (w, x, y, z); the walk should go along the world's x
+- velocity: of the root, ahead, to the left and up, seen from its heading [mm/s]
+- angular_velocity: of the root, in its own frame [rad/s]
+- clearance: height of the trunk's lowest point, (1,) [mm]
+- tips: in the root frame, (leg, axis) [mm]
+- contact: (leg,) 1 where the ground carried the foot within the last `Numerics.contact_gap`
+- margin: measured stability margin, (1,) [mm], from the feet in contact and the insect's own centre of mass;
+  `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
+- command: velocity to walk at, (1,) [mm/s]
+- planned_stance: (leg,) 1 where the plan lets the leg stand
+- planned_tips: in the root frame, (leg, axis) [mm], without offsets
+- out_of_reach, with 'tips' only: (leg,) substeps of the last step in which the leg kept its last angles, because its
+  planned tip with the offset could not be reached
+
+The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the step, the
+command c and the upward component u of the body's vertical; it is 0 on a fall.  An episode ends on a fall, when the
+trunk touches the ground (terminated); or after its duration, or where a foot comes to the end of a step, gap or hurdle
+(truncated).
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.bodies.grounds import beyond_the_ground
+from hexmj.checks import typed
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.errors import InputError
+from hexmj.legs import LEGS
+from hexmj.stability import stability_margin
+from hexmj.timing import Stride, steps_within
+
+Actions = Literal["joints", "tips"]
+"""Kinds of actions: targets of the joints, or offsets to the tips."""
+
+BEYOND_RANGE = 0.5
+"""How far joints may be observed beyond their ranges, which give way [rad]."""
+
+FASTEST_TURN = 200.0
+"""Greatest velocity of a joint, and of the root about an axis, that is observed [rad/s]."""
+
+FASTEST = 20.0
+"""Greatest velocity of the root that is observed, in body heights fallen freely: sqrt(2 g h) at so many of them."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What an episode is."""
+
+    velocity: float = 0.3
+    """Commanded V_r, 0 < V < 1, as a fraction of V_p."""
+    actions: Actions = "joints"
+    """What an action means."""
+    controller: Controller = LDVS
+    """Plans the walk."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """Of the walk."""
+    stride: Stride = field(default_factory=Stride)
+    """Of the plan; its time step is that of the environment."""
+    duration: float = 200.0
+    """Of an episode [time units]."""
+
+    def __post_init__(self) -> None:
+        if not 0 < typed("velocity", self.velocity, float) < 1:
+            raise InputError(
+                f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p"
+            )
+        typed("actions", self.actions, Actions)
+        check_controller_type(self.controller)
+        typed("conditions", self.conditions, Conditions)
+        typed("stride", self.stride, Stride)
+        steps_within(typed("duration", self.duration, float), self.stride)
+
+    @property
+    def steps(self) -> int:
+        """Steps of an episode."""
+        return int(steps_within(self.duration, self.stride))
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in one step."""
+        return self.conditions.substeps(self.stride)
+
+    @property
+    def command(self) -> float:
+        """Velocity to walk at [mm/s]."""
+        return self.velocity * self.conditions.time.vp
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Some insects as they are now."""
+
+    qpos: np.ndarray
+    """(n, position)."""
+    qvel: np.ndarray
+    """(n, velocity)."""
+    rotation: np.ndarray
+    """From the root frame to the world, (n, axis, axis)."""
+    feet: np.ndarray
+    """In the world, (n, leg, axis) [mm]."""
+    centre_of_mass: np.ndarray
+    """In the world, (n, axis) [mm]."""
+
+
+def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Least and greatest value of every observation, each in its shape, by the observations' names in their order."""
+    lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
+    far, tall = -lengths.no_foot_margin, compiled.body.standing_height
+    fastest = np.sqrt(2.0 * compiled.weight / compiled.body.mass * FASTEST * tall)
+    size, legs = (compiled.joints,), (len(LEGS),)
+    bounds = {
+        "joint_angles": (ranges[:, 0] - BEYOND_RANGE, ranges[:, 1] + BEYOND_RANGE),
+        "joint_velocities": _alike(size, -FASTEST_TURN, FASTEST_TURN),
+        "orientation": _alike((4,), -1.0, 1.0),
+        "velocity": _alike((3,), -fastest, fastest),
+        "angular_velocity": _alike((3,), -FASTEST_TURN, FASTEST_TURN),
+        "clearance": _alike((1,), -lengths.shortest_leg, FASTEST * tall),
+        "tips": _alike((6, 3), -far, far),
+        "contact": _alike(legs, 0.0, 1.0),
+        "margin": _alike((1,), -far, far),
+        "command": _alike((1,), 0.0, lengths.fastest_swing),
+        "planned_stance": _alike(legs, 0.0, 1.0),
+        "planned_tips": _alike((6, 3), -far, far),
+    }
+    if task.actions == "tips":
+        bounds["out_of_reach"] = _alike(legs, 0.0, float(task.substeps))
+    return bounds
+
+
+def action_names(compiled: CompiledBody, task: Task) -> tuple[str, ...]:
+    """What the numbers of an action are for."""
+    if task.actions == "joints":
+        return compiled.body.joints
+    return tuple(f"{leg}_{axis}" for leg in LEGS for axis in ("forward", "left", "up"))
+
+
+def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Least, usual and greatest action, (number,): of the joints' targets [rad], where posture home is usual, or of the
+    tips' offsets [mm], where none are."""
+    if task.actions == "joints":
+        low, high = compiled.model.actuator_ctrlrange[compiled.columns.ctrl].T
+        return low, compiled.home[compiled.columns.qpos], high
+    most = np.full(3 * len(LEGS), compiled.body.lengths.largest_tip_offset)
+    return -most, np.zeros(len(most)), most
+
+
+def own_observations(seen: Seen, standing: np.ndarray, compiled: CompiledBody) -> dict[str, np.ndarray]:
+    """What insects observe of themselves, each (n, ...) in its shape, by name; `standing` says which feet do, (n, leg).
+
+    The plan's observations come on top of it.
+    """
+    columns, qpos, qvel = compiled.columns, seen.qpos, seen.qvel
+    return {
+        "joint_angles": qpos[:, columns.qpos],
+        "joint_velocities": qvel[:, columns.qvel],
+        "orientation": qpos[:, 3:ROOT_QPOS],
+        "velocity": velocity_from_heading(seen),
+        "angular_velocity": qvel[:, 3:ROOT_QVEL],
+        "clearance": clearance(seen, compiled)[:, np.newaxis],
+        "tips": tips(seen),
+        "contact": standing,
+        "margin": margin(seen, standing, compiled)[:, np.newaxis],
+    }
+
+
+def velocity_from_heading(seen: Seen) -> np.ndarray:
+    """Velocity of the root ahead, to the left and up, (n, axis) [mm/s]."""
+    angle = np.arctan2(seen.rotation[:, 1, 0], seen.rotation[:, 0, 0])
+    cosine, sine, x, y = np.cos(angle), np.sin(angle), seen.qvel[:, 0], seen.qvel[:, 1]
+    velocity = seen.qvel[:, :3].copy()
+    velocity[:, 0] = cosine * x + sine * y
+    velocity[:, 1] = cosine * y - sine * x
+    return velocity
+
+
+def clearance(seen: Seen, compiled: CompiledBody) -> np.ndarray:
+    """Height of the trunk's lowest point over the ground, (n,) [mm]."""
+    corners, radii = compiled.trunk_corners
+    above_root = (corners @ seen.rotation[:, 2, :, np.newaxis])[..., 0]
+    return (seen.qpos[:, 2:3] + above_root - radii).min(axis=1)
+
+
+def tips(seen: Seen) -> np.ndarray:
+    """Tips in the root frame, (n, leg, axis) [mm]."""
+    return (seen.feet - seen.qpos[:, np.newaxis, :3]) @ seen.rotation
+
+
+def margin(seen: Seen, standing: np.ndarray, compiled: CompiledBody) -> np.ndarray:
+    """Stability margin on the feet that stand, (n, leg), seen from the centre of mass, (n,) [mm]."""
+    found = stability_margin((seen.feet - seen.centre_of_mass[:, np.newaxis])[:, :, :2], standing, threads=1)
+    return np.maximum(found, compiled.body.lengths.no_foot_margin)
+
+
+def rewards(seen: Seen, fell: np.ndarray, task: Task) -> np.ndarray:
+    """max(0, 1 - |v - c| / c) max(0, u), and 0 on a fall, (n,)."""
+    off = np.abs(seen.qvel[:, 0] - task.command) / task.command
+    return np.maximum(1.0 - off, 0.0) * np.maximum(seen.rotation[:, 2, 2], 0.0) * ~fell
+
+
+def fallen(sensors: np.ndarray, compiled: CompiledBody) -> np.ndarray:
+    """Whether the trunk has touched the ground in any of the substeps, from (n, substep, column) to (n,)."""
+    return np.any(sensors[:, :, compiled.columns.trunk] > 0, axis=(1, 2))
+
+
+def at_the_end(seen: Seen, task: Task) -> np.ndarray:
+    """Whether a foot has come to the end of the ground that was laid, (n,)."""
+    return np.any(beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, seen.feet), axis=1)
+
+
+def _alike(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    return np.full(shape, low), np.full(shape, high)

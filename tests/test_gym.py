@@ -1,0 +1,284 @@
+"""The faces for Gymnasium: its own checks, and one insect, many insects and the physical walk to the same bits."""
+
+import os
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.mujoco.utils import check_mujoco_reset_state
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import hexmj
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.environments import IDS, dm
+from hexmj.environments.gym import StickInsect
+from hexmj.environments.vector import StickInsects
+from hexmj.errors import InputError, SimulationError
+from hexmj.replay.film import gl
+from hexmj.timing import Stride
+
+TIPS: dict[str, Any] = {"actions": "tips"}
+LDVS: Controller = hexmj.LDVS
+NAMES = pytest.mark.parametrize("name", IDS)
+
+
+def made(name: str, **options: Any) -> Any:
+    """The environment itself, without Gymnasium's wrappers."""
+    return gymnasium.make(name, **options).unwrapped
+
+
+def steps_of(walking: Any, actions: np.ndarray) -> list[tuple]:
+    """What each action brings about, until the episode ends."""
+    seen = []
+    for action in actions:
+        seen.append(walking.step(action))
+        if seen[-1][2] or seen[-1][3]:
+            break
+    return seen
+
+
+def some_actions(steps: int, count: int, seed: int = 0, size: float = 0.3) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-size, size, (steps, count, 18))
+
+
+def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+    assert one.keys() == other.keys()
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+
+
+@NAMES
+def test_it_passes_gymnasiums_checks(name):
+    """Without a warning."""
+    check_env(made(name), skip_render_check=True)
+    check_mujoco_reset_state(made(name))
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+def test_it_is_rendered():
+    check_env(made("hexmj/StickInsectTips-v0"))
+    walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
+    walking.reset(seed=0)
+    frame = walking.render()
+    assert frame.shape == (480, 640, 3)
+    assert frame.std() > 5
+    walking.close()
+    many = StickInsects(2, render_mode="rgb_array")
+    many.reset(seed=0)
+    first, second = many.render() or (frame, frame)
+    np.testing.assert_array_equal(first, frame)
+    assert (second != frame).any()
+    many.close()
+
+
+@pytest.mark.parametrize("actions", ["joints", "tips"])
+def test_the_dm_env_face_passes_them_by_shimmy(actions):
+    from shimmy.dm_control_compatibility import DmControlCompatibilityV0
+
+    wrapped = DmControlCompatibilityV0(dm.load(actions=actions))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*(symmetric and normalized|not having a spec).*")
+        check_env(wrapped)
+    first, again, other = (wrapped.reset(seed=seed)[0]["planned_tips"] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).any()
+
+
+@pytest.mark.parametrize(
+    ("controller", "conditions", "stride"),
+    [
+        (LDVS, Conditions(), Stride()),
+        (hexmj.ReadsLegs(LDVS), Conditions.of(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
+    ],
+    ids=["as usual", "reads the legs, loaded"],
+)
+def test_no_offsets_are_the_physical_walk_to_the_last_bit(controller, conditions, stride):
+    """From the start that is drawn with the same seed, also where the plan is told what the legs feel."""
+    few: Any = {"conditions": conditions, "stride": stride}
+    starts = hexmj.draw_starts(2, 7, stride)
+    walked = hexmj.physical_walk(starts, controller, 0.3, 40.0, **few)
+    walking = StickInsect(**TIPS, velocity=0.3, controller=controller, duration=40.0, **few)
+    for start, seed in ((0, 7), (1, None)):
+        walking.reset(seed=seed)
+        qpos, fell, over = [], False, False
+        for _ in range(round(40.0 / stride.dt)):
+            *_, fell, over, _ = walking.step(np.zeros(18))
+            qpos.append(walking.data.qpos.copy())
+        assert over and not fell
+        np.testing.assert_array_equal(qpos, walked.qpos[:, start])
+
+
+@pytest.mark.parametrize("actions", ["joints", "tips"])
+def test_it_is_the_environment_of_dm_env_but_for_units(actions):
+    """The same positions to the last bit, and what is computed in one pass is what NumPy's formulas say."""
+    walking, other = StickInsect(actions=actions, velocity=0.5), dm.load(0.5, actions=actions, seed=3)
+    observed, step = walking.reset(seed=3)[0], other.reset()
+    home = other.physics.compiled.home[7:] if actions == "joints" else np.zeros(18)
+    spec = other.action_spec()
+    for action in some_actions(150, 1, size=0.1)[:, 0]:
+        span = np.where(action > 0, spec.maximum - home, home - spec.minimum)
+        observed, reward, fell, _, _ = walking.step(action)
+        step = other.step(home + action * span)
+        np.testing.assert_array_equal(walking.data.qpos, other.physics.position())
+        assert list(observed) == list(step.observation)
+        for name, values in step.observation.items():
+            np.testing.assert_allclose(observed[name], values, rtol=0, atol=1e-9, err_msg=name)
+        assert reward == pytest.approx(step.reward, abs=1e-12)
+        assert fell == (step.discount == 0.0)
+        if fell:
+            break
+
+
+def test_no_action_is_home_and_full_ones_are_the_ends_of_the_ranges():
+    walking = StickInsect(actions="joints")
+    walking.reset(seed=0)
+    targets = []
+    for action in (-1.0, 0.0, 1.0):
+        walking.step(np.full(18, action, dtype=np.float32))
+        targets.append(walking.data.ctrl.copy())
+    low, high = walking.model.actuator_ctrlrange.T
+    np.testing.assert_allclose(targets[0], low, atol=1e-12)
+    np.testing.assert_allclose(targets[2], high, atol=1e-12)
+    np.testing.assert_array_equal(targets[1], walking.model.key("home").qpos[7:])
+
+
+def walk_alone(seed: int, done: np.ndarray, mode: AutoresetMode, **task: Any) -> list[tuple]:
+    """What a vector environment of a mode shall show of one insect."""
+    walking, seen, over = StickInsect(**task), [], False
+    observed = walking.reset(seed=seed)[0]
+    for action in done:
+        if over and mode is AutoresetMode.NEXT_STEP:
+            observed, over = walking.reset()[0], False
+            seen.append((observed, 0.0, False, False, None))
+            continue
+        if over and mode is AutoresetMode.DISABLED:
+            seen.append((observed, 0.0, False, False, None))
+            continue
+        observed, reward, fell, late, _ = walking.step(action)
+        over, last = fell or late, None
+        if over and mode is AutoresetMode.SAME_STEP:
+            last, observed, over = observed, walking.reset()[0], False
+        seen.append((observed, reward, fell, late, last))
+    return seen
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+@pytest.mark.parametrize(("count", "threads"), [(1, 1), (3, 1), (3, 2)])
+def test_many_insects_are_single_ones_to_the_last_bit(mode, count, threads):
+    """Whatever their number and the threads, in every mode of beginning anew, over falls and ends of time."""
+    task: Any = {"actions": "tips", "velocity": 0.8, "duration": 14.0}
+    actions = some_actions(160, count, seed=5, size=0.5)
+    many = StickInsects(count, autoreset_mode=mode, threads=threads, **task)
+    many.reset(seed=20)
+    alone = [walk_alone(20 + i, actions[:, i], mode, **task) for i in range(count)]
+    ends = 0
+    for n, action in enumerate(actions):
+        observed, reward, fell, late, infos = many.step(action)
+        for i in range(count):
+            here, gain, fell_here, late_here, last = alone[i][n]
+            assert_same({name: values[i] for name, values in observed.items()}, here)
+            assert (reward[i], fell[i], late[i]) == (gain, fell_here, late_here)
+            if last is not None:
+                assert infos["_final_obs"][i]
+                assert_same(infos["final_obs"][i], last)
+            ends += fell_here or late_here
+    assert ends > 0
+
+
+def test_a_plan_that_reads_the_legs_is_told_of_its_own_insects_alone():
+    task: Any = {"actions": "tips", "velocity": 0.8, "duration": 12.0, "controller": hexmj.ReadsLegs(LDVS)}
+    actions = some_actions(140, 3, seed=1)
+    many = StickInsects(3, **task)
+    many.reset(seed=3)
+    alone = [walk_alone(3 + i, actions[:, i], AutoresetMode.NEXT_STEP, **task) for i in range(3)]
+    for n, action in enumerate(actions):
+        observed = many.step(action)[0]
+        for i in range(3):
+            assert_same({name: values[i] for name, values in observed.items()}, alone[i][n][0])
+
+
+def test_what_is_handed_out_is_never_written_to_again():
+    many = StickInsects(2, **TIPS)
+    handed = [many.reset(seed=0)[0]] + [many.step(np.zeros((2, 18)))[0] for _ in range(3)]
+    kept = [{name: values.copy() for name, values in one.items()} for one in handed]
+    many.step(np.zeros((2, 18)))
+    many.reset(seed=1)
+    for one, copy in zip(handed, kept, strict=True):
+        assert_same(one, copy)
+    assert handed[1] in many.observation_space
+
+
+def test_some_insects_begin_anew_and_the_others_go_on():
+    many = StickInsects(3, autoreset_mode="Disabled", **TIPS)
+    many.reset(seed=0)
+    before = many.step(np.zeros((3, 18)))[0]
+    after = many.reset(seed=[5, 6, 7], options={"reset_mask": np.array([False, True, False])})[0]
+    for i, anew in enumerate((False, True, False)):
+        same = all(np.array_equal(before[name][i], after[name][i]) for name in before)
+        assert same is not anew
+    assert_same({name: values[1] for name, values in after.items()}, StickInsect(**TIPS).reset(seed=6)[0])
+    assert many.np_random_seed == (0, 6, 2)
+
+
+def test_make_finds_them_from_the_package_alone():
+    """In a process of its own, as a script would; and neither dm_control nor a GL is there."""
+    script = (
+        "import gymnasium, sys\n"
+        "gymnasium.make('hexmj.environments:hexmj/StickInsect-v0').reset(seed=0)\n"
+        "gymnasium.make_vec('hexmj/StickInsectTips-v0', num_envs=2).reset(seed=0)\n"
+        "print([one for one in sys.modules if one.split('.')[0] in ('dm_control', 'OpenGL')])\n"
+    )
+    before = "import gymnasium, hexmj\nassert 'hexmj/StickInsect-v0' in gymnasium.registry\n"
+    plain = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    for code, said in ((script, "[]"), (before, "")):
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=plain | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True, text=True,
+        )  # fmt: skip
+        assert (done.returncode, done.stdout.strip()) == (0, said), done.stderr
+    assert hexmj.environments.IDS is IDS
+
+
+@pytest.mark.parametrize("walking", [StickInsect(**TIPS), StickInsects(1, **TIPS)], ids=["one", "many"])
+def test_nonsensical_actions_are_refused(walking: Any):
+    walking.reset(seed=0)
+    shape = walking.action_space.shape
+    for action, sentence in (
+        (np.full(shape, 1.5), "the action's L1_forward = 1.5; expected -1 to 1"),
+        (np.full(shape, np.nan), "the action's L1_forward = nan; expected -1 to 1"),
+        (np.zeros(3), "an action has the shape"),
+        ("go", "action = 'go'; expected numbers"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            walking.step(action)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"velocity": 1.5}, "velocity = 1.5; expected 0 < V < 1"),
+        ({"actions": "feet"}, "actions = 'feet'; valid names: joints, tips"),
+        ({"render_mode": "human"}, "render_mode = 'human'; valid names: rgb_array"),
+        ({"num_envs": 0}, "num_envs = 0; expected a whole number"),
+        ({"autoreset_mode": "never"}, "autoreset_mode = 'never'; valid names: NextStep, SameStep, Disabled"),
+    ],
+)
+def test_nonsense_is_refused(options, sentence):
+    with pytest.raises(InputError, match=sentence):
+        StickInsects(**options)
+
+
+@pytest.mark.parametrize("walking", [StickInsect(**TIPS), StickInsects(1, **TIPS)], ids=["one", "many"])
+def test_divergence_is_an_error_that_can_be_replayed(walking: Any):
+    walking.reset(seed=0)
+    walking._walkers._bodies.qvel[0, 0] = 1e12
+    with pytest.raises(SimulationError, match="diverged while acting") as error:
+        for _ in range(5):
+            walking.step(np.zeros(walking.action_space.shape))
+    assert set(error.value.state) >= {"qpos", "qvel", "ctrl", "conditions"}

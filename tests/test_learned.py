@@ -1,0 +1,116 @@
+"""What was learned walks as a controller, and the examples that train do so, made small."""
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers.conformance import check_controller
+from hexmj.environments.gym import StickInsect
+from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def example(monkeypatch, tmp_path):
+    """One that trains, and writes into a folder of this test."""
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+
+    def load(name: str) -> ModuleType:
+        sys.modules.pop(name, None)
+        module = importlib.import_module(name)
+        monkeypatch.setattr(module, "FOUND", tmp_path / "found")
+        return module
+
+    return load
+
+
+def some_reflexes(module: ModuleType) -> WithOffsets:
+    weights = np.random.default_rng(0).uniform(-0.1, 0.1, (3, 6))
+    weights[:, 4:] = 0.0
+    return WithOffsets(module.Reflexes(tuple(map(tuple, weights.tolist()))))
+
+
+def test_no_offsets_plan_what_the_controller_plans(example):
+    starts = hexmj.draw_starts(5, 0)
+    still = WithOffsets(example("train_cma").Reflexes())
+    planned, own = (hexmj.walk(starts, one, 0.5, 60.0) for one in (still, hexmj.LDVS))
+    np.testing.assert_allclose(planned.x, own.x, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(planned.y, own.y, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(planned.stance, own.stance)
+
+
+@pytest.mark.slow
+def test_it_obeys_the_laws_of_controllers(example):
+    check_controller(some_reflexes(example("train_cma")))
+
+
+def test_a_policy_feels_the_same_in_a_walk_as_in_the_environment(example, monkeypatch):
+    """And so it walks nearly alike: an offset comes in over a step there, and at once here."""
+    felt, controller = [], some_reflexes(example("train_cma"))
+    step = OffsetPlan._step
+    monkeypatch.setattr(
+        OffsetPlan, "_step", lambda plan: (felt.append((plan._told.all(), plan._felt.copy())), step(plan))[1]
+    )
+    walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), controller, 0.3, 10.0)
+    walking = StickInsect(actions="tips", velocity=0.3)
+    observed = walking.reset(seed=0)[0]
+    here = felt_in({name: values[None] for name, values in observed.items()})
+    assert here.shape == (1, FELT)
+    np.testing.assert_allclose(next(one for told, one in felt if told), here, rtol=0, atol=1e-9)
+    for _ in range(99):
+        action = controller.policy(felt_in({name: values[None] for name, values in observed.items()}))[0]
+        observed = walking.step(action)[0]
+    assert np.abs(walking.data.qpos - walked.qpos[98, 0]).max() < 0.5
+
+
+def test_on_paper_it_walks_upright_at_its_velocity(example):
+    plan = some_reflexes(example("train_cma")).begin(np.zeros((2, 6)), np.array([0.5, 0.2]), hexmj.Stride())
+    upright = plan._upright(np.array([0.5, 0.2]))
+    np.testing.assert_allclose(upright[:, VELOCITY] * 50.0, [[40.0, 0.0, 0.0], [16.0, 0.0, 0.0]])
+    assert np.abs(upright[:, TIPS]).max() < 5.0
+
+
+@pytest.mark.slow
+def test_cma_trains(example, monkeypatch, capsys):
+    module = example("train_cma")
+    for name, small in {"POPULATION": 4, "STARTS": 2, "GENERATIONS": 2, "WINDOW": 5.0}.items():
+        monkeypatch.setattr(module, name, small)
+    compare = hexmj.compare
+    monkeypatch.setattr(hexmj, "compare", lambda *args, **options: compare(*args, **options | {"n_starts": 3}))
+    module.main()
+    assert "reflexes: physical FLSS of the start at V = 0.6 is" in capsys.readouterr().out
+    assert np.any(np.array(module.found().policy.weights) != 0.0)
+
+
+@pytest.mark.slow
+def test_ppo_trains(example, monkeypatch, capsys):
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    module = example("train_ppo")
+    for name, small in {"INSECTS": 4, "STEPS": 512, "WINDOW": 5.0}.items():
+        monkeypatch.setattr(module, name, small)
+    compare = hexmj.compare
+    monkeypatch.setattr(hexmj, "compare", lambda *args, **options: compare(*args, **options | {"n_starts": 3}))
+    module.main()
+    assert "network: physical FLSS of the start at V = 0.6 is" in capsys.readouterr().out
+    assert module.found().policy(np.zeros((2, FELT))).shape == (2, 18)
+
+
+def test_without_stable_baselines_it_is_said_what_brings_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    monkeypatch.delitem(sys.modules, "hexmj.environments.stable_baselines", raising=False)
+    with pytest.raises(hexmj.InputError, match=r'pip install "hexmj\[rl\]"'):
+        importlib.import_module("hexmj.environments.stable_baselines")
+
+
+def test_the_pages_snippets_run():
+    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    snippets = [part.split("```")[0] for part in page.split("```python\n")[1:]]
+    assert len(snippets) == 2
+    for snippet in snippets:
+        exec(snippet, {})
