@@ -20,6 +20,10 @@ class OutOfReach(InputError):
     """A plan whose tips a body cannot reach, so that it does not walk."""
 
 
+class StillThrown(InputError):
+    """A walk that a push still throws as it ends, so that nobody knows whether it falls."""
+
+
 class SimulationError(RuntimeError):
     """A physical simulation that did not settle or diverged; it is never counted as an outcome."""
 

@@ -65,6 +65,20 @@ def test_without_a_part_is_a_controller_like_any_other() -> None:
     check_controller(hexmj.load_controller("walknet-without-2"))
 
 
+def test_a_controller_that_stands_twice_is_refused() -> None:
+    for names in (("ldvs", "ldvs-without-3"), ("walknet-without-2", "walknet")):
+        with pytest.raises(InputError, match=f"{max(names, key=len)} stands twice.*expected each controller once"):
+            Ablation({name: switched(name) for name in names})
+
+
+def test_a_contact_gap_is_refused_where_nobody_reads_it() -> None:
+    from hexmj.cli.main import options_of
+
+    with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
+        options_of(["ablate", "--contact-gap", "5"]).study()
+    options_of(["ablate", "--contact-gap", "5", "--models", "ldvs", "walknet-load"]).study()
+
+
 def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     study = Ablation({"walknet": switched("walknet")}, (0.5,), n_starts=20, n_physical=2, periods=12)
     result = conduct(study)

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from hexmj import HWS, LDVS, UNCOORDINATED, Acceleration, Cruse1998, InputError, ReadsLegs, Stride
+from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.losses import planned_losses
@@ -16,10 +17,11 @@ from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.reads_legs import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance.cases import every_case
+from hexmj.studies.disturbance.cases import Case, every_case
 from hexmj.studies.disturbance.disturbances import SETTLED, Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed, DisturbedPlan
+from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.disturbance.strategies import Postures, collect_postures, reorganise
 from hexmj.studies.disturbance.study import DisturbedWalks
 from hexmj.sweeps import conduct
@@ -273,6 +275,14 @@ def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
     assert files == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     other = conduct(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
     assert other.fall[0, 2].equals(result.fall[0, 1])
+
+
+@pytest.mark.parametrize("kind", ["halt", "leg", "push"])
+def test_some_starts_alone_go_as_among_all(kind):
+    walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)
+    asked = Case(kind, "none", 20.0 * (kind == "push")), 5.0, None, Conditions()
+    every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
+    assert alone.identical(every.isel(start=[2, 0]))
 
 
 def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():

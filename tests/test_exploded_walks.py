@@ -10,7 +10,7 @@ import pytest
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import divergence
 from hexmj.physics.drive import Chunk, Push, drive
@@ -78,12 +78,38 @@ def test_a_walk_that_turns_over_high_up_is_an_error_unless_it_was_pushed():
     qpos[1, :, 3:7] = np.cos(1.0), 0.0, np.sin(1.0), 0.0  # tilted by 2 rad
     qpos[1, :, 2] = 1.4 * LEG
     everything = np.full(2, 3)
-    assert explosion(qpos, everything, still, settled) is None
+    centre = qpos[..., :3]
+    assert explosion(qpos, centre, everything, still, settled) is None
     qpos[1, :, 2] = 1.6 * LEG
-    found = explosion(qpos, everything, still, settled)
+    found = explosion(qpos, centre, everything, still, settled)
     assert found == (1, 1, "it tilts by 2 rad, past a right angle, and was not pushed")
-    assert explosion(qpos, everything, np.array([0.0, 80.0]), settled) is None
-    assert explosion(qpos, np.array([3, 1]), still, settled) is None, "it has fallen"
+    assert explosion(qpos, centre, everything, np.array([0.0, 80.0]), settled) is None
+    assert explosion(qpos, centre, np.array([3, 1]), still, settled) is None, "it has fallen"
+
+
+def test_a_push_bounds_the_centre_of_mass_and_may_turn_the_root_about_it_faster():
+    settled = settle(draw_starts(1, 0))
+    everything, impulse, step = np.full(1, 3), np.full(1, 40.0 * 80.0), settled.compiled.model.opt.timestep
+    fastest = np.sqrt(2 * GRAVITY * (MOST_ENERGY * LEG - 10.0) + (80.0 + 40.0 * 80.0) ** 2)
+    qpos = settled.qpos[:, np.newaxis].repeat(3, axis=1)
+    centre = qpos[..., :3].copy()
+    way = np.arange(3) * step * fastest
+    qpos[0, :, 1], centre[0, :, 1] = 1.2 * way, 0.95 * way
+    assert explosion(qpos, centre, everything, impulse, settled) is None
+    centre[0, :, 1] = 1.05 * way
+    found = explosion(qpos, centre, everything, impulse, settled)
+    assert found and found.what.startswith("its centre of mass is 10")
+    assert explosion(qpos, centre, everything, np.zeros(1), settled), "not pushed"
+
+
+def test_an_insect_that_a_push_still_throws_as_the_window_ends_is_no_outcome():
+    """Pushed with 3.2 m/s it counted as standing as long as it had not come down."""
+    settled = settle(draw_starts(2, 5))
+    plan = [begin(LDVS, settled.starts, 0.5, settled.stride) for _ in range(2)]
+    hard, none = (Push(np.array([0.0, push]), np.full(2, 10.0)) for push in (3200.0, 0.0))
+    with pytest.raises(StillThrown, match="start 1 is still thrown by its push as the window ends: its root is"):
+        outcomes_of_plan(settled, plan[0], 14.0, np.full(2, np.inf), push=hard)
+    assert np.isinf(outcomes_of_plan(settled, plan[1], 14.0, np.full(2, np.inf), push=none).fall).all()
 
 
 def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duration: float = 80.0) -> Outcomes:

@@ -6,6 +6,7 @@ from typing import TypedDict
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import hexmj
 from hexmj.conditions import Conditions
@@ -14,7 +15,7 @@ from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.controllers.stepwise import Step, stepwise
-from hexmj.errors import InputError
+from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.intervals import paired_difference
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range, walk
 from hexmj.measures.physical import physical_walk
@@ -26,6 +27,7 @@ from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import EVERYONE, entrants
 from hexmj.studies.league.figure import league_figure
 from hexmj.studies.league.frequencies import came, frequencies
+from hexmj.studies.league.paper import losses
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
@@ -146,6 +148,15 @@ def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
     assert np.array_equal(came(found.fall).isnull(), refused)
     told = frequencies("fell", came(found.fall).values[None], ("entrant",))
     assert told["fell_starts"][1] == (~refused).sum()
+
+
+def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -> None:
+    entrant = Entrant(Stretched())
+    alone = League({"far": entrant}, (0.5,), 1, 1, 1, window=10.0, accelerating=False, periods=1, seed=0)
+    result = alone.result([cell.compute(threads=1) for cell in alone.cells()])
+    assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
+    assert "nan" not in league_markdown(result)
+    league_figure(result)
 
 
 def test_tables_and_figure_show_every_entrant(result) -> None:
@@ -283,3 +294,69 @@ def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch:
     shown = capsys.readouterr().out
     assert "Standings" in shown and "tripod.py" in shown
     assert {"league.nc", "league.png", "league.md", "manifest.json"} <= {one.name for one in Path("here").iterdir()}
+
+
+FAR = """
+from dataclasses import dataclass, replace
+import numpy as np
+from hexmj.controllers.rivals.metronomes import Metronome
+
+@dataclass(frozen=True)
+class Far:
+    name: str = "far"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        plan = Metronome("wilson").begin(starts, velocity, stride, acceleration, threads)
+        near = plan.step
+        plan.step = lambda v: replace(near(v), y=np.tile(3 * np.array(stride.geometry.y), (len(starts), 1)))
+        return plan
+"""
+
+
+def test_who_cannot_be_filmed_costs_neither_tables_nor_manifest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    from hexmj.cli.main import options_of
+
+    monkeypatch.chdir(tmp_path)
+    Path("far.py").write_text(FAR)
+    words = ["league", "--controllers", "graham-ideal", "far.py:Far", *SMALL.replace("--no-video", "").split()]
+    options_of(words).run()
+    shown = capsys.readouterr()
+    assert "no video: " in shown.err and "Standings" in shown.out
+    assert "below far.py:Far on the same starts" in " ".join(shown.out.split()), "the first from random starts"
+    assert {"league.nc", "league.png", "league.md", "manifest.json"} == {one.name for one in Path("here").glob("*.*")}
+
+
+@pytest.mark.parametrize("option", ["--ground-height", "--ground-at", "--ground-length"])
+def test_conditions_that_trials_bring_along_are_not_offered(option: str, capsys) -> None:
+    from hexmj.cli.main import options_of
+
+    with pytest.raises(SystemExit):
+        options_of(["league", option, "5"])
+    assert option in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("window", ["start", 40.0])
+def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(window: str | float) -> None:
+    eq11, entrant = hexmj.Acceleration(rate=0.01), Entrant(hexmj.load_controller("uncoordinated"))
+    found = losses(entrant, 0.5, window, n_starts=20, seed=0, stride=Stride(), acceleration=eq11)
+    lost = first_loss(hexmj.draw_starts(20, 0), hexmj.UNCOORDINATED, 0.5, 80.0, acceleration=eq11)
+    assert np.array_equal(found.lost, np.isfinite(lost))
+
+
+@pytest.mark.parametrize("error", [SimulationError, OutOfReach, StillThrown])
+def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[Exception]) -> None:
+    def walked(which: np.ndarray, refused: tuple[int, ...] = ()) -> xr.Dataset:
+        if np.isin(which, refused).any():
+            raise error("refused")
+        return xr.Dataset({"fall": ("start", np.sqrt(which), {"units": "mm"})})
+
+    def found(*refused: int) -> xr.DataArray:
+        return physics.unless_refused(lambda which: walked(which, refused), 4, {"fall": "mm"}).fall
+
+    whole = found()
+    assert found(2).identical(whole.where([True, True, False, True]))
+    assert np.isnan(found(0, 1, 2, 3)).all()
+    with pytest.raises(ZeroDivisionError):
+        physics.unless_refused(lambda which: 1 // 0, 4, {"fall": "mm"})

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from tyro.conf import OmitArgPrefixes, arg
 
 from hexmj.cli.options import STEADY, Accelerating, Controlled, Walks, hiding
@@ -49,8 +50,10 @@ class Ablate(StudyCommand):
     def study(self) -> study.Ablation:
         """See `StudyCommand.study`."""
         check_distinct("models", self.models)
+        models = {name: study.switched(name) for name in self.models}
+        self.refuse_contact_gap(*(one for several in models.values() for one in several.values()))
         return study.Ablation(
-            {name: study.switched(name) for name in self.models},
+            models,
             self.velocities,
             self.starts,
             self.physical_starts,
@@ -86,8 +89,8 @@ def _table(one: "xr.Dataset") -> "Table":
 
 
 def _cell(one: "xr.Dataset") -> str:
-    frequency = f"{one.frequency.item():.3f}"
-    if one.controller.item() == one.whole.item():
+    frequency = "-" if np.isnan(one.frequency) else f"{one.frequency.item():.3f}"
+    if one.controller.item() == one.whole.item() or np.isnan(one.more):
         return frequency
     sure = "*" if one.more_low.item() > 0 or one.more_high.item() < 0 else ""
     return f"{frequency} ({one.more.item():+.3f}{sure})"

@@ -77,8 +77,8 @@ class WalkingCommand:
             name = given[0].replace("_", "-")
             raise InputError(f"--{name} {reason}; expected it only where the insect walks in physics")
 
-    def refuse_contact_gap(self, controller: Controller) -> None:
-        """Refuse a contact gap where no polygon is measured and no plan of the controller reads it.
+    def refuse_contact_gap(self, *controllers: Controller) -> None:
+        """Refuse a contact gap where no polygon is measured and no plan of the controllers reads it.
 
         Raises:
             InputError: it is not the usual one.
@@ -88,8 +88,8 @@ class WalkingCommand:
 
         gap, stride = self.conditions.numerics.contact_gap, self.walks.stride
         if gap != Numerics.contact_gap:
-            plan = begin(controller, draw_starts(1, self.walks.seed, stride), 0.5, stride, threads=1)
-            if not isinstance(plan, ReadingPlan):
+            starts = draw_starts(1, self.walks.seed, stride)
+            if not any(isinstance(begin(one, starts, 0.5, stride, threads=1), ReadingPlan) for one in controllers):
                 raise InputError(
                     f"--contact-gap = {gap:g} with falls only; expected it where a polygon is measured (compare, map,"
                     " converge, walk --physical) or the controller reads the legs"

@@ -13,7 +13,8 @@ from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import new_table
 from hexmj.conditions import Conditions
-from hexmj.errors import RenderingError, check_distinct
+from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
+from hexmj.literal import literal
 from hexmj.progress import progress_bar
 from hexmj.replay.film.film import Film
 from hexmj.results import save_text
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 TABLE, FILM = "league.md", "league.mp4"
 """Files for all tables, and for the best side by side."""
+
+OF_TRIALS = ("ground", "ground_height", "ground_at", "ground_length", "load")
+"""Conditions that the trials bring along, or of which none has any."""
 
 BEST = 6
 """Who are filmed, at most."""
@@ -62,7 +66,7 @@ class League(StudyCommand):
     controlled: OmitArgPrefixes[Controlled] = field(
         default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
     )
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["ground", "load"]))
+    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), OF_TRIALS))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,21 +125,33 @@ class League(StudyCommand):
             return [table]
         try:
             return [table, self._filmed(result)]
-        except RenderingError as error:
-            print(f"hexmj: no video: {error}", file=sys.stderr)
+        except (InputError, SimulationError, RenderingError) as error:
+            print(f"hexmj: no video: {literal(str(error))}", file=sys.stderr)
             return [table]
 
     def _filmed(self, result: "xr.Dataset") -> Path:
-        """The best in physics side by side, from the first of the random starts."""
+        """The best in physics side by side, from the first of the random starts, but for walks that are refused.
+
+        Raises:
+            InputError, SimulationError, RenderingError: there is no video, and why.
+        """
         from hexmj.replay.film import gl
         from hexmj.replay.film.video import render
+        from hexmj.studies.league.physics import REFUSALS
         from hexmj.studies.league.table import by_rank
 
         if sentence := gl.missing():
             raise RenderingError(sentence)
         takes_part, v = entrants(self.names), result.attrs["tried_at"]
         best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]
-        shown = [recorded(self, takes_part[name].controller, v, 0, title=name) for name in best]
+        shown = []
+        for name in best:
+            try:
+                shown.append(recorded(self, takes_part[name].controller, v, 0, title=name))
+            except REFUSALS as error:
+                print(f"hexmj: {literal(f'{name} is not in the video: {error}')}", file=sys.stderr)
+        if not shown:
+            raise RenderingError("no controller of this league walks the first random start")
         with progress_bar("rendering") as progress:
             render(shown, self.out / FILM, Film(width=480, height=360), progress)
         return self.out / FILM

@@ -19,7 +19,7 @@ from hexmj.physics.fine_steps import FineSteps, Shown
 from hexmj.physics.orders import Orders
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
-from hexmj.physics.watch import explosion
+from hexmj.physics.watch import check_landed, explosion
 from hexmj.walks import PlannedWalk, joined
 
 PUSH_LASTS = 0.025
@@ -106,7 +106,8 @@ class Insects:
         touching = (whole["sensors"][:, :, self._columns.trunk] > 0).any(axis=2)
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
-        if odd := explosion(whole["qpos"], valid, self._impulse[done[0].ids], self.settled):
+        centre = whole["sensors"][:, :, self._columns.centre_of_mass]
+        if odd := explosion(whole["qpos"], centre, valid, self._impulse[done[0].ids], self.settled):
             control = _joined([orders.control for orders in done])[odd.row, : odd.substep + 1]
             start = int(done[0].ids[odd.row])
             state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
@@ -116,6 +117,14 @@ class Insects:
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
         plan = joined([orders.plan for orders in done])
         return Chunk(plan, done[0].first, done[0].ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
+
+    def check_landed(self, ids: np.ndarray) -> None:
+        """Refuse starts that have not fallen, (n,), and are still thrown by their push.
+
+        Raises:
+            StillThrown: the first of them.
+        """
+        check_landed(ids, self._batch.qpos[ids], self._batch.qvel[ids], self._impulse[ids], self.settled)
 
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
         """Refuse walks, (n, substep, column) until they fall, that lead beyond the ground that was laid."""

@@ -43,16 +43,19 @@ def drive(
     Raises:
         InputError: a plan of other starts, with another stride, not at time 0, or of other shapes than asked for.
         SimulationError: a simulation that diverged; it carries its last good state.
+        StillThrown: the observation time ends before a push is over, after the last chunk.
     """
     insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration)
     total = int(steps_within(duration, settled.stride)) * settled.substeps
-    told = 0.0
+    told, walking = 0.0, np.arange(len(settled.starts))
     for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):
         yield chunk
         if progress:
             done = 1.0 if chunk.fell.all() else min(1.0, (chunk.first + chunk.qpos.shape[1]) / total)
             progress(done - told)
             told = done
+        walking = chunk.ids[~chunk.fell]
+    insects.check_landed(walking)
 
 
 def _by_itself(insects: Insects, orders: OrdersFromPlan) -> Iterator[Chunk]:

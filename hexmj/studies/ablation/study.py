@@ -83,6 +83,12 @@ class Ablation:
             check_draw(count, self.seed)
         if not self.models:
             raise InputError("no controller was given; expected at least one")
+        names = [name for several in self.models.values() for name in several]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise InputError(
+                f"models = {list(self.models)}; {twice[0]} stands twice, alone and as a part of what comes of another;"
+                " expected each controller once"
+            )
         if not (self.observed[0] > 0).all():
             raise InputError(f"velocities = {self.velocities}; expected each above 0")
 

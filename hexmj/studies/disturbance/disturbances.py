@@ -3,7 +3,7 @@
 An obstacle is "the termination of motion. Then the motion is initiated from new leg positions".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -50,6 +50,10 @@ class Disturbance:
             raise InputError(f"step = {self.step}; expected whole numbers of steps, each at least 0")
         if self.leg.shape != self.step.shape or not ((self.leg >= 0) & (self.leg < 6)).all():
             raise InputError(f"leg = {self.leg}; expected indices from 0 to 5, as many as steps, {len(self.step)}")
+
+    def of(self, which: np.ndarray) -> "Disturbance":
+        """That of some starts, (n,) indices."""
+        return replace(self, step=self.step[which], leg=self.leg[which])
 
     def legs(self, tips: np.ndarray, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tips [mm] and states, both (start, leg), with which every start goes on if it is disturbed now."""

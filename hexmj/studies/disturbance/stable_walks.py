@@ -1,6 +1,6 @@
 """Walks at one velocity that are disturbed: the same starts at the same times in every case."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -75,41 +75,52 @@ class StableWalks:
         recovery: Acceleration | None,
         conditions: Conditions | None,
         threads: int | None = None,
+        which: np.ndarray | None = None,
     ) -> "xr.Dataset":
         """The `TIMES` of every start in one case, and the number of starts `drawn` to find these.
 
         Args:
             case: what they meet, and their strategy.
-            window: how long they walk once they are at V again [time units].
+            window: how long they walk once all are at V again [time units].
             recovery: of the strategy 'slow_down'.
             conditions: of the physical walk; without them there is none, and no fall.
             threads: one per core unless given; the times do not depend on it.
+            which: indices of some starts, (n,), which walk as long as if all did; all unless given.
+
+        Raises:
+            TooFewStable: not so many starts are stable until they are disturbed.
+            InputError, SimulationError: see `drive.drive`.
         """
         import xarray as xr
 
+        which = np.arange(self.n_starts) if which is None else which
         disturbance = disturbance_of(self.found, case.kind, self.planner, self.velocity, self.stride)
         postures = self.postures if case.strategy == "reorganise" else None
         disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
-        time = disturbance.step * self.stride.dt
-        ahead = self._plan(disturbed, recovery, threads)
+        ahead = self._plan(disturbed, self.found.starts, recovery, threads)
         ahead.advance(int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
         end = float(back.max() + window)
-        steps = steps_within(end, self.stride)
-        first = planned_losses(self._plan(disturbed, recovery, threads), steps, threads)
+        starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance.of(which))
+        time = disturbed.disturbance.step * self.stride.dt
+        first = planned_losses(
+            self._plan(disturbed, starts, recovery, threads), steps_within(end, self.stride), threads
+        )
         lost = np.where(first > 0, first * self.stride.dt, np.inf)
-        times = {"time": time, "back": back, "planned_loss": lost}
+        times = {"time": time, "back": back[which], "planned_loss": lost}
         if conditions:
             push = Push(np.full(len(time), case.impulse * conditions.body.mass * conditions.time.vp), time)
-            settled = settle(self.found.starts, conditions, self.stride, threads)
+            settled = settle(starts, conditions, self.stride, threads)
             walks = ReadsLegs(disturbed) if isinstance(self.controller, ReadsLegs) else disturbed
-            plan = begin(walks, self.found.starts, self.velocity, self.stride, recovery, threads=1)
+            plan = begin(walks, starts, self.velocity, self.stride, recovery, threads=1)
             times["fall"] = outcomes_of_plan(settled, plan, end, lost, push=push, threads=threads).fall
         columns = {
             name: ("start", values, {"units": "time unit", "long_name": TIMES[name]}) for name, values in times.items()
         }
         return xr.Dataset(columns).assign(drawn=self.found.drawn)
 
-    def _plan(self, disturbed: Disturbed, recovery: Acceleration | None, threads: int | None) -> DisturbedPlan:
-        plan = begin(disturbed, self.found.starts, self.velocity, self.stride, recovery, threads)
+    def _plan(
+        self, disturbed: Disturbed, starts: np.ndarray, recovery: Acceleration | None, threads: int | None
+    ) -> DisturbedPlan:
+        plan = begin(disturbed, starts, self.velocity, self.stride, recovery, threads)
         return plan  # pyright: ignore[reportReturnType]

@@ -32,7 +32,7 @@ def losses(
     Args:
         entrant: who walks.
         velocity: V_r, or its final value.
-        window: 'walk', 'start' or the observation time [time units].
+        window: 'walk', 'start' or the observation time [time units]; a number, too, from when on V_r is reached.
         n_starts: number of starts.
         seed: of the starts.
         stride: step range, lines of the tips and time step.
@@ -42,7 +42,8 @@ def losses(
     """
     controller = entrant.controller if leg_lost is None else LegLost(entrant.controller, leg_lost)
     starts = entrant.starts(n_starts, seed, velocity, stride)
-    duration = float(observation_time(window, velocity, stride, acceleration))
+    duration = float(observation_time(window, velocity, stride))
+    duration += acceleration.duration(velocity) if acceleration else 0.0
     how = {"stride": stride, "acceleration": acceleration, "threads": threads}
     return _lost(first_loss(starts, controller, velocity, duration, **how))
 

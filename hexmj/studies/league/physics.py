@@ -1,5 +1,6 @@
 """What the league asks of a body: falls, what a walk costs, and how walks go on that meet something."""
 
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import OutOfReach, SimulationError
+from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.outcome_table import UNITS
 from hexmj.physics.drive import drive
@@ -20,13 +21,46 @@ from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.frequencies import came
 from hexmj.timing import Stride, observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
 
-REFUSALS = OutOfReach, SimulationError
+REFUSALS = OutOfReach, SimulationError, StillThrown
 """Why a walk is no outcome."""
+
+COLUMNS = {one.name: UNITS.get(one.name, "1") for one in fields(Outcomes)} | {"work": "mm", "torque": "1", "way": "mm"}
+"""What is told of every walk, and its unit."""
+
+DISTURBED = {"time": "time unit", "fall": "time unit"}
+"""The same of a walk that is disturbed."""
+
+
+def unless_refused(
+    walked: Callable[[np.ndarray], "xr.Dataset"], n_starts: int, columns: Mapping[str, str]
+) -> "xr.Dataset":
+    """How every start goes; one whose walk is refused is NaN throughout and no outcome: it diverged, its tips are out
+    of reach, or a push still throws it as the window ends.
+
+    Args:
+        walked: how some of the starts go, (n,), which does not depend on the others.
+        n_starts: number of all.
+        columns: what it tells of each, and its unit.
+    """
+    import xarray as xr
+
+    everyone = np.arange(n_starts)
+    with suppress(*REFUSALS):
+        return walked(everyone)
+    nothing = xr.Dataset({name: ("start", [np.nan], {"units": units}) for name, units in columns.items()})
+    alone: list[xr.Dataset] = []
+    for start in everyone[:, np.newaxis]:
+        try:
+            alone.append(walked(start))
+        except REFUSALS:
+            alone.append(nothing)
+    return xr.concat(alone, "start")
 
 
 def walks(
@@ -56,32 +90,12 @@ def walks(
 
     Returns:
         Over start all `Outcomes`; of the joints the `work` over the insect's weight [mm] and the greatest `torque` over
-        its limit, see `EffortSoFar`; and the `way` walked ahead [mm].  A start whose walk is refused, since it diverged
-        or its tips are out of reach, is NaN throughout and no outcome.
-
-    Raises:
-        OutOfReach, SimulationError: every walk is refused.
+        its limit, see `EffortSoFar`; and the `way` walked ahead [mm].  NaN as of `unless_refused`.
     """
-    import xarray as xr
-
     starts = entrant.starts(n_starts, seed, velocity, stride)
     how: Any = {"conditions": conditions, "stride": stride, "threads": threads}
     walked = controller, velocity, float(observation_time(window, velocity, stride))
-    try:
-        return _outcomes(starts, *walked, **how)
-    except REFUSALS:
-        alone = [_unless_refused(start[None], *walked, **how) for start in starts]
-    if not (known := [one for one in alone if one is not None]):
-        raise
-    nothing = xr.full_like(known[0], np.nan, dtype=float)
-    return xr.concat([nothing if one is None else one for one in alone], "start")
-
-
-def _unless_refused(start: np.ndarray, *walked: Any, **how: Any) -> "xr.Dataset | None":
-    """The outcome of one start, (1, leg); None where its walk is refused."""
-    with suppress(*REFUSALS):
-        return _outcomes(start, *walked, **how)
-    return None
+    return unless_refused(lambda which: _outcomes(starts[which], *walked, **how), len(starts), COLUMNS)
 
 
 def _outcomes(
@@ -104,10 +118,10 @@ def _outcomes(
         so_far.add(chunk)
         effort.add(chunk)
     outcomes = so_far.outcomes()
-    columns = {one.name: (getattr(outcomes, one.name), UNITS.get(one.name, "1")) for one in fields(Outcomes)}
-    columns |= {"work": (effort.work / settled.compiled.weight, "mm"), "torque": (effort.torque, "1")}
-    columns |= {"way": (np.minimum(outcomes.fall, duration) * velocity * outcomes.speed, "mm")}
-    return xr.Dataset({name: ("start", values, {"units": units}) for name, (values, units) in columns.items()})
+    told = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
+    told |= {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
+    told["way"] = np.minimum(outcomes.fall, duration) * velocity * outcomes.speed
+    return xr.Dataset({name: ("start", told[name], {"units": units}) for name, units in COLUMNS.items()})
 
 
 def disturbed(
@@ -124,13 +138,14 @@ def disturbed(
     threads: int | None = None,
 ) -> "xr.Dataset":
     """Whether starts `fell` that a disturbance met, over start: 1 or 0, or NaN where too few starts are stable until
-    then, or the insect fell before; arguments as of `StableWalks`."""
+    then, the insect fell before, or the walk is refused, see `unless_refused`; arguments as of `StableWalks`."""
     import xarray as xr
 
     found = StableWalks(entrant.controller, velocity, n_starts, seed, stride, grid)
+    asked = case, float(observation_time(window, velocity, stride)), None, conditions, threads
     try:
-        times = found.times(case, float(observation_time(window, velocity, stride)), None, conditions, threads)
+        times = unless_refused(lambda which: found.times(*asked, which)[[*DISTURBED]], n_starts, DISTURBED)
     except TooFewStable:
         return xr.Dataset({"fell": ("start", np.full(n_starts, np.nan), {"units": "1"})})
-    fell = np.where(times.fall <= times.time, np.nan, np.isfinite(times.fall))
-    return xr.Dataset({"fell": ("start", fell, {"units": "1"})})
+    fell = came(times.fall).where(~(times.fall <= times.time))
+    return xr.Dataset({"fell": ("start", fell.values, {"units": "1"})})

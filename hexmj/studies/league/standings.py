@@ -24,7 +24,7 @@ Rows = Sequence[Sequence["xr.Dataset | None"]]
 OVER_VELOCITY = ("entrant", "velocity")
 
 REFERENCE = "ldvs"
-"""Whom all are compared with; the first entrant where it does not take part."""
+"""Whom all are compared with; where it does not take part the first entrant from random starts, if there is one."""
 
 
 def standings(league: "League", data: Data) -> "xr.Dataset":
@@ -51,13 +51,14 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         "measured": _each(walked, lambda one: came(one.measured_loss)),
         "physical": _each(walked, lambda one: came(one.fall)),
     }
-    reference = names.index(REFERENCE) if REFERENCE in names else 0
+    random = [name for name, entrant in league.entrants.items() if not entrant.ideal]
+    reference = REFERENCE if REFERENCE in random else next(iter(random), "")
     ideal = np.array([entrant.ideal for entrant in league.entrants.values()])[:, None, None]
     same = {measure: np.where(ideal, np.nan, values) for measure, values in happened.items()}  # the same random starts
     table: dict[str, Any] = {}
     for measure, values in same.items():
         table |= frequencies(measure, happened[measure], OVER_VELOCITY)
-        table |= differences(f"{measure}_above", values, values[reference], OVER_VELOCITY)
+        table |= differences(f"{measure}_above", values, values[names.index(reference or names[0])], OVER_VELOCITY)
     for asked in ("range", "accelerated"):
         table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
     over_trials = "entrant", "trial"
@@ -70,7 +71,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
     velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
-    return xr.Dataset(table, axes, {"reference": names[reference]})
+    return xr.Dataset(table, axes, {"reference": reference})
 
 
 def _lost(one: "xr.Dataset") -> "xr.DataArray":

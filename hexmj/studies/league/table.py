@@ -62,10 +62,15 @@ def _ranks(result: "xr.Dataset") -> Table:
     rows = []
     for name in (shown := by_rank(result)).entrant.values:
         one = shown.sel(entrant=name)
-        places = [f"{one[measure].mean().item():.3f}{_place(one.sel(measure=measure))}" for measure in MEASURES]
+        places = [_mean(one[measure]) + _place(one.sel(measure=measure)) for measure in MEASURES]
         rows.append((name, *places, frequency(one, "range"), frequency(one, "accelerated")))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
+
+
+def _mean(over_velocities: "xr.DataArray") -> str:
+    """Of frequencies at all velocities; "-" where one is not known."""
+    return _known(f"{over_velocities.mean(skipna=False).item():.3f}")
 
 
 def _place(one: "xr.Dataset") -> str:
@@ -80,7 +85,8 @@ def _over_velocity(result: "xr.Dataset", measure: str, title: str) -> Table:
         cells = (shown.sel(entrant=name).isel(velocity=i) for i in range(result.sizes["velocity"]))
         rows.append((name, *(frequency(one, measure) + _against(one, measure) for one in cells)))
     reference, starts = result.attrs["reference"], result[f"{measure}_starts"].max().item()
-    told = f"{title} of {starts} starts; {LESS} below {reference} on the same starts, {MORE} above"
+    told = f"{title} of {starts} starts"
+    told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
     return Table(told, ("controller", *(f"V = {v:g}" for v in result.velocity.values)), rows)
 
 
