@@ -359,4 +359,4 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
     assert found(2).identical(whole.where([True, True, False, True]))
     assert np.isnan(found(0, 1, 2, 3)).all()
     with pytest.raises(ZeroDivisionError):
-        physics.unless_refused(lambda which: 1 // 0, 4, {"fall": "mm"})
+        physics.unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
