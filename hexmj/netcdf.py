@@ -45,7 +45,7 @@ def _no_lock_of_dask() -> Iterator[None]:
     """While the block runs, xarray asks no Dask cluster for a lock that this process works for: nobody else writes to
     its memory, and the cluster does not know such a file."""
     try:
-        import dask
+        import dask.config
     except ImportError:
         yield
         return

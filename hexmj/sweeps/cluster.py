@@ -61,12 +61,14 @@ def _found(address: str) -> dict[str, Any]:
 
 async def _identity(address: str) -> dict[str, Any]:
     """What a server of Dask tells of itself."""
-    from distributed.core import connect, send_recv
+    from distributed.comm.core import connect
+    from distributed.core import send_recv
     from distributed.security import Security
 
     comm = await connect(address, timeout=PATIENCE, **Security().get_connection_args("client"))
     try:
-        return await send_recv(comm, op="identity")
+        told: Any = await send_recv(comm, op="identity")
+        return told
     finally:
         comm.abort()
 
