@@ -56,7 +56,7 @@ def started(
 @contextmanager
 def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A scheduler on loopback, by its address and its process."""
-    told = folder / "scheduler"
+    told = folder / "scheduler-file"
     words = "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)
     with started(*DASK, "scheduler", *words, folder=folder, environment=FORGIVING) as program:
         wait_for(lambda: told.exists() and told.read_text().endswith("}"))

@@ -67,7 +67,8 @@ async def _identity(address: str) -> dict[str, Any]:
 
     comm = await connect(address, timeout=PATIENCE, **Security().get_connection_args("client"))
     try:
-        return await send_recv(comm, op="identity") or {}
+        told: Any = await send_recv(comm, op="identity")
+        return told
     finally:
         comm.abort()
 
