@@ -501,7 +501,7 @@ NONSENSE = [
     (["walk", "--physical", "--order", "printed", "--model", "nowhere.py:Tripod"], "nowhere.py is no file"),
     (["map", "--processes", "0"], "--processes = 0; expected at least 1"),
     (["check-controller", "nothing"], "nor module:object or file.py:object"),
-    (["dance"], "compare, flss, walk, render, search"),
+    (["dance"], "compare, flss, walk, render, page, view, search"),
 ]
 
 

@@ -119,5 +119,5 @@ def test_a_notebook_shows_the_browsers_own_bar(monkeypatch):
     monkeypatch.setattr("IPython.display.display", display)
     monkeypatch.setattr(progress, "OFTEN", 0.0)
     CALLS["flss"](progress=True)
-    assert states[0] == 'kinematic FLSS <progress max="1" value="0.000"></progress> 0%'
+    assert states[0] == 'computing <progress max="1" value="0.000"></progress> 0%'
     assert states[-1].endswith(" 100%")

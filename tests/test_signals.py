@@ -118,7 +118,7 @@ def test_after_all_is_said(words, code):
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
 def test_while_a_film_is_written(tmp_path, by, group):
     stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
-    assert [path.name for path in tmp_path.iterdir()] == ["recording-1.nc"]
+    assert [path.name for path in tmp_path.iterdir()] == ["ldvs-V-0.3-1.nc"]
 
 
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
