@@ -118,6 +118,7 @@ def test_compare_makes_a_video_of_a_gait(run, tmp_path):
     assert len(video) == round(30 / 80 * 30 * 2)
 
 
+@pytest.mark.slow
 def test_without_rendering_compare_still_delivers(tmp_path):
     """MuJoCo is told to use a screen that is not there: numbers and figure come, and a sentence on what is missing."""
     words = [
@@ -141,6 +142,7 @@ def test_without_rendering_compare_still_delivers(tmp_path):
     assert not (tmp_path / "gait.mp4").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding):
     (tmp_path / "snow.py").write_text(
@@ -607,6 +609,7 @@ SUMS = "from dataclasses import replace\nfrom hexmj import LDVS\nfrom hexmj.cont
 SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -630,6 +633,7 @@ def test_the_last_line_is_silent_on_what_is_as_printed_and_fresh(run, words):
     assert "reading" not in out
 
 
+@pytest.mark.slow
 def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
     words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]
     out = run(*words, "--out", tmp_path)[1].replace("\n", " ").replace("  ", " ")

@@ -93,6 +93,7 @@ def test_processes_and_threads_give_the_same_bits(name, two_processes):
         assert conduct(STUDIES[name], executor=executor).identical(here)
 
 
+@pytest.mark.slow
 def test_a_killed_command_goes_on_and_ends_like_an_unbroken_one(run, tmp_path):
     words = [*WORDS, "--no-video", "--json", "--out"]
     command = [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")]

@@ -104,6 +104,7 @@ def test_everyone_is_found_and_can_be_asked_everything() -> None:
         entrants(("ldvs-ideal",))
 
 
+@pytest.mark.slow
 def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
     table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=40.0)
     assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)
@@ -169,6 +170,7 @@ def test_tables_and_figure_show_every_entrant(result) -> None:
     assert len(league_figure(result).axes) == 8
 
 
+@pytest.mark.slow
 def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, result) -> None:
     alone = replace(league, entrants={"wilson": league.entrants["wilson"]}, velocities=(0.6,))
     other = alone.result([cell.compute(threads=1) for cell in alone.cells()])
@@ -285,6 +287,7 @@ def test_trials_are_what_they_say() -> None:
     assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
 
 
+@pytest.mark.slow
 def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     from hexmj.cli.main import options_of
 

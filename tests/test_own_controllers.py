@@ -278,6 +278,7 @@ class Chatty:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("--processes", "2")])
 def test_what_a_controller_prints_is_no_answer(tmp_path, more):
     (tmp_path / "mine.py").write_text(CHATTY)

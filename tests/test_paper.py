@@ -235,6 +235,7 @@ def test_rows_of_another_protocol_are_kept_apart(tmp_path):
     assert len(list(tmp_path.iterdir())) == 4
 
 
+@pytest.mark.slow
 def test_everything_is_written(tmp_path):
     told = []
     rows, files = reproduce(tmp_path, TINY, progress=told.append)

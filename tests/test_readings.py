@@ -50,6 +50,7 @@ def test_where_the_claims_come_from_that_decide():
     assert {*REFINED_BY} <= CALIBRATED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", [HWS, LDVS])
 def test_what_only_acceleration_knows_changes_no_other_walk(controller):
     starts, final = draw_starts(20, 3), replace(controller, reading=Reading(neutral="final"))
@@ -151,6 +152,7 @@ def test_bad_options_are_refused(words, tmp_path):
         options_of(["readings", *words, "--out", str(tmp_path)]).run()
 
 
+@pytest.mark.slow
 def test_command(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", ())
     monkeypatch.setattr("hexmj.paper.scores.IDEAL", replace(IDEAL, budget=12))

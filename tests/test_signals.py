@@ -115,12 +115,14 @@ def test_after_all_is_said(words, code):
     assert b"stopped" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
 def test_while_a_film_is_written(tmp_path, by, group):
     stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
     assert [path.name for path in tmp_path.iterdir()] == ["ldvs-V-0.3-1.nc"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
 def test_while_processes_compute_cells(tmp_path, by, group):
     """They end at once, too; their cells may be long."""
@@ -129,6 +131,7 @@ def test_while_processes_compute_cells(tmp_path, by, group):
     assert not list(tmp_path.rglob("manifest.json"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGHUP])
 def test_while_a_search_evaluates(tmp_path, by):
     out = tmp_path / "evaluations"

@@ -188,6 +188,7 @@ def sweep(folder: Path, log: Path, workers: int) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 2])
 def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path, workers: int) -> None:
     folder = tmp_path / "kept"
@@ -207,6 +208,7 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path, workers: int) -> No
     assert_same_bits(found, run(cells, tmp_path / "fresh", executor=ThreadPoolExecutor(30)))
 
 
+@pytest.mark.slow
 def test_two_sweeps_share_a_folder(tmp_path: Path) -> None:
     both = [sweep(tmp_path / "kept", tmp_path, workers) for workers in (0, 2)]
     assert [one.wait() for one in both] == [0, 0]

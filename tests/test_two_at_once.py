@@ -34,6 +34,7 @@ def test_many_writers_of_one_file_leave_one_whole_file(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_two_commands_write_the_same_folder(tmp_path):
     words = ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--window", "20", "--no-video")
     both = [command(*words, "--json", "--out", str(tmp_path)) for _ in range(2)]
@@ -46,6 +47,7 @@ def test_two_commands_write_the_same_folder(tmp_path):
     assert [path.suffix for path in (tmp_path / "walks").iterdir()] == [".nc"]
 
 
+@pytest.mark.slow
 def test_a_running_search_has_its_folder_alone(tmp_path):
     words = ("search", "--starts", "500", "--refine-starts", "20000", "--out", str(tmp_path))
     first = command(*words)
