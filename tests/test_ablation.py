@@ -71,6 +71,19 @@ def test_a_controller_that_stands_twice_is_refused() -> None:
             Ablation({name: switched(name) for name in names})
 
 
+@pytest.mark.parametrize(
+    ("models", "said"),
+    [
+        ({"ldvs": hexmj.LDVS}, "models\\['ldvs'\\] = Cruse1998"),
+        ({"ldvs": {}}, "expected ldvs itself among them"),
+        ({"ldvs": {"a": hexmj.LDVS}}, "expected ldvs itself among them"),
+    ],
+)
+def test_models_that_make_no_sense_are_refused(models, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Ablation(models)
+
+
 def test_a_contact_gap_is_refused_where_nobody_reads_it() -> None:
     from hexmj.cli.main import options_of
 

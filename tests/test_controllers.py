@@ -665,3 +665,14 @@ def test_toml_that_names_itself_is_refused(tmp_path):
 def test_arguments_that_nobody_knows_are_refused():
     with pytest.raises(hexmj.InputError, match="argument 'condition'; valid names: executor"):
         hexmj.compare(LDVS, [0.3], n_starts=2, window=5.0, condition=1)  # pyright: ignore[reportCallIssue]
+
+
+@pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])
+def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(f'controller = "{name}"\n[fields]\nname = "found"\n')
+    usual: Any = hexmj.load_controller(name)
+    assert hexmj.load_controller(str(path)) == replace(usual, name="found")
+    path.write_text(f'controller = "{path}"\n[fields]\n')
+    with pytest.raises(hexmj.InputError, match=r"expected module:object, file.py:object, a rival or an entry point"):
+        hexmj.load_controller(str(path))

@@ -263,7 +263,7 @@ def test_disturbed_walks_can_read_their_legs():
 
 
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
-    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": []}
+    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "window": 45.0}
     study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)
     result = conduct(study, tmp_path, threads=1)
     assert result.physical_reached.values.tolist() == [[4, 4]]
@@ -280,7 +280,7 @@ def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
 def test_some_starts_alone_go_as_among_all(kind):
     walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)
-    asked = Case(kind, "none", 20.0 * (kind == "push")), 5.0, None, Conditions()
+    asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
     every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
     assert alone.identical(every.isel(start=[2, 0]))
 

@@ -122,7 +122,7 @@ def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duratio
 
 @pytest.mark.parametrize("push", [40.0, 80.0])
 def test_an_insect_tipped_over_by_a_push_fell(push: float):
-    found = outcomes(Conditions(), 0.5, push)
+    found = outcomes(Conditions(), 0.5, push, duration=120.0)
     assert np.isfinite(found.fall).mean() > 0.5
     assert (found.tilt > pi / 2).any()
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 import pytest
@@ -14,6 +14,10 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.rivals.evolved import Evolved
+from hexmj.controllers.rivals.lifted import Lifted
+from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
 from hexmj.controllers.stepwise import Step, stepwise
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.intervals import paired_difference
@@ -153,7 +157,7 @@ def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
 
 def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -> None:
     entrant = Entrant(Stretched())
-    alone = League({"far": entrant}, (0.5,), 1, 1, 1, window=10.0, accelerating=False, periods=1, seed=0)
+    alone = League({"far": entrant}, (0.5,), 1, 1, 1, window=10.0, accelerating=False, periods=12, seed=0)
     result = alone.result([cell.compute(threads=1) for cell in alone.cells()])
     assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
     assert "nan" not in league_markdown(result)
@@ -279,7 +283,7 @@ def test_work_and_torque_do_not_depend_on_chunks_and_are_those_of_the_strides() 
 def test_trials_are_what_they_say() -> None:
     entrant, usual = Entrant(hexmj.LDVS), Conditions()
     walked = [name for name in TRIALS if name not in DISTURBED]
-    found = {name: one for name in walked if (one := walking(name, entrant, usual))}
+    found = {name: one for name in walked if (one := walking(name, entrant, usual, Stride()))}
     assert list(found) == walked
     assert found["load"].conditions.masses.load == 1.0
     assert found["step"].conditions.ground.ground_height == 3.0
@@ -300,22 +304,21 @@ def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch:
 
 
 FAR = """
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import numpy as np
-from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.stepwise import Step, stepwise
 
 @dataclass(frozen=True)
 class Far:
     name: str = "far"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        plan = Metronome("wilson").begin(starts, velocity, stride, acceleration, threads)
-        near = plan.step
-        plan.step = lambda v: replace(near(v), y=np.tile(3 * np.array(stride.geometry.y), (len(starts), 1)))
-        return plan
+        y, stands = np.tile(3 * np.array(stride.geometry.y), (len(starts), 1)), np.ones(starts.shape, dtype=bool)
+        return stepwise(lambda v: Step(starts, stands, y=y), starts, velocity, stride, acceleration)
 """
 
 
+@pytest.mark.slow
 def test_who_cannot_be_filmed_costs_neither_tables_nor_manifest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
@@ -329,6 +332,59 @@ def test_who_cannot_be_filmed_costs_neither_tables_nor_manifest(
     assert "no video: " in shown.err and "Standings" in shown.out
     assert "below far.py:Far on the same starts" in " ".join(shown.out.split()), "the first from random starts"
     assert {"league.nc", "league.png", "league.md", "manifest.json"} == {one.name for one in Path("here").glob("*.*")}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (lambda: League({"ldvs": hexmj.LDVS}), "entrants\\['ldvs'\\] = .* expected an Entrant"),  # pyright: ignore
+        (lambda: League(entrants(("ldvs",)), periods=0), "periods = 0; expected a whole number of at least 12"),
+        (lambda: Entrant(hexmj.load_controller("graham"), "no"), "ideal = 'no'; expected True or False"),  # pyright: ignore
+        (lambda: Metronome("tripod"), "wave = 'tripod'; valid names: wilson, graham"),  # pyright: ignore
+        (lambda: PhaseOscillators(coupling=np.nan), "cpg-tripod: coupling = nan; expected a finite number"),
+        (lambda: Evolved(theta=np.inf), "evolved: theta = inf; expected a finite number"),
+    ],
+)
+def test_entrants_and_rivals_that_make_no_sense_are_refused(given, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        given()
+
+
+@pytest.mark.parametrize("state", [np.zeros((2, 6)), None, (np.zeros((2, 6)),)])
+def test_a_rule_that_remembers_no_named_tuple_is_refused_as_it_begins(state) -> None:
+    own = {"name": "rule", "at_start": lambda self, legs: state}
+    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
+    with pytest.raises(
+        InputError, match=r"at_start gave .* expected a named tuple of arrays whose first axis is the start, 2"
+    ):
+        hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)
+
+
+def test_an_ideal_start_that_raises_is_one_sentence() -> None:
+    @dataclass(frozen=True)
+    class Gone(Still):
+        def ideal_start(self, velocity, stride):
+            raise ValueError("no gait at this velocity")
+
+    with pytest.raises(InputError, match=r"still, ideal_start: ValueError in .*: no gait at this velocity"):
+        Entrant(Gone(), ideal=True).starts(1, 0, 0.5, Stride())
+
+
+def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
+    late = PoorSenses(ReadsLegs(hexmj.LDVS), delay=0.04)
+    with pytest.raises(InputError, match=r"delay = 0.04 with steps of 0.1 time units; expected at least one step"):
+        late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
+    assert walking("late", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride()) is None
+    assert walking("noise", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride())
+
+
+def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
+    one = League({"far": Entrant(Stretched())}, (0.5,), 6, 6, 1, window=10.0, accelerating=False, periods=12, seed=0)
+    result = one.result([cell.compute(threads=1) for cell in one.cells()])
+    left = int((hexmj.draw_starts(6, 0)[:, 0] <= 0).sum())
+    assert result.missing.item() == 6 - left and 0 < left < 6
+    text = league_markdown(result)
+    assert f") of {left} |" in text and f"far, {6 - left} walks missing |" in text
 
 
 @pytest.mark.parametrize("option", ["--ground-height", "--ground-at", "--ground-length"])
@@ -346,6 +402,12 @@ def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(wind
     found = losses(entrant, 0.5, window, n_starts=20, seed=0, stride=Stride(), acceleration=eq11)
     lost = first_loss(hexmj.draw_starts(20, 0), hexmj.UNCOORDINATED, 0.5, 80.0, acceleration=eq11)
     assert np.array_equal(found.lost, np.isfinite(lost))
+
+
+def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
+    entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions.of(settling_time=3.0), stride=Stride())
+    with pytest.raises(SimulationError, match="start 0 did not settle in 3 ms"):
+        physics.walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)
 
 
 @pytest.mark.parametrize("error", [SimulationError, OutOfReach, StillThrown])

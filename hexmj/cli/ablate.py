@@ -89,7 +89,9 @@ def _table(one: "xr.Dataset") -> "Table":
 
 
 def _cell(one: "xr.Dataset") -> str:
-    frequency = "-" if np.isnan(one.frequency) else f"{one.frequency.item():.3f}"
+    left, physical = one.frequency_starts.item(), one.measure.item() == "physical"
+    frequency = "-" if not left else f"{one.frequency.item():.3f}"
+    frequency += f" of {left}" if physical and 0 < left < one.attrs["n_physical"] else ""
     if one.controller.item() == one.whole.item() or np.isnan(one.more):
         return frequency
     sure = "*" if one.more_low.item() > 0 or one.more_high.item() < 0 else ""

@@ -82,8 +82,11 @@ def _varied(name: str, how: str, which: int) -> Controller:
 
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     """The controller that a file names, with these fields."""
-    if ":" not in named and not entry_points(group=ENTRY_POINTS, name=named):
-        raise InputError(f"{path}: controller = {named!r}; expected module:object, file.py:object or an entry point")
+    varied = VARIED.fullmatch(named)
+    if ":" not in named and (varied["name"] if varied else named) not in known_names():
+        raise InputError(
+            f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
+        )
     found: Any = load_controller(named)
     try:
         wanted = get_type_hints(type(found))

@@ -22,7 +22,7 @@ class PoorSenses:
     """Standard deviation of the error of each coordinate of each tip, new and independent at every step, as a part of
     AEP_0 - PEP_0."""
     delay: float = 0.0
-    """How late everything is told [time units]."""
+    """How late everything is told [time units], to the nearest step of the plan."""
 
     def __post_init__(self) -> None:
         check_types(self)
@@ -48,12 +48,17 @@ class PoorSenses:
         """See `protocol.Controller.begin`.
 
         Raises:
-            InputError: plans that read nothing.
+            InputError: plans that read nothing, or a delay that is no step of theirs.
         """
+        late = round(self.delay / stride.dt)
+        if self.delay and not late:
+            raise InputError(
+                f"delay = {self.delay:g} with steps of {stride.dt:g} time units; expected at least one step"
+            )
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
         if not isinstance(plan, ReadingPlan):
             raise InputError(f"poor senses of {self.controller.name}; expected a controller whose plans read the legs")
-        return PoorlyToldPlan(plan, self.noise * (stride.aep0 - stride.pep0), round(self.delay / stride.dt))
+        return PoorlyToldPlan(plan, self.noise * (stride.aep0 - stride.pep0), late)
 
 
 class PoorlyToldPlan:

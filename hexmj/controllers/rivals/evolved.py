@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4
 
@@ -67,6 +67,8 @@ class Evolved(Lifted):
     across: float = 0.0
     """Weight of the output of the contralateral leg."""
     name: str = "evolved"
+
+    __post_init__ = check_numbers
 
     mirrored = True
 

@@ -5,12 +5,14 @@ so, and at PEP_min at the latest, beyond which no leg reaches.  So V, V_p, AEP_0
 1998 network, and every rival meets the same random starts.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
 
+from hexmj.checks import check_types
 from hexmj.controllers.protocol import Sensed
+from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride, commanded_velocities
 from hexmj.walks import PlannedWalk
@@ -43,6 +45,19 @@ class Legs:
     def stance_part(self) -> np.ndarray:
         """(start, 1) part of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
         return 1.0 / (1.0 + self.v)
+
+
+def check_numbers(rule: Any) -> None:
+    """Refuse a rule, a frozen dataclass, with a field of another type or a number that is not finite; its
+    `__post_init__`.
+
+    Raises:
+        InputError: such a field.
+    """
+    check_types(rule)
+    for one in fields(rule):
+        if isinstance(value := getattr(rule, one.name), float) and not np.isfinite(value):
+            raise InputError(f"{rule.name}: {one.name} = {value}; expected a finite number")
 
 
 State = tuple[np.ndarray, ...]
@@ -79,7 +94,7 @@ class LiftedPlan:
         self._final = checked_velocities(velocity, len(self.starts), acceleration)
         self._age = np.full(len(self.starts), age)
         self._legs = self._at_rest(self.starts)
-        self._state: Any = rule.at_start(self._legs)
+        self._state: Any = _checked(rule.at_start(self._legs), len(self.starts))
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps."""
@@ -113,7 +128,7 @@ class LiftedPlan:
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        fresh = self._rule.at_start(rest)
+        fresh = _checked(self._rule.at_start(rest), len(tips))
         self._state = type(self._state)(*(_chosen(which, a, b) for a, b in zip(fresh, self._state, strict=True)))
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
@@ -193,6 +208,17 @@ class Lifted:
 def _equal_parts(stands: np.ndarray) -> np.ndarray:
     """Share of the weight on each foot if all that stand carry the same; none where none stands."""
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
+
+
+def _checked(state: Any, count: int) -> Any:
+    """A rule's state at time 0 if it is a `State` of so many starts."""
+    named = isinstance(state, tuple) and hasattr(state, "_fields")
+    if not (named and all(isinstance(one, np.ndarray) and one.shape[:1] == (count,) for one in state)):
+        raise InputError(
+            f"at_start gave {' '.join(repr(state).split()):.80}; expected a named tuple of arrays whose first axis is"
+            f" the start, {count}"
+        )
+    return state
 
 
 def _chosen(which: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:

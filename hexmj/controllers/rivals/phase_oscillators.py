@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 
 NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
@@ -83,6 +83,8 @@ class PhaseOscillators(Lifted):
     amplitude_at_start: float = 0.0
     """r at time 0; source."""
     name: str = "cpg-tripod"
+
+    __post_init__ = check_numbers
 
     @property
     def mirrored(self) -> bool:

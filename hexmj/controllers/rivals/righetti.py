@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 
 TRIPOD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """(leg,) k_ij is the product of two legs' signs."""
@@ -62,6 +62,8 @@ class Righetti(Lifted):
     loaded: float = 0.25
     """Share of the weight above which a leg does not begin a swing; ours."""
     name: str = "righetti"
+
+    __post_init__ = check_numbers
 
     reads_load = True
     mirrored = True

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 from hexmj.legs import MIRROR, N2, N4
 
 
@@ -44,6 +44,8 @@ class Scores(Lifted):
     margin: float = 0.001
     """Part of the highest score by which a score may be lower and still count as equal; source."""
     name: str = "flygym-rules"
+
+    __post_init__ = check_numbers
 
     def at_start(self, legs: Legs) -> Nothing:
         """See `LiftingRule`."""

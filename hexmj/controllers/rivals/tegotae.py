@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 
 
 class Phases(NamedTuple):
@@ -41,6 +41,8 @@ class Tegotae(Lifted):
     neighbours: float = 0.5
     """sigma_2 W / (6 omega), the same of its neighbours; ours."""
     name: str = "tegotae"
+
+    __post_init__ = check_numbers
 
     reads_load = True
     mirrored = True

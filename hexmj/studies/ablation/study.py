@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.attributes import attributes
-from hexmj.checks import check_types
+from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
+from hexmj.gaits import CYCLES
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
@@ -81,8 +82,12 @@ class Ablation:
         check_types(self)
         for count in (self.n_starts, self.n_physical):
             check_draw(count, self.seed)
+        whole("periods", self.periods, CYCLES + 2)
         if not self.models:
             raise InputError("no controller was given; expected at least one")
+        for name, several in self.models.items():
+            if name not in typed(f"models[{name!r}]", several, Mapping):
+                raise InputError(f"models[{name!r}] = {[*several]}; expected {name} itself among them")
         names = [name for several in self.models.values() for name in several]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(

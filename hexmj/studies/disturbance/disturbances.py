@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
@@ -120,10 +120,10 @@ def disturbance_of(
     if kind != "leg":
         return Disturbance(kind, stable.step, leg)
     plan, step = begin(controller, stable.starts, velocity, stride), np.full_like(leg, NEVER)
-    plan.advance(int(stable.step.min()) - 1)
+    advanced(plan, int(stable.step.min()) - 1)
     while (step == NEVER).any():
         first = plan.done + 1
-        up = ~plan.advance(CHUNK).stance
+        up = ~advanced(plan, CHUNK).stance
         due = (first + np.arange(CHUNK))[:, None] >= stable.step
         row = np.argmax(up.any(axis=2) & due, axis=0)
         legs = up[row, np.arange(len(step))]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -98,7 +98,7 @@ class StableWalks:
         postures = self.postures if case.strategy == "reorganise" else None
         disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
         ahead = self._plan(disturbed, self.found.starts, recovery, threads)
-        ahead.advance(int(disturbance.step.max()) + 1)
+        advanced(ahead, int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
         end = float(back.max() + window)
         starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance.of(which))

@@ -5,7 +5,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.checks import check_types
+from hexmj.controllers.asking import begin, said
 from hexmj.controllers.protocol import Controller, ReadingPlan, SteerableController, check_controller_type
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
@@ -32,6 +33,7 @@ class Entrant:
     """Whether it begins at its `ideal_start`, the same for all walks."""
 
     def __post_init__(self) -> None:
+        check_types(self)
         check_controller_type(self.controller)
         if self.ideal and not isinstance(self.controller, HasIdealStart):
             raise InputError(f"an ideal start of {self.controller.name}; expected a controller with ideal_start")
@@ -39,7 +41,8 @@ class Entrant:
     def starts(self, n_starts: int, seed: int, velocity: float, stride: Stride) -> np.ndarray:
         """Random starts, (start, leg) [mm], or the ideal one alone."""
         if self.ideal and isinstance(self.controller, HasIdealStart):
-            return self.controller.ideal_start(velocity, stride)
+            with said(f"{self.controller.name}, ideal_start"):
+                return self.controller.ideal_start(velocity, stride)
         return draw_starts(n_starts, seed, stride)
 
     @property

@@ -17,6 +17,7 @@ from hexmj.physics.drive import drive
 from hexmj.physics.effort import EffortSoFar
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import settle
+from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
@@ -91,11 +92,29 @@ def walks(
     Returns:
         Over start all `Outcomes`; of the joints the `work` over the insect's weight [mm] and the greatest `torque` over
         its limit, see `EffortSoFar`; and the `way` walked ahead [mm].  NaN as of `unless_refused`.
+
+    Raises:
+        SimulationError: none of the random starts comes to rest, whoever walks.
     """
     starts = entrant.starts(n_starts, seed, velocity, stride)
     how: Any = {"conditions": conditions, "stride": stride, "threads": threads}
     walked = controller, velocity, float(observation_time(window, velocity, stride))
-    return unless_refused(lambda which: _outcomes(starts[which], *walked, **how), len(starts), COLUMNS)
+    found = unless_refused(lambda which: _outcomes(starts[which], *walked, **how), len(starts), COLUMNS)
+    if found.fall.isnull().all():
+        _check_settles(draw_starts(n_starts, seed, stride), **how)
+    return found
+
+
+def _check_settles(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> None:
+    """Refuse conditions in which no start comes to rest, whoever walks."""
+    refused = []
+    for start in starts:
+        try:
+            settle(start[np.newaxis], conditions, stride, threads)
+            return
+        except SimulationError as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def _outcomes(

@@ -34,8 +34,9 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
         how far they are above those of the `reference` on the same starts, `_above`, with its interval; of walks
         without a fall the `speed` over that commanded, `slip` [mm/s], `cost` of transport, and the greatest `torque`
-        of a joint over its limit; of limit regimes the share that is `periodic` and `stable`, the median `reached`
-        [time units], `duty_factor` and the phases `ipsilateral` and `contralateral`.
+        of a joint over its limit; how many walks are `missing`, since they were refused; of limit regimes the share
+        that is `periodic` and `stable`, the median `reached` [time units], `duty_factor` and the phases `ipsilateral`
+        and `contralateral`.
         Over entrant: `range`, J_N, and `accelerated`, with intervals; over (entrant, measure) the `best` and `worst`
         rank, by the mean over velocities.  Over (entrant, trial): `fell`, and on paper `lost`, with intervals.
         All frequencies have the number of their `_starts`.
@@ -68,6 +69,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
     table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
+    table["missing"] = _over(walked, lambda one: one.fall.isnull().sum())
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
     velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}

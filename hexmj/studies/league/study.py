@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.attributes import attributes
-from hexmj.checks import check_types
+from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.gaits import CYCLES
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
@@ -74,8 +75,11 @@ class League:
         check_types(self)
         for count in (self.n_starts, self.n_physical, self.n_tried):
             check_draw(count, self.seed)
+        whole("periods", self.periods, CYCLES + 2)
         if not self.entrants:
             raise InputError("no controller was given; expected at least one")
+        for name, entrant in self.entrants.items():
+            typed(f"entrants[{name!r}]", entrant, Entrant)
         if not (0 < self.tried_at < 1 and (self.observed[0] > 0).all()):
             raise InputError(
                 f"velocities = {self.velocities}, of the trials = {self.tried_at}; expected each above 0 and below 1"
@@ -178,7 +182,7 @@ class League:
                 found[trial] = self._cell(trial, physics.disturbed, 300, entrant, how)
             elif trial in DISTURBED or (trial in GROUNDS and way < CROSSED):
                 continue
-            elif one := walking(trial, entrant, self.conditions):
+            elif one := walking(trial, entrant, self.conditions, self.stride):
                 how = at | {"controller": one.controller, "conditions": one.conditions}
                 found[trial] = self._cell(trial, physics.walks, 180, entrant, how)
         return found

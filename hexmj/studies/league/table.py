@@ -62,8 +62,9 @@ def _ranks(result: "xr.Dataset") -> Table:
     rows = []
     for name in (shown := by_rank(result)).entrant.values:
         one = shown.sel(entrant=name)
+        missing = f", {one.missing.sum().item():g} walks missing" if one.missing.any() else ""
         places = [_mean(one[measure]) + _place(one.sel(measure=measure)) for measure in MEASURES]
-        rows.append((name, *places, frequency(one, "range"), frequency(one, "accelerated")))
+        rows.append((name + missing, *places, frequency(one, "range"), frequency(one, "accelerated")))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
 
@@ -71,6 +72,11 @@ def _ranks(result: "xr.Dataset") -> Table:
 def _mean(over_velocities: "xr.DataArray") -> str:
     """Of frequencies at all velocities; "-" where one is not known."""
     return _known(f"{over_velocities.mean(skipna=False).item():.3f}")
+
+
+def _left(one: "xr.Dataset", measure: str) -> str:
+    """Of how many walks, where some are missing."""
+    return f" of {one[f'{measure}_starts'].item()}" if measure != "kinematic" and one.missing.item() else ""
 
 
 def _place(one: "xr.Dataset") -> str:
@@ -83,7 +89,7 @@ def _over_velocity(result: "xr.Dataset", measure: str, title: str) -> Table:
     rows = []
     for name in (shown := by_rank(result)).entrant.values:
         cells = (shown.sel(entrant=name).isel(velocity=i) for i in range(result.sizes["velocity"]))
-        rows.append((name, *(frequency(one, measure) + _against(one, measure) for one in cells)))
+        rows.append((name, *(frequency(one, measure) + _left(one, measure) + _against(one, measure) for one in cells)))
     reference, starts = result.attrs["reference"], result[f"{measure}_starts"].max().item()
     told = f"{title} of {starts} starts"
     told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
@@ -124,7 +130,8 @@ def _costs(result: "xr.Dataset") -> Table:
     for name in at.entrant.values:
         one = at.sel(entrant=name)
         cells = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
-        rows.append((name, *map(_known, cells)))
+        missing = f", {one.missing.item():g} walks missing" if one.missing else ""
+        rows.append((name + missing, *map(_known, cells)))
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque")
     return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
 

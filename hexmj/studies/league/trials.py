@@ -9,6 +9,7 @@ from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.protocol import Controller
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.league.entrant import Entrant
+from hexmj.timing import Stride
 
 IMPULSE = 40.0
 """Of the push, in multiples of m V_p."""
@@ -54,8 +55,8 @@ TRIALS = (*DISTURBED, *MET, *LEGS_LOST, *READING)
 TOLD = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
     " until then; step and rough ground of 3 mm; load: twice the weight; lost: one leg, from the front; reads: the legs"
-    " are read; noise, late: with errors of 10 % of the step range, 20 ms late; - where plans cannot be steered or"
-    " read no legs, or the walk ends before the ground"
+    " are read; noise, late: with errors of 10 % of the step range, 20 ms late, in whole steps; - where plans cannot be"
+    " steered or read no legs, or the walk ends before the ground"
 )
 """What they are."""
 
@@ -70,21 +71,23 @@ class Walking:
     """In which it walks."""
 
 
-def walking(name: str, entrant: Entrant, conditions: Conditions) -> Walking | None:
-    """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs.
+def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride) -> Walking | None:
+    """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs, or not so
+    late, since its steps are longer.
 
     Args:
         name: of the trial.
         entrant: whose controller it is.
         conditions: all others.
+        stride: with the time step.
     """
     controller, reading = entrant.controller, entrant.reading if name in READING else None
     if name in MET:
         return Walking(controller, conditions.but(**MET[name]))
     if name in LEGS_LOST:
         return Walking(LegLost(controller, LEGS_LOST[name]), conditions)
-    if reading is None:
-        return None
     late = DELAY * conditions.time.vp
+    if reading is None or (name == "late" and not round(late / stride.dt)):
+        return None
     senses = (reading, PoorSenses(reading, noise=NOISE), PoorSenses(reading, delay=late))
     return Walking(dict(zip(READING, senses, strict=True))[name], conditions)
