@@ -57,7 +57,7 @@ def outcomes(
     size = len(settled.starts)
     pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.time.vp), np.full(size, 20.0))
     plan = begin(controller, settled.starts, 0.6, settled.stride)
-    return outcomes_of_plan(settled, plan, 80.0, np.full(size, np.inf), push=pushed, threads=threads)
+    return outcomes_of_plan(settled, plan, 120.0, np.full(size, np.inf), push=pushed, threads=threads)
 
 
 def allowed(settled: Settled) -> float:
