@@ -2,7 +2,7 @@
 
 import json
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, RANGES, Protocol, ce
 from hexmj.paper.quantities import Lost, Measured, Phase, Scatter, Weight, main_peak
 from hexmj.paper.reproduce import measure, reproduce
 from hexmj.paper.rules import Answer, Band, Rule, Seen, Trend, fisher
-from hexmj.paper.table import NOT_SEARCHED, judge, summary
+from hexmj.paper.table import NOT_SEARCHED, Row, claims_markdown, judge, summary
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import WINDOWS, Acceleration
@@ -366,3 +366,11 @@ def test_other_readings_stand_beside(tmp_path):
         reproduce(tmp_path, TINY, only=keys, beside=("wrong",))
     with pytest.raises(InputError, match="readings beside"):
         reproduce(tmp_path, TINY, only=keys, beside=("printed",))
+
+
+def test_a_rows_command_tells_starts_and_readings():
+    claim = CLAIMS[0]
+    beside = Row(claim, {}, {"lasting": Row(claim, {})})
+    quick = claims_markdown([beside], asdict(replace(QUICK, seed=7)))
+    assert f"`{claim.command} --quick --seed 7 --beside lasting`" in quick
+    assert f"`{claim.command}`" in claims_markdown([Row(claim, {})], asdict(FULL))

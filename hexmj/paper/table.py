@@ -1,10 +1,11 @@
 """The table of claims: each judged over both windows, as rows, Markdown and JSON."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from hexmj.paper.claims import IN_PHYSICS, Claim
+from hexmj.paper.protocol import FULL, QUICK
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
 from hexmj.timing import WINDOWS
@@ -102,7 +103,7 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     lines += [line(heads(rows)), line(["---"] * len(heads(rows)))]
     lines += [line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
     lines += ["", "## Rules and commands", "", line(("the paper", "agrees if", "command")), line(["---"] * 3)]
-    lines += [line((row.claim.words, row.claim.rule.words, f"`{row.claim.command}`")) for row in rows]
+    lines += [line((row.claim.words, row.claim.rule.words, f"`{_command(row, settings)}`")) for row in rows]
     lines += ["", "## Judged in physics", "", "What a plan knows nothing of; docs/experiments.md has the answers.", ""]
     lines += [f"- {name} (Section 6): {told}; `{command}`" for name, (command, told) in IN_PHYSICS.items()]
     return "\n".join(lines) + "\n"
@@ -115,15 +116,9 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
         claim = row.claim
         told = {"key": claim.key, "section": claim.section, "paper": claim.words, "value": claim.value}
         told |= {"kind": row.kind, "calibrates": list(claim.calibrates)}
-        ours = {
-            window or "any": {"verdict": row.verdicts[window]} | (asdict(answer) if answer else {})
-            for window, answer in row.answers.items()
-        }
-        how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": claim.command}
-        beside = {
-            name: {window or "any": one for window, one in other.verdicts.items()} for name, other in row.beside.items()
-        }
-        claims.append(told | {"ours": ours, "beside": beside} | how)
+        how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": _command(row, settings)}
+        beside = {name: _answers(other) for name, other in row.beside.items()}
+        claims.append(told | {"ours": _answers(row), "beside": beside} | how)
     return {"claims": claims, "summary": summary(rows), "protocol": settings}
 
 
@@ -131,6 +126,23 @@ def summary_beside(rows: Sequence[Row]) -> list[str]:
     """Sentences that count the verdicts under the other readings."""
     names = rows[0].beside if rows else ()
     return [f"reading {name}, {one}" for name in names for one in summary([row.beside[name] for row in rows])]
+
+
+def _answers(row: Row) -> dict[str, dict[str, Any]]:
+    """Verdicts and numbers, by window."""
+    return {
+        window or "any": {"verdict": row.verdicts[window]} | (asdict(answer) if answer else {})
+        for window, answer in row.answers.items()
+    }
+
+
+def _command(row: Row, settings: dict[str, Any]) -> str:
+    """Recomputes a row with the same starts, beside the same readings."""
+    quick = settings == asdict(replace(QUICK, seed=settings["seed"]))
+    words = [row.claim.command, *(["--quick"] if quick else [])]
+    words += [f"--seed {settings['seed']}"] if settings["seed"] != FULL.seed else []
+    words += [f"--beside {' '.join(row.beside)}"] if row.beside else []
+    return " ".join(words)
 
 
 def _counts(verdicts: Sequence[str]) -> str:
