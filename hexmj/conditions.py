@@ -163,8 +163,10 @@ class Conditions:
     def __post_init__(self) -> None:
         check_types(self)
         flat = self.flat()
+        idle = {one for one in vars(Ground()).items() if one[0] not in OBEYED[self.ground.ground]}  # made for no body
         for name, bound in bounds(self.body).items():
-            bound.check(name, flat[name])
+            if (name, flat[name]) not in idle:
+                bound.check(name, flat[name])
         lengths = self.body.lengths
         if self.ground.ground == "rough":
             rough = Bound(lengths.lowest_bump, lengths.highest_bump, "mm where rough", closed=True)

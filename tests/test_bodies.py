@@ -19,7 +19,7 @@ from hexmj.bodies.hinges import ThreeHinges
 from hexmj.bodies.loading import compile_body, plain_model
 from hexmj.bodies.numeric import HingeChains
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.conditions import Conditions
+from hexmj.conditions import Conditions, Ground
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
@@ -440,3 +440,13 @@ def test_mjcfs_that_cannot_walk_are_refused(tmp_path: Path, old: str, new: str, 
     file.write_text(STICK_INSECT.text().replace(old, new))
     with pytest.raises(InputError, match=message):
         compile_body(conditions(replace(STICK_INSECT, mjcf=file)))
+
+
+def test_usual_places_of_obstacles_hold_no_body_back_where_the_ground_is_flat(tmp_path):
+    long = renamed(tmp_path, factor=1.2)
+    Conditions(body=long)
+    for ground in ("step", "gap", "rough"):
+        with pytest.raises(InputError, match="ground_at = 50"):
+            Conditions(body=long, ground=Ground(ground))
+    with pytest.raises(InputError, match="ground_at = 51"):
+        Conditions(body=long, ground=Ground(ground_at=51.0))
