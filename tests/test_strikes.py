@@ -53,11 +53,11 @@ def walked(settled: Settled, velocity: float = 0.6) -> list[Chunk]:
 def outcomes(
     settled: Settled, push: float = 0.0, threads: int | None = None, controller: Controller = LDVS
 ) -> Outcomes:
-    """Of the same walks, pushed aside at 20 time units by a multiple of m V_p."""
+    """Of the same walks, or longer ones, pushed aside at 20 time units by a multiple of m V_p."""
     size = len(settled.starts)
     pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.time.vp), np.full(size, 20.0))
     plan = begin(controller, settled.starts, 0.6, settled.stride)
-    return outcomes_of_plan(settled, plan, 120.0, np.full(size, np.inf), push=pushed, threads=threads)
+    return outcomes_of_plan(settled, plan, 130.0 if push else 80.0, np.full(size, np.inf), push=pushed, threads=threads)
 
 
 def allowed(settled: Settled) -> float:
