@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.checks import typed
 from hexmj.literal import literal
 
 if TYPE_CHECKING:
@@ -37,8 +38,14 @@ def settings(result: "xr.Dataset") -> dict[str, Any]:
 
     Returns:
         Numbers, texts, lists and dictionaries by name, such as ``settings(result)["conditions"]["vp"]``.
+
+    Raises:
+        InputError: it is no dataset.
     """
-    return {str(key): value if key in TEXTS else _told(value) for key, value in result.attrs.items()}
+    import xarray as xr
+
+    told = typed("result", result, xr.Dataset).attrs
+    return {str(key): value if key in TEXTS else _told(value) for key, value in told.items()}
 
 
 def _told(value: Any) -> Any:

@@ -49,6 +49,8 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
+    if gone := [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]:
+        raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
     chosen = next(iter(figures)) if which is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")

@@ -13,7 +13,7 @@ from hexmj import netcdf
 from hexmj.attributes import attributes
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import read_bytes, remove_leftovers, sealed, try_writing, unsealed, write_whole
+from hexmj.files import MARK, read_bytes, remove_leftovers, sealed, try_writing, unsealed, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,8 +30,9 @@ def load(path: Path | str) -> "xr.Dataset":
         InputError: it cannot be read, is damaged, or is no NetCDF.
     """
     path = path_of(path)
-    content = read_bytes(path)
-    return netcdf.decode(unsealed(content) or content, f"{path} is damaged, or no NetCDF; expected a result of hexmj")
+    whole = read_bytes(path)
+    content = unsealed(whole) if MARK in whole else whole  # what xarray's own `to_netcdf` wrote has no seal
+    return netcdf.decode(content, f"{path} is damaged, or no NetCDF; expected a result of hexmj")
 
 
 def save(result: "xr.Dataset", path: Path | str) -> Path:

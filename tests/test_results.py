@@ -185,3 +185,22 @@ def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
     if form == "png":
         hexmj.plot(hexmj.load(tmp_path / "comparison.nc")).savefig(tmp_path / "again.png", dpi=150)
         assert (tmp_path / "again.png").read_bytes() == drawn.read_bytes()
+
+
+def test_a_damaged_result_is_no_result(tmp_path):
+    path = hexmj.save(hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, window="start"), tmp_path / "flss.nc")
+    whole = path.read_bytes()
+    for wrong in (whole[:900] + bytes([whole[900] ^ 1]) + whole[901:], whole[:-1], whole + b" "):
+        path.write_bytes(wrong)
+        with pytest.raises(InputError, match="is damaged"):
+            hexmj.load(path)
+
+
+def test_what_has_lost_its_velocities_gets_a_sentence():
+    result = hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, window="start")
+    hexmj.plot(result.isel(velocity=[0]))
+    for wrong in (0, []):
+        with pytest.raises(InputError, match="without the axis velocity"):
+            hexmj.plot(result.isel(velocity=wrong))
+    with pytest.raises(InputError, match="result = None"):
+        hexmj.settings(None)  # pyright: ignore[reportArgumentType]
