@@ -39,7 +39,7 @@ class Network:
 
 
 def main() -> None:
-    from stable_baselines3 import PPO
+    from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
     from hexmj.environments.stable_baselines import FeltInsects
 

@@ -4,7 +4,7 @@ What an episode is stands in `task`.  Actions are normalised: 0 is the usual one
 are the ends of the joints' ranges or the largest offsets.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,7 +26,7 @@ RENDER_MODES = [None, "rgb_array"]
 class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One insect that walks in an episode of its own."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES[1:], "render_fps": 800}  # pyright: ignore
+    metadata = {"render_modes": RENDER_MODES[1:], "render_fps": 800}  # noqa: RUF012  # Gymnasium reads it of the class
 
     def __init__(self, *, render_mode: str | None = None, **task: Any) -> None:
         """Its settings are those of `task.Task`.
@@ -42,6 +42,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         compiled, self.render_mode = compiled_for(self.task), checked_mode(render_mode)
         self.metadata = metadata_of(self.task)
         self.observation_space, self.action_space = spaces_of(compiled, self.task)
+        self._shape = (len(action_names(compiled, self.task)),)
         self._body = Alone(compiled, self.task.stride)
         self.model, self.data = self._body.model, self._body.data
         self._walkers = Walkers(self.task, compiled, self._body, self._body.take, count=1, threads=1)
@@ -62,7 +63,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
             InputError: an action out of bounds.
             SimulationError: a simulation that diverged.
         """
-        acted = self._walkers.act(checked_actions(action, self.action_space.shape)[np.newaxis])
+        acted = self._walkers.act(checked_actions(action, self._shape)[np.newaxis])
         return self._observation(), float(acted.reward[0]), bool(acted.terminated[0]), bool(acted.truncated[0]), {}
 
     def render(self) -> np.ndarray | None:
@@ -82,10 +83,10 @@ def compiled_for(task: Task) -> CompiledBody:
     return compile_body(task.conditions, task.conditions.timestep(task.stride), looks=False)
 
 
-def spaces_of(compiled: CompiledBody, task: Task) -> tuple[spaces.Dict, spaces.Box]:
+def spaces_of(compiled: CompiledBody, task: Task) -> tuple[Any, spaces.Box]:
     """Of one insect's observations and actions."""
     bounds = observation_bounds(compiled, task)
-    observed = {name: spaces.Box(low, high, dtype=np.float64) for name, (low, high) in bounds.items()}
+    observed: dict[str, Any] = {name: spaces.Box(low, high, dtype=np.float64) for name, (low, high) in bounds.items()}
     return spaces.Dict(observed), spaces.Box(-1.0, 1.0, (len(action_names(compiled, task)),), np.float32)
 
 

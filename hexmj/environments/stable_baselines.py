@@ -15,7 +15,7 @@ from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
 
 try:
-    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 except ImportError:
     raise InputError('stable-baselines3 is not installed: pip install "hexmj[rl]"') from None
 
