@@ -31,7 +31,7 @@ def example(monkeypatch, tmp_path):
 
 
 def some_reflexes(module: ModuleType) -> WithOffsets:
-    weights = np.random.default_rng(0).uniform(-0.1, 0.1, (3, 6))
+    weights = np.random.default_rng(0).uniform(-0.1, 0.1, (3, 5))
     weights[:, 4:] = 0.0
     return WithOffsets(module.Reflexes(tuple(map(tuple, weights.tolist()))))
 
