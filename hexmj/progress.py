@@ -97,7 +97,7 @@ def _in_lines(label: str) -> Iterator[Progress]:
     def tell() -> None:
         while not over.wait(EVERY):
             gone = monotonic() - begun
-            left = f", about {gone / sofar - gone:.0f} s to go" if sofar > 0 else ""
+            left = f", about {max(gone / sofar - gone, 0.0):.0f} s to go" if sofar > 0 else ""
             with suppress(OSError, ValueError, AttributeError):  # closed, or nobody listens any more
                 print(f"{literal(label)}: {sofar:.0%} in {gone:.0f} s{left}", file=sys.stderr, flush=True)
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 def load(path: Path | str) -> "xr.Dataset":
     """Read a result that a command, `save` or its own `to_netcdf` wrote; it is the same as when it was fresh.
 
+    Damage is seen by the seal, which what `to_netcdf` wrote has not: there a bit may be another one in silence.
+
     Args:
         path: such as "results/compare/comparison.nc".
 

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
@@ -282,3 +283,23 @@ def test_divergence_is_an_error_that_can_be_replayed(walking: Any):
         for _ in range(5):
             walking.step(np.zeros(walking.action_space.shape))
     assert set(error.value.state) >= {"qpos", "qvel", "ctrl", "conditions"}
+
+
+@pytest.mark.parametrize("walking", [StickInsect(), StickInsects(2)], ids=["one", "many"])
+def test_a_step_needs_a_reset_and_a_copy_another_make(walking: Any):
+    with pytest.raises(InputError, match="before the first reset"):
+        walking.step(np.zeros(walking.action_space.shape))
+    with pytest.raises(InputError, match="neither copied nor pickled"):
+        deepcopy(walking)
+    with pytest.raises(InputError, match="options = 5"):
+        walking.reset(options=5)
+
+
+def test_seeds_of_many_are_whole_numbers():
+    many = StickInsects(2)
+    plain = many.reset(seed=3)[0]["tips"]
+    for seed in (np.int64(3), [3, 4], np.array([3, 4])):
+        assert np.array_equal(many.reset(seed=seed)[0]["tips"], plain)  # pyright: ignore[reportArgumentType]
+    for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1]):
+        with pytest.raises(InputError, match="seed = "):
+            many.reset(seed=wrong)  # pyright: ignore[reportArgumentType]

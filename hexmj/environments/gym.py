@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
-from hexmj.checks import numbers
+from hexmj.checks import numbers, typed
 from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
 from hexmj.environments.task import Task, action_names, observation_bounds
@@ -53,6 +53,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Begin an episode.  With a seed it takes the first of `hexmj.draw_starts` by that seed, then its next ones."""
         super().reset(seed=seed)
+        typed("options", options, dict | None)
         self._walkers.begin(np.arange(1), drawn(self.np_random, self.task))
         return self._observation(), {}
 
@@ -73,6 +74,10 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     def close(self) -> None:
         """Free the GL, if one was chosen."""
         self._frames.close()
+
+    def __reduce__(self) -> Any:
+        """Refuse copies and pickles, which would not share the memory that MuJoCo steps."""
+        raise InputError("an environment can be neither copied nor pickled; expected another gymnasium.make")
 
     def _observation(self) -> dict[str, np.ndarray]:
         return self._walkers.named(self._walkers.observations()[0])

@@ -12,7 +12,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from hexmj.checks import whole
+from hexmj.checks import typed, whole
 from hexmj.environments.frames import Frames
 from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, drawn, metadata_of, spaces_of
 from hexmj.environments.task import Task, action_names
@@ -79,11 +79,10 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         Raises:
             InputError: seeds or a mask that make no sense.
         """
-        which = _mask((options or {}).get("reset_mask"), self.num_envs)
+        which = _mask((typed("options", options, dict | None) or {}).get("reset_mask"), self.num_envs)
         if not (self._rngs or which.all()):
             raise InputError("a reset_mask leaves out insects that have never begun; expected a reset of all first")
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
-        self._seed([None] * self.num_envs if seeds is None else list(seeds), which)
+        self._seed(_seeds(seed, self.num_envs), which)
         self._begin(which)
         return self._observations(), {}
 
@@ -117,6 +116,10 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """Free the GL, if one was chosen."""
         self._frames.close()
 
+    def __reduce__(self) -> Any:
+        """Refuse copies and pickles, which would not share the memory that MuJoCo steps."""
+        raise InputError("an environment can be neither copied nor pickled; expected another gymnasium.make_vec")
+
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The insects' generators."""
@@ -129,8 +132,6 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _seed(self, seeds: list[int | None], which: np.ndarray) -> None:
         """Make new generators of some insects where there is a seed, or nothing yet."""
-        if len(seeds) != self.num_envs:
-            raise InputError(f"{len(seeds)} seeds; expected one for each of {self.num_envs} insects")
         if not self._rngs:
             self._rngs, self._seeds = ([*one] for one in zip(*(seeding.np_random(seed) for seed in seeds), strict=True))
             return
@@ -161,6 +162,17 @@ def _mode(mode: AutoresetMode | str) -> AutoresetMode:
     except ValueError:
         names = ", ".join(one.value for one in AutoresetMode)
         raise InputError(f"autoreset_mode = {mode!r:.80}; valid names: {names}") from None
+
+
+def _seeds(seed: Any, count: int) -> list[int | None]:
+    """A seed for each insect."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+        if len(seed) != count:
+            raise InputError(f"{len(seed)} seeds; expected one for each of {count} insects")
+        return [None if one is None else whole("seed", one, 0) for one in seed]
+    return [whole("seed", seed, 0) + i for i in range(count)]
 
 
 def _mask(mask: Any, count: int) -> np.ndarray:

@@ -120,6 +120,7 @@ class Walkers:
         self._steps, self._substeps = task.steps, task.substeps
         self._everyone, self._ids = np.arange(count), np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
+        self._begun = False
         self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
@@ -165,16 +166,18 @@ class Walkers:
         for shown, now in zip(self._planned, (1.0, standing, 0.0), strict=True):
             shown[ids] = now
         self._done[ids], self._walking[ids] = 0, True
-        self._ids = np.flatnonzero(self._walking)
+        self._ids, self._begun = np.flatnonzero(self._walking), True
 
     def act(self, actions: np.ndarray) -> Acted:
         """One step of all insects that walk, with an action of every insect, (insect, number): 0 is the usual action,
         -1 the least and 1 the greatest.
 
         Raises:
-            InputError: actions out of bounds, or a plan that makes no sense.
+            InputError: actions out of bounds, no episode has begun, or a plan that makes no sense.
             SimulationError: an insect that diverged.
         """
+        if not self._begun:
+            raise InputError("a step before the first reset; expected a reset")
         ids, task, count = self._ids, self._task, len(self._everyone)
         reward, fell = np.zeros(count), np.zeros(count, dtype=bool)
         if len(ids) == 0:
