@@ -94,6 +94,14 @@ def test_what_makes_no_sense_changes_nothing():
     before = live.moment
     with pytest.raises(InputError, match="expected 0 <= V < 1"):
         live.steer(velocity=1.5)
+    with pytest.raises(InputError, match="velocity = "):
+        live.steer(velocity=[0.3])  # pyright: ignore[reportArgumentType]
+    for wrong in (np.nan, -1.0, 1e9, "a", None):
+        with pytest.raises(InputError, match="seconds = "):
+            live.advance(wrong)  # pyright: ignore[reportArgumentType]
+    for wrong in (np.nan, np.inf, 1e9, "a", None):
+        with pytest.raises(InputError, match="impulse = "):
+            live.push(wrong)  # pyright: ignore[reportArgumentType]
     assert live.velocity == 0.4
     assert live.moment is before
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS
-from hexmj.conditions import Conditions
+from hexmj.checks import typed
+from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.protocol import (
     Controller,
@@ -30,6 +31,12 @@ from hexmj.walks import PlannedWalk, joined, part_of
 
 ONLY = np.array([0])
 """The index of the only insect."""
+
+AT_ONCE = Bound(0.0, 60.0, "s", closed=True)
+"""How long it walks in one go."""
+
+PUSHES = Bound(-80.0, 80.0, "times m V_p", closed=True)
+"""As of `hexmj disturb`, from either side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +166,7 @@ class LiveWalk:
         Raises:
             InputError: a velocity or controller that makes no sense; the walk goes on as it was.
         """
-        velocity = self.velocity if velocity is None else velocity
+        velocity = self.velocity if velocity is None else typed("velocity", velocity, float)
         controller = controller or self.controller
         begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # refuses what makes no sense
         self.velocity, self.controller = velocity, controller
@@ -173,7 +180,11 @@ class LiveWalk:
 
         Args:
             impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
+
+        Raises:
+            InputError: one of more than 80.
         """
+        PUSHES.check("impulse", impulse := typed("impulse", impulse, float))
         vp, lasts = self.conditions.time.vp, max(1, round(PUSH_LASTS / self.conditions.time.seconds(self.stride)))
         self._push.impulse[:] = impulse * self.conditions.body.mass * vp
         self._push.time[:] = (self._plan.done // lasts + 1) * lasts * self.stride.dt
@@ -185,9 +196,10 @@ class LiveWalk:
             What is seen then; of an insect that has fallen, what was seen last.
 
         Raises:
-            InputError: it walks off the ground that was laid, or its controller fails.
+            InputError: no time or a minute at once, it walks off the ground that was laid, or its controller fails.
             SimulationError: the simulation diverged.
         """
+        AT_ONCE.check("seconds", seconds := typed("seconds", seconds, float))
         self._left += seconds
         self.trace = []
         step = self.conditions.time.seconds(self.stride)
