@@ -384,7 +384,7 @@ def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
     left = int((hexmj.draw_starts(6, 0)[:, 0] <= 0).sum())
     assert result.missing.item() == 6 - left and 0 < left < 6
     text = league_markdown(result)
-    assert f") of {left} |" in text and f"far, {6 - left} walks missing |" in text
+    assert f") of {left} |" in text and f"far (walks missing: {6 - left}) |" in text
 
 
 @pytest.mark.parametrize("option", ["--ground-height", "--ground-at", "--ground-length"])

@@ -62,7 +62,7 @@ def _ranks(result: "xr.Dataset") -> Table:
     rows = []
     for name in (shown := by_rank(result)).entrant.values:
         one = shown.sel(entrant=name)
-        missing = f", {one.missing.sum().item():g} walks missing" if one.missing.any() else ""
+        missing = f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
         places = [_mean(one[measure]) + _place(one.sel(measure=measure)) for measure in MEASURES]
         rows.append((name + missing, *places, frequency(one, "range"), frequency(one, "accelerated")))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
@@ -130,7 +130,7 @@ def _costs(result: "xr.Dataset") -> Table:
     for name in at.entrant.values:
         one = at.sel(entrant=name)
         cells = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
-        missing = f", {one.missing.item():g} walks missing" if one.missing else ""
+        missing = f" (walks missing: {one.missing.item():g})" if one.missing else ""
         rows.append((name + missing, *map(_known, cells)))
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque")
     return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
