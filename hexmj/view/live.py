@@ -166,7 +166,7 @@ class LiveWalk:
         Raises:
             InputError: a velocity or controller that makes no sense; the walk goes on as it was.
         """
-        velocity = self.velocity if velocity is None else typed("velocity", velocity, float)
+        velocity = typed("velocity", self.velocity if velocity is None else velocity, float)
         controller = controller or self.controller
         begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # refuses what makes no sense
         self.velocity, self.controller = velocity, controller
