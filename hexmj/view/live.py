@@ -166,11 +166,11 @@ class LiveWalk:
         Raises:
             InputError: a velocity or controller that makes no sense; the walk goes on as it was.
         """
-        velocity = typed("velocity", self.velocity if velocity is None else velocity, float)
+        wanted: float = typed("velocity", self.velocity if velocity is None else velocity, float)
         controller = controller or self.controller
-        begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # refuses what makes no sense
-        self.velocity, self.controller = velocity, controller
-        if self._plan.hand_over(controller, velocity):
+        begin(controller, self.start[np.newaxis], wanted, self.stride, threads=1)  # refuses what makes no sense
+        self.velocity, self.controller = wanted, controller
+        if self._plan.hand_over(controller, wanted):
             return True
         self.begin()
         return False
