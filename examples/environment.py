@@ -17,7 +17,7 @@ def main() -> None:
     end = "fell" if step.discount == 0 else "walked on"
     print(f"The insect {end} after {walking.physics.time():.2f} s, {len(rewards)} steps.")
     print(f"return {sum(rewards):.0f}, {np.mean(rewards):.2f} a step")
-    print(f"speed {np.mean(speeds):.1f} mm/s, commanded {float(step.observation['command']):.1f} mm/s")
+    print(f"speed {np.mean(speeds):.1f} mm/s, commanded {step.observation['command'].item():.1f} mm/s")
 
 
 if __name__ == "__main__":

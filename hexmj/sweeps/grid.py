@@ -104,16 +104,20 @@ def finish(
         for i, cell in enumerate(cells):
             done = _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i))
             yield finished(i, done)
-        return
-    waiting = list[int]()
-    for i, path in enumerate(paths):
-        if path and path.exists():
-            yield finished(i, read(path, records[i]))
-        else:
-            waiting.append(i)
-    parcels = [_Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting]
-    for j, done in _by_others(executor, parcels, folder):
-        yield finished(waiting[j], done)
+    else:
+        waiting = list[int]()
+        for i, path in enumerate(paths):
+            if path and path.exists():
+                yield finished(i, read(path, records[i]))
+            else:
+                waiting.append(i)
+        parcels = [
+            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting
+        ]
+        for j, done in _by_others(executor, parcels, folder):
+            yield finished(waiting[j], done)
+    if folder:
+        remove_leftovers(folder)  # once more: workers of one that was killed may have outlived its begin
 
 
 def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":

@@ -95,7 +95,8 @@ class Life:
     """How a job ended, and what it left."""
 
     def __init__(self, job: str, folder: Path, log: Path, code: int, told: str, lived: float) -> None:
-        self.job, self.folder, self.code, self.told, self.lived = job, folder, code, told, lived
+        self.job, self.folder, self.code, self.lived = job, folder, code, lived
+        self.told = "".join(line for line in told.splitlines(keepends=True) if "% in " not in line)  # but progress
         self.log, self.notes = log, noted(log)
 
     def key(self, line: str) -> str:
