@@ -1,13 +1,13 @@
 """Environments: one insect against a bare loop of MuJoCo's steps, many against the package's own physical walks.
 
-A row is one insect's steps a second; a step is one of the plan, with two physics steps.
+A figure is steps a second, summed over insects; a step is one of the plan, with its physics steps.
 """
 
 import mujoco
 import numpy as np
 import pytest
 
-from hexmj import LDVS, draw_starts
+from hexmj import LDVS, Stride, draw_starts
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.measures.physical import physical_outcomes
@@ -17,29 +17,31 @@ VELOCITY, STEPS = 0.1, 1000  # nobody falls, so both loops take the same steps
 MANY, FEW_STEPS = 1000, 100
 
 
+@pytest.mark.parametrize("dt", [0.1, 0.5])
 @pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls"])
-def test_one(measure, who):
-    """The bare loop plans, observes and measures nothing."""
-    walking, controls = StickInsect(actions="tips", velocity=VELOCITY), []
+def test_one(measure, who, dt):
+    """One walk that goes on; the bare loop plans, observes and measures nothing."""
+    walking = StickInsect(actions="tips", velocity=VELOCITY, stride=Stride(dt=dt), duration=1e5)
+    controls, data = [], mujoco.MjData(walking.model)
     walking.reset(seed=0)
+    mujoco.mj_copyData(data, walking.model, walking.data)
     for _ in range(STEPS):
         walking.step(np.zeros(18))
         controls.append(walking.data.ctrl.copy())
 
     def ours() -> None:
-        walking.reset(seed=0)
         for _ in range(STEPS):
             walking.step(np.zeros(18))
 
     def bare() -> None:
-        walking.reset(seed=0)
+        control, substeps = data.ctrl, walking.task.substeps
         for now in controls:
-            walking.data.ctrl[:] = now
-            for _ in range(walking.task.substeps):
-                mujoco.mj_step(walking.model, walking.data)
+            control[:] = now
+            for _ in range(substeps):
+                mujoco.mj_step(walking.model, data)
 
-    work = ours if who == "hexmj" else bare
-    measure(work, "environment, 1 insect", who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
+    work, what = ours if who == "hexmj" else bare, f"environment, 1 insect, {walking.task.substeps} substeps"
+    measure(work, what, who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
 
 
 @pytest.mark.parametrize("who", ["hexmj", "hexmj's own physical walks"])

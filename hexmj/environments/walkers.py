@@ -118,6 +118,7 @@ class Walkers:
         self._task, self._compiled, self._bodies, self._threads = task, compiled, bodies, threads
         self._take = take
         self._steps, self._substeps = task.steps, task.substeps
+        self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
         self._everyone, self._ids = np.arange(count), np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self._begun = False
@@ -186,11 +187,12 @@ class Walkers:
         self._done[ids] += 1
         any_fell = judge(*self._body[1:3], ids, sensors, self._trunk, task.command, reward, fell)
         over = (self._done == self._steps) & self._walking
-        if task.conditions.ground.ground != "flat":
+        if self._ends:
             over |= at_the_end(self._seen(), task) & self._walking
         if any_fell or over.any():
+            over &= ~fell
             self._leave(np.flatnonzero(fell | over))
-        return Acted(reward, fell, over & ~fell)
+        return Acted(reward, fell, over)
 
     def observations(self) -> np.ndarray:
         """Everything observed of all insects, (insect, number); `named` says what it is."""
