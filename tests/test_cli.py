@@ -601,7 +601,7 @@ def test_reproduce_judges_chosen_claims(run, tmp_path):
     (claim,) = json.loads(text)["claims"]
     assert claim["key"] == "ldvs-accelerated"
     assert set(claim["ours"]) == {"walk", "start"}
-    assert claim["command"].endswith("--only ldvs-accelerated")
+    assert claim["command"].endswith("--only ldvs-accelerated --quick")
     assert (tmp_path / "claims.md").is_file()
 
 

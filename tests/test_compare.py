@@ -26,6 +26,7 @@ from hexmj.sweeps import Cell, conduct
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
+PUSHED: dict[str, Any] = FEW | {"window": 60.0}
 WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "6", "--window", "30"]
 
 
@@ -80,7 +81,7 @@ STUDIES = {
     "reading": Comparison({"reading": ReadsLegs(LDVS)}, [0.5, 0.6], **FEW),
     "map": StabilityMap(LDVS, "load", [0.0, 0.5], [0.6], **FEW),
     "terrain": Terrain(LDVS, [0.8], grounds=["step"], heights=[3.0], grasps=[0.0], n_starts=2),
-    "disturb": DisturbedWalks(LDVS, [0.7], ["halt", "push"], strategies=["reorganise"], **FEW),
+    "disturb": DisturbedWalks(LDVS, [0.7], ["halt", "push"], strategies=["reorganise"], **PUSHED),
     "converge": StaticLimit(LDVS, 0.6, [200.0, 80.0], [1.0], **FEW),
 }
 
