@@ -51,7 +51,8 @@ def main() -> None:
     )
     net: dict = {"net_arch": [HIDDEN, HIDDEN], "log_std_init": float(np.log(QUIET))}
     agent = PPO(
-        "MlpPolicy", VecNormalize(insects, norm_obs=False, gamma=0.98), policy_kwargs=net, n_steps=80, batch_size=1024, n_epochs=10, gamma=0.98,
+        "MlpPolicy", VecNormalize(insects, norm_obs=False, gamma=0.98), policy_kwargs=net,
+        n_steps=80, batch_size=1024, n_epochs=10, gamma=0.98,
         learning_rate=1e-3, seed=1, device="cpu",
     )  # fmt: skip
     agent.learn(STEPS)
