@@ -16,8 +16,9 @@ from hexmj.environments.learned import FELT, WithOffsets
 
 FOUND = Path(__file__).with_name("network.json")
 VELOCITY, WINDOW = 0.6, 40.0  # V_r, and the window `start` [time units]
-INSECTS, STEPS, HIDDEN = 64, 400_000, 32
-QUIET = 0.05  # of the first actions: loud ones shake the insect off its feet
+INSECTS, STEPS, HIDDEN = 64, 300_000, 32
+COARSE = 0.5  # time step of the plan [time units]: an action lasts 6.25 ms at V_p = 80 mm/s
+QUIET = 0.2  # size of the first actions: loud ones shake the insect off its feet
 MOST_FELT = 10.0
 
 
@@ -40,13 +41,18 @@ class Network:
 
 def main() -> None:
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+    from stable_baselines3.common.vec_env import VecNormalize  # pyright: ignore[reportMissingImports]
 
     from hexmj.environments.stable_baselines import FeltInsects
 
-    began, insects = time.monotonic(), FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW)
+    began, insects = (
+        time.monotonic(),
+        FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=hexmj.Stride(dt=COARSE)),
+    )
     net: dict = {"net_arch": [HIDDEN, HIDDEN], "log_std_init": float(np.log(QUIET))}
     agent = PPO(
-        "MlpPolicy", insects, policy_kwargs=net, n_steps=128, batch_size=1024, n_epochs=5, gamma=0.995,
+        "MlpPolicy", VecNormalize(insects, norm_obs=False, gamma=0.98), policy_kwargs=net,
+        n_steps=80, batch_size=1024, n_epochs=10, gamma=0.98,
         learning_rate=1e-3, seed=1, device="cpu",
     )  # fmt: skip
     agent.learn(STEPS)
