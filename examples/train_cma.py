@@ -86,11 +86,12 @@ def main() -> None:
 
 def found() -> WithOffsets:
     """LDVS with the reflexes that were found."""
-    weights = tomllib.loads(FOUND.read_text(encoding="utf-8"))["weights"] if FOUND.exists() else Reflexes().weights
+    weights = tomllib.loads(FOUND.read_text(encoding="utf-8"))["weights"]
     return WithOffsets(Reflexes(tuple(map(tuple, weights))), name="reflexes")
 
 
-REFLEXES = found()
+if FOUND.exists():
+    REFLEXES = found()
 
 if __name__ == "__main__":
     main()

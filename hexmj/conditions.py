@@ -5,6 +5,7 @@ by itself.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
@@ -215,6 +216,13 @@ class Conditions:
     def timestep(self, stride: Stride) -> float:
         """The physics step [s]."""
         return self.time.seconds(stride) / self.substeps(stride)
+
+
+def unusual(told: Mapping[str, Any]) -> list[str]:
+    """Names of conditions worth telling, of `Conditions.settings` or `flat`: what the ground at hand obeys, and what
+    is not as usual."""
+    usual, obeyed = Conditions().settings(), OBEYED[told.get("ground", "flat")]
+    return [name for name, value in told.items() if name in obeyed or value != usual[name]]
 
 
 def bounds(body: Body) -> dict[str, Bound]:

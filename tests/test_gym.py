@@ -303,3 +303,15 @@ def test_seeds_of_many_are_whole_numbers():
     for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1]):
         with pytest.raises(InputError, match="seed = "):
             many.reset(seed=wrong)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.slow
+def test_a_drawn_insect_that_nobody_closes_ends_in_silence():
+    program = """
+import gymnasium
+walking = gymnasium.make("hexmj.environments:hexmj/StickInsectTips-v0", render_mode="rgb_array")
+walking.reset(seed=0)
+walking.render()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr == ""

@@ -7,7 +7,7 @@ from typing import Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Accelerating, Controlled, Walks, changed
-from hexmj.conditions import OBEYED, Conditions, Numerics
+from hexmj.conditions import Conditions, Numerics, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 
@@ -55,8 +55,8 @@ class WalkingCommand:
         line += "".join(f"; {name}: {told}" for name in self.names if (told := self.controlled.brought(name)))
         line += "; feedback" if self.controlled.feedback else ""
         if physical:
-            values, usual, ground = self.conditions.flat(), Conditions().flat(), OBEYED[self.conditions.ground.ground]
-            told = {*TOLD, *ground, *(key for key in values if values[key] != usual[key])} - {*varied}
+            values = self.conditions.flat()
+            told = {*TOLD, *unusual(values)} - {*varied}
             shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
         return line

@@ -61,7 +61,7 @@ class Render(WalkingCommand):
         controllers = self.controlled.controllers([self.model, *beside])
         shown = [load_recording(path) for path in self.recordings]
         name = self._name(shown)
-        video, manifest = f"{name}.{self.format}", f"{name}-{MANIFEST}"
+        video, manifest = f"{name}.{self.format}", f"{name}.{self.format}-{MANIFEST}"
         out = results_folder(self.out, (video, f"{name}-1.nc", f"{name}-2.nc", manifest))
         if sentence := gl.missing():
             raise RenderingError(sentence)

@@ -1,5 +1,6 @@
 """Frames of an insect, drawn without a screen; a GL is chosen when the first one is drawn."""
 
+import atexit
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -36,6 +37,7 @@ class Frames:
     def close(self) -> None:
         """Free the GL; it may be called again."""
         if self._renderer:
+            atexit.unregister(self._renderer.close)
             self._renderer.close()
         self._renderer = None
 
@@ -43,4 +45,5 @@ class Frames:
         if self._renderer is None:
             model = compile_body(self._conditions).model
             self._data, self._renderer = mujoco.MjData(model), gl.renderer(model, *SIZE)
+            atexit.register(self._renderer.close)  # before the GL goes, though nobody closes the environment
         return self._renderer

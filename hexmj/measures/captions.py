@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from hexmj.attributes import settings
-from hexmj.conditions import OBEYED, Conditions
+from hexmj.conditions import unusual
 from hexmj.literal import in_figure
 
 if TYPE_CHECKING:
@@ -58,8 +58,7 @@ def controllers(told: dict[str, Any]) -> str:
 def conditions(told: dict[str, Any]) -> str:
     """V_p and the conditions that are not the usual ones; nothing of a result on paper."""
     given = told.get("conditions") or {}
-    usual, obeyed = Conditions().settings(), OBEYED[given.get("ground", "flat")]
-    shown = {name for name, value in given.items() if name == "vp" or name in obeyed or value != usual[name]}
+    shown = {"vp", *unusual(given)} & given.keys()
     words = [WORDS[name].format(given[name]).replace(" ", NO_BREAK) for name in WORDS if name in shown]
     return ", ".join(words)
 

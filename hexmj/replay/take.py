@@ -6,11 +6,13 @@ import numpy as np
 import xarray as xr
 
 from hexmj.bodies.description import Body
+from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.replay.recording import recorded_conditions
 from hexmj.rotations import heading, turned
+from hexmj.stability import support_polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,3 +83,22 @@ class Take:
     def row(self, seconds: float) -> int:
         """The step whose end is nearest to a time; the last one after the end."""
         return int(np.clip(round(seconds / self.step) - 1, 0, len(self.qpos) - 1))
+
+
+def support_on_ground(
+    conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The support polygon, and the height at which it is drawn: that of the highest ground below it.
+
+    Args:
+        conditions: of the walk.
+        feet: in the world, (leg, 2) [mm].
+        stance: which of them stand, (leg,).
+        centre: of mass, (3,) [mm].
+
+    Returns:
+        Its corners, (corner, 2), none without a foot, and the height, both [mm].
+    """
+    corners = support_polygon(feet, stance)
+    below = np.vstack([corners, centre[:2]])
+    return corners, float(ground_level(conditions.ground, conditions.body.lengths, below).max())

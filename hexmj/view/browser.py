@@ -12,7 +12,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.diagrams import spans
@@ -20,7 +19,7 @@ from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
-from hexmj.stability import support_polygon
+from hexmj.replay.take import support_on_ground
 from hexmj.view.live import LiveWalk, Moment
 from hexmj.view.session import LiveSession, ticks
 
@@ -214,15 +213,13 @@ class BrowserView:
 
     def _show(self, moment: Moment) -> None:
         """Put everything where it is, seen from the ground below the centre of mass."""
-        conditions, centre = self.session.walk.conditions, moment.centre_of_mass
+        centre = moment.centre_of_mass
         here = np.array([*centre[:2], 0.0])
         self._data.qpos[:] = moment.qpos
         mujoco.mj_kinematics(self._model, self._data)
         for body, frame in self._frames.items():
             frame.position, frame.wxyz = self._data.xpos[body] - here, self._data.xquat[body].copy()
-        polygon = support_polygon(moment.feet[:, :2], moment.stance)
-        below = np.vstack([polygon, centre[:2]])
-        level = float(ground_level(conditions.ground, conditions.body.lengths, below).max())
+        polygon, level = support_on_ground(self.session.walk.conditions, moment.feet[:, :2], moment.stance, centre)
         self._ground.position = -here
         corners = np.column_stack([polygon, np.full(len(polygon), level + 0.3)]) - here
         padded = corners[np.minimum(np.arange(6), len(corners) - 1)] if len(corners) else np.zeros((6, 3))

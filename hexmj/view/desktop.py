@@ -10,12 +10,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.stability import support_polygon
+from hexmj.replay.take import support_on_ground
 from hexmj.view.session import LiveSession, ReplaySession, ticks
 
 KEYS = "space pauses, up and down change V, left and right push, enter takes the next start"
@@ -102,8 +101,7 @@ def _show(window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, 
     with window.lock():
         window.d.qpos[:] = qpos
         mujoco.mj_forward(window.m, window.d)
-        polygon, stable = support_polygon(feet, stance), bool(margin > 0.0)
-        level = float(ground_level(conditions.ground, body.lengths, np.vstack([polygon, centre[:2]])).max())
+        (polygon, level), stable = support_on_ground(conditions, feet, stance, centre), bool(margin > 0.0)
         scene.ngeom = 0
         mark_support(scene, body.marks, polygon, level, stable)
         mark_centre_of_mass(scene, body.marks, centre, level, stable)

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from hexmj.bodies.description import Body
-from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.checks import given, path_of, typed
@@ -23,8 +22,7 @@ from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.schema import check_recording
-from hexmj.replay.take import Take
-from hexmj.stability import support_polygon
+from hexmj.replay.take import Take, support_on_ground
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
@@ -136,8 +134,8 @@ def _view(
     mujoco.mj_camlight(renderer.model, data)
     renderer.update_scene(data, camera)
     stable, body = bool(take.margin[row] > 0.0), take.conditions.body
-    corners, centre = support_polygon(take.feet[row], take.stance[row]), take.centre_of_mass[row]
-    level = float(ground_level(take.conditions.ground, body.lengths, np.vstack([corners, centre[:2]])).max())
+    centre = take.centre_of_mass[row]
+    corners, level = support_on_ground(take.conditions, take.feet[row], take.stance[row], centre)
     mark_support(renderer.scene, body.marks, corners, level, stable)
     mark_centre_of_mass(renderer.scene, body.marks, centre, level, stable)
     mark_planned_tips(renderer.scene, body.marks, take.planned_tip[row])

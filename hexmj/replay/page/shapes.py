@@ -81,13 +81,11 @@ def geom_shape(model: mujoco.MjModel, geom: int) -> Shape:
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     turn = turn.reshape(3, 3)
-    material = model.geom_matid[geom]
-    rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
     return Shape(
         corners=corners @ turn.T + model.geom_pos[geom],
         normals=normals @ turn.T,
         faces=faces,
-        colour=np.tile(rgba[:3], (len(corners), 1)),
+        colour=np.tile(_rgba(model, geom)[:3], (len(corners), 1)),
         body=np.full(len(corners), model.geom_bodyid[geom]),
     )
 
@@ -104,9 +102,12 @@ def surface(places: np.ndarray, height: np.ndarray) -> Shape:
 
 
 def _seen(model: mujoco.MjModel, geom: int) -> bool:
+    return bool(model.geom_group[geom] < SEEN and _rgba(model, geom)[3] > 0)
+
+
+def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
     material = model.geom_matid[geom]
-    rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-    return bool(model.geom_group[geom] < SEEN and rgba[3] > 0)
+    return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
 
 
 def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

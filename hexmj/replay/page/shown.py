@@ -8,13 +8,11 @@ import numpy as np
 import xarray as xr
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.loading import compile_body
-from hexmj.conditions import OBEYED, Conditions
+from hexmj.conditions import Conditions, unusual
 from hexmj.legs import LEGS
 from hexmj.replay.page.shapes import body_shape, ground_shape
-from hexmj.replay.take import Take
-from hexmj.stability import support_polygon
+from hexmj.replay.take import Take, support_on_ground
 
 APART = 0.005
 """From one pose that is shown to the next [s]."""
@@ -69,12 +67,10 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
 
 def told_conditions(conditions: Conditions, physical: bool) -> str:
     """What body walked, at which V_p, and under which conditions that are not the usual ones."""
-    values, usual = conditions.flat(), Conditions().flat()
-    ground = OBEYED[conditions.ground.ground]
-    names = [key for key in values if key != "vp" and (key in ground or values[key] != usual[key])]
+    values = conditions.flat()
     body = conditions.body.name.replace("_", " ")
     who = f"{body} in physics" if physical else f"the plan, shown by a {body} that follows it"
-    values_told = (f"{name.replace('_', ' ')} {values[name]}" for name in names)
+    values_told = (f"{name.replace('_', ' ')} {values[name]}" for name in unusual(values) if name != "vp")
     return ", ".join([who, f"V_p = {conditions.time.vp:g} mm/s", *values_told])
 
 
@@ -98,12 +94,12 @@ def _poses(compiled: CompiledBody, qpos: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def _polygons(take: Take, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Support polygons, (pose, 6, 2), NaN beyond their corners, and the ground below them, (pose,) [mm]."""
-    corners, level, conditions = np.full((len(rows), 6, 2), np.nan), np.empty(len(rows)), take.conditions
+    corners, level = np.full((len(rows), 6, 2), np.nan), np.empty(len(rows))
     for n, row in enumerate(rows):
-        polygon = support_polygon(take.feet[row], take.stance[row])
+        polygon, level[n] = support_on_ground(
+            take.conditions, take.feet[row], take.stance[row], take.centre_of_mass[row]
+        )
         corners[n, : len(polygon)] = polygon
-        below = np.vstack([polygon, take.centre_of_mass[row, :2]])
-        level[n] = ground_level(conditions.ground, conditions.body.lengths, below).max()
     return corners, level
 
 
