@@ -229,6 +229,11 @@ def run_steps(walking: control.Environment, count: int) -> TimeStep:
     return [walking.step(ZEROS) for _ in range(count)][-1]
 
 
+def seen(walking: control.Environment) -> dict[str, np.ndarray]:
+    """What is observed now."""
+    return walking.task.get_observation(walking.physics)
+
+
 def test_velocity_is_seen_from_the_heading():
     walking = dm.load()
     walking.reset()
@@ -236,22 +241,28 @@ def test_velocity_is_seen_from_the_heading():
         data = walking.physics.data
         data.qpos[2:7] = 20.0, np.cos(0.4), 0.0, 0.0, np.sin(0.4)
         data.qvel[:3] = 10.0 * np.cos(0.8), 10.0 * np.sin(0.8), 3.0
-    np.testing.assert_allclose(walking.physics.velocity_from_heading(), [10.0, 0.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(seen(walking)["velocity"], [10.0, 0.0, 3.0], atol=1e-12)
 
 
 def test_clearance_at_home_is_that_of_the_metathorax():
     walking = dm.load()
+    walking.reset()
     walking.physics.reset(walking.physics.model.name2id("home", "key"))
-    assert walking.physics.clearance() == pytest.approx(10.4 - 2.0 - 1.6)
+    assert seen(walking)["clearance"] == pytest.approx(10.4 - 2.0 - 1.6)
 
 
 def test_no_foot_in_contact_has_a_margin_of_its_own():
     """It lies below every margin that one foot in contact can have, at any reach of the legs."""
     walking = dm.load()
     walking.reset()
-    physics = walking.physics
-    one = [float(physics.margin(row)) for row in np.eye(6, dtype=bool)]
-    assert physics.margin(np.zeros(6, dtype=bool)) == STICK_INSECT.lengths.no_foot_margin < min(one) < 0
+    physics, walkers = walking.physics, walking.task._walkers
+
+    def margin(standing: np.ndarray) -> float:
+        flat = walkers.observer.observe(walkers.places, standing[np.newaxis], walkers._planned)
+        return walkers.observer.named(flat)["margin"][0, 0]
+
+    one = [margin(row) for row in np.eye(6, dtype=bool)]
+    assert margin(np.zeros(6, dtype=bool)) == STICK_INSECT.lengths.no_foot_margin < min(one) < 0
     legs = physics.compiled.kinematics
     reach = np.linalg.norm(legs.coxa_position[:, :2], axis=1) + legs.coxa + legs.femur + legs.tibia
     farthest = STICK_INSECT.lengths.farthest_centre_of_mass

@@ -23,6 +23,7 @@ from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError, SimulationError
 from hexmj.replay.film import gl
 from hexmj.timing import Stride
+from tests.plain_observations import plain_observations, plain_rewards
 
 TIPS: dict[str, Any] = {"actions": "tips"}
 LDVS: Controller = hexmj.LDVS
@@ -117,7 +118,7 @@ def test_no_offsets_are_the_physical_walk_to_the_last_bit(controller, conditions
 
 @pytest.mark.parametrize("actions", ["joints", "tips"])
 def test_it_is_the_environment_of_dm_env_but_for_units(actions):
-    """The same positions to the last bit, and what is computed in one pass is what NumPy's formulas say."""
+    """The same positions and observations to the last bit."""
     walking, other = StickInsect(actions=actions, velocity=0.5), dm.load(0.5, actions=actions, seed=3)
     observed, step = walking.reset(seed=3)[0], other.reset()
     home = other.physics.compiled.home[7:] if actions == "joints" else np.zeros(18)
@@ -128,12 +129,29 @@ def test_it_is_the_environment_of_dm_env_but_for_units(actions):
         step = other.step(home + action * span)
         np.testing.assert_array_equal(walking.data.qpos, other.physics.position())
         assert list(observed) == list(step.observation)
-        for name, values in step.observation.items():
-            np.testing.assert_allclose(observed[name], values, rtol=0, atol=1e-9, err_msg=name)
-        assert reward == pytest.approx(step.reward, abs=1e-12)
+        assert_same(observed, step.observation)
+        assert reward == step.reward
         assert fell == (step.discount == 0.0)
         if fell:
             break
+
+
+@pytest.mark.parametrize("actions", ["joints", "tips"])
+def test_what_is_computed_in_one_pass_is_what_plain_formulas_say(actions):
+    """Of insects that walk, fall and lie, some of whose tips are out of reach."""
+    many = StickInsects(4, actions=actions, velocity=0.5, autoreset_mode="Disabled")
+    many.reset(seed=3)
+    walkers, compiled, task = many._walkers, many._compiled, many.task
+    for action in some_actions(150, 4, size=0.3):
+        observed, reward, fell, *_ = many.step(action)
+        standing = observed["contact"] > 0
+        plain = plain_observations(walkers.places, standing, walkers._planned, compiled, task)
+        assert list(observed) == list(plain)
+        for name, values in plain.items():
+            np.testing.assert_allclose(observed[name], values, rtol=0, atol=1e-9, err_msg=name)
+        walks = walkers._walking | fell
+        np.testing.assert_allclose(reward[walks], plain_rewards(walkers.places, fell, task)[walks], atol=1e-12)
+    assert not walkers._walking.all()
 
 
 def test_no_action_is_home_and_full_ones_are_the_ends_of_the_ranges():
@@ -278,7 +296,7 @@ def test_nonsense_is_refused(options, sentence):
 @pytest.mark.parametrize("walking", [StickInsect(**TIPS), StickInsects(1, **TIPS)], ids=["one", "many"])
 def test_divergence_is_an_error_that_can_be_replayed(walking: Any):
     walking.reset(seed=0)
-    walking._walkers._bodies.qvel[0, 0] = 1e12
+    walking._walkers.bodies.qvel[0, 0] = 1e12
     with pytest.raises(SimulationError, match="diverged while acting") as error:
         for _ in range(5):
             walking.step(np.zeros(walking.action_space.shape))

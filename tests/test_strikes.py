@@ -17,6 +17,7 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
+from hexmj.environments.alone import Alone
 from hexmj.environments.dm import InsectPhysics
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import fine_steps
@@ -165,7 +166,7 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
         one, other = (np.concatenate([x.qpos[x.ids == start][0] for x in walk]) for walk in (fine, usual))
         feet = np.concatenate([x.sensors[x.ids == start][0][:, columns.foot] for x in usual]).reshape(-1, 6, 3)
         depth = measured(settled.conditions, feet, settled.compiled.foot_radius)
-        struck = strikes(depth, m, allowed(settled))
+        struck = strikes(depth[np.newaxis], m, allowed(settled))[0]
         first = np.argmax(struck) // m * m + 1 if struck.any() else len(one)
         assert_array_equal(one[:first], other[:first])
         assert not struck.any() or (one[first] != other[first]).any()
@@ -227,15 +228,15 @@ def test_fine_steps_of_the_environment_last_no_longer():
 
 
 def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
-    physics, roll = thrown(), InsectPhysics._roll
+    physics, roll = thrown(), Alone._roll
     usual = physics.timestep(), physics.model.pair_solref.copy()
 
-    def diverge(self: InsectPhysics, control: np.ndarray) -> Rolled:
+    def diverge(self: Alone, control: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if len(control) > 2:
-            raise PhysicsError("diverged")
+            raise Diverged(0, "diverged", {})
         return roll(self, control)
 
-    monkeypatch.setattr(InsectPhysics, "_roll", diverge)
+    monkeypatch.setattr(Alone, "_roll", diverge)
     with pytest.raises(PhysicsError):
         physics.step(2)
     assert physics.timestep() == usual[0]

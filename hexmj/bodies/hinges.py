@@ -52,7 +52,7 @@ class ThreeHinges(NamedTuple):
             The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
             tip can be reached within the leg's length and the joints' ranges, (..., leg).
         """
-        return over_tips(_solve, tips, self)
+        return over_tips(_solve, tips, tuple(self))
 
     def forward(self, joints: ArrayLike) -> Floats:
         """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
@@ -91,15 +91,16 @@ def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> Thre
 
 @njit(cache=True, nogil=True)
 def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
-    """`ThreeHinges.inverse` for tips shaped (n, leg, axis)."""
+    """`ThreeHinges.inverse` for tips shaped (n, leg, axis); `legs` as a plain tuple, which is handed over faster."""
+    coxa_position, coxas, femurs, tibias, side, joint_range = legs
     joints = np.empty(tips.shape)
     reachable = np.empty(tips.shape[:2], dtype=np.bool_)
     for n in range(tips.shape[0]):
         for leg in range(tips.shape[1]):
-            coxa, a, b = legs.coxa[leg], legs.femur[leg], legs.tibia[leg]
-            forward = tips[n, leg, 0] - legs.coxa_position[leg, 0]
-            outward = legs.side[leg] * (tips[n, leg, 1] - legs.coxa_position[leg, 1])
-            up = tips[n, leg, 2] - legs.coxa_position[leg, 2]
+            coxa, a, b = coxas[leg], femurs[leg], tibias[leg]
+            forward = tips[n, leg, 0] - coxa_position[leg, 0]
+            outward = side[leg] * (tips[n, leg, 1] - coxa_position[leg, 1])
+            up = tips[n, leg, 2] - coxa_position[leg, 2]
             # The triangle of femur a, tibia b and c, from the coxa-trochanter joint to the tip.
             along = math.sqrt(forward * forward + outward * outward) - coxa
             c = math.sqrt(along * along + up * up)
@@ -113,7 +114,7 @@ def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
             within = True
             for j in range(3):
                 joints[n, leg, j] = angles[j]
-                within &= legs.joint_range[leg, j, 0] <= angles[j] <= legs.joint_range[leg, j, 1]
+                within &= joint_range[leg, j, 0] <= angles[j] <= joint_range[leg, j, 1]
             reachable[n, leg] = within
             if not within:
                 joints[n, leg] = math.nan

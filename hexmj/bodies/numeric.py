@@ -69,9 +69,10 @@ class HingeChains(NamedTuple):
 
 def over_tips(solve: Callable[..., Any], tips: ArrayLike, legs: Any) -> tuple[Floats, Bools]:
     """What a compiled inverse says of tips with any leading axes."""
-    tips = np.asarray(tips, dtype=np.float64)
-    joints, reachable = solve(np.ascontiguousarray(tips).reshape(-1, *tips.shape[-2:]), legs)
-    return joints.reshape(*tips.shape[:-1], joints.shape[-1]), reachable.reshape(tips.shape[:-1])
+    tips = np.ascontiguousarray(tips, dtype=np.float64)
+    joints, reachable = solve(tips.reshape(-1, *tips.shape[-2:]), legs)
+    before = tips.shape[:-1]
+    return joints.reshape(*before, joints.shape[-1]), reachable.reshape(before)
 
 
 def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:

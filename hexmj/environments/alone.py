@@ -5,8 +5,7 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.backend import AFTER, STATE, Diverged, Rolled
-from hexmj.physics.fine_steps import FineSteps, Shown, strikes
-from hexmj.timing import Stride
+from hexmj.physics.fine_steps import FineSteps, Shown, allowed_depth, strikes
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that a step goes on from, the time included."""
@@ -18,16 +17,14 @@ class Alone:
     Between two steps the first half of the next is done already, so that places are current.
     """
 
-    def __init__(self, compiled: CompiledBody, stride: Stride) -> None:
-        """At home; it will take a step of the stride at once."""
-        self.model, self.data = compiled.model, mujoco.MjData(compiled.model)
-        model, data = self.model, self.data
+    def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """A body as it is now, in a model and data of its own that others may look at and change."""
+        self.model, self.data, self._compiled, self._allowed = model, data, compiled, allowed_depth(compiled)
         self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
         self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
         self.sensors = data.sensordata[np.newaxis]
         self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
         self._foot, self._feet = compiled.columns.foot, data.sensordata[compiled.columns.foot].reshape(6, 3)
-        self._fine = FineSteps.of(self, compiled.conditions.substeps(stride), compiled)
         self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
 
     def states(self, ids: np.ndarray) -> np.ndarray:
@@ -49,12 +46,12 @@ class Alone:
         mujoco.mj_step1(self.model, self.data)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """See `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
-        before, seen, fine = self.states(ids), self._roll(control[0]), self._fine
-        feet, sensors, force = seen
-        if strikes(fine.depth_of(feet), fine.substeps, fine.allowed).any():
+        """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
+        before, substeps = self.states(ids), control.shape[1]
+        feet, sensors, force = self._roll(control[0])
+        if np.count_nonzero(strikes(self._compiled.depth(feet), substeps, self._allowed)):
             self.put(ids, before)
-            return fine.take(ids, control)
+            return FineSteps.of(self, substeps, self._compiled).take(ids, control)
         return {"sensors": sensors, "force": force}
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
@@ -85,7 +82,7 @@ class Alone:
             sensors[0, k], force[0, k] = sensors_now, force_now
             step1(model, data)
             feet[0, k + 1] = feet_now
-        if self._warned.any():  # what is not finite is seen as the next step begins
+        if np.count_nonzero(self._warned):  # what is not finite is seen as the next step begins
             raise self._diverged(control)
         return feet, sensors, force
 

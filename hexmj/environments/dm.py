@@ -25,42 +25,20 @@ from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
 from hexmj.checks import given, numbers
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, ReadingPlan
-from hexmj.environments.task import (
-    Actions,
-    Seen,
-    Task,
-    action_bounds,
-    action_names,
-    at_the_end,
-    clearance,
-    fallen,
-    margin,
-    observation_bounds,
-    own_observations,
-    rewards,
-    tips,
-    velocity_from_heading,
-)
+from hexmj.controllers.protocol import Controller
+from hexmj.environments.alone import Alone
+from hexmj.environments.passes import ROUNDING, worth
+from hexmj.environments.task import Actions, Task, action_bounds, action_names, drawn, observation_bounds
+from hexmj.environments.walkers import Acted, Walkers
 from hexmj.errors import InputError
-from hexmj.physics.backend import AFTER, Rolled
-from hexmj.physics.fine_steps import FineSteps, Shown
-from hexmj.physics.orders import OrdersFromPlan
-from hexmj.physics.sensing import Senses
-from hexmj.physics.settling import settle
+from hexmj.physics.backend import Diverged
+from hexmj.physics.fine_steps import Shown
 from hexmj.starts import check_draw
 from hexmj.timing import Stride
 
-ROUNDING = 1e-6
-"""Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
-
 ONLY = np.array([0])
 """The index of the only insect."""
-
-_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""All that a step goes on from, the solver's warm start included."""
 
 
 def load(
@@ -93,7 +71,7 @@ def load(
     compiled = compile_body(conditions, conditions.timestep(stride))
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
     physics.compiled = compiled
-    return control.Environment(physics, KINDS[actions](task, seed), n_sub_steps=task.substeps)
+    return control.Environment(physics, Walking(task, seed), n_sub_steps=task.substeps)
 
 
 class InsectPhysics(mujoco.Physics):
@@ -107,6 +85,7 @@ class InsectPhysics(mujoco.Physics):
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
         self._next: list[np.ndarray] = []
+        self._alone: Alone | None = None
 
     def copy(self, share_model: bool = False) -> "InsectPhysics":
         """As planners need it; goes on the same way."""
@@ -133,78 +112,24 @@ class InsectPhysics(mujoco.Physics):
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `fine_steps`."""
         rows = [self.data.ctrl.copy(), *self._next]
-        control = np.array((rows + nstep * rows[-1:])[:nstep])
-        self.shown = FineSteps.of(self, nstep, self.compiled).take(ONLY, control[np.newaxis])
+        targets = np.array((rows + nstep * rows[-1:])[:nstep])
+        try:
+            self.shown = self.alone.take(ONLY, targets[np.newaxis])
+        except Diverged as error:
+            raise control.PhysicsError(f"the simulation diverged: {error.kinds}") from None
         self.set_control(np.array(rows[nstep:] or rows[-1:]))
 
-    def states(self, ids: np.ndarray) -> np.ndarray:
-        """See `backend.Engine.states`."""
-        return self.get_state(_STATE)[np.newaxis]
-
-    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """See `backend.Engine.put`."""
-        self.set_state(states[0], _STATE)
-
-    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int = 1) -> Rolled:
-        """See `backend.Engine.roll`; of the states after each step nothing is kept, since there is one step only."""
-        if parts == 1:
-            return self._roll(control[0])
-        model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
-        model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
-        try:
-            mujoco.mj_step1(model.ptr, self.data.ptr)
-            rolled = self._roll(control[0])
-        finally:
-            model.opt.timestep, model.pair_solref[:] = timestep, usual
-        mujoco.mj_step1(model.ptr, self.data.ptr)
-        return rolled
-
-    def _roll(self, control: np.ndarray) -> Rolled:
-        """One step for each row of the controls, (step, actuator)."""
-        feet, sensors, force = [self._feet()], [], []
-        for now in control:
-            super().set_control(now)
-            super().step()
-            sensors.append(self.data.sensordata.copy())
-            force.append(self.data.actuator_force.copy())
-            feet.append(self._feet())
-        seen = (np.array(values)[np.newaxis] for values in (feet, sensors, force))
-        return Rolled(*seen, after=np.empty((1, len(control), 0)))
-
-    def seen(self) -> Seen:
-        """The insect as it is now, the only one."""
-        data, columns = self.data, self.compiled.columns
-        return Seen(
-            qpos=data.qpos[np.newaxis],
-            qvel=data.qvel[np.newaxis],
-            rotation=data.xmat[self.compiled.root].reshape(1, 3, 3),
-            feet=self._feet()[np.newaxis],
-            centre_of_mass=data.sensordata[np.newaxis, columns.centre_of_mass],
-        )
-
-    def velocity_from_heading(self) -> np.ndarray:
-        """Velocity of the root ahead, to the left and up, (axis,) [mm/s]."""
-        return velocity_from_heading(self.seen())[0]
-
-    def clearance(self) -> np.ndarray:
-        """Height of the trunk's lowest point over the ground [mm]."""
-        return clearance(self.seen(), self.compiled)[0]
-
-    def tips(self) -> np.ndarray:
-        """Tips in the root frame, (leg, axis) [mm]."""
-        return tips(self.seen())[0]
-
-    def margin(self, standing: np.ndarray) -> np.ndarray:
-        """Stability margin on the feet that stand, (leg,), seen from the centre of mass [mm]."""
-        return margin(self.seen(), standing[np.newaxis], self.compiled)[0]
-
-    def _feet(self) -> np.ndarray:
-        return self.data.sensordata[self.compiled.columns.foot].reshape(6, 3).copy()
+    @property
+    def alone(self) -> Alone:
+        """What takes its steps; another one where dm_control has given it other data."""
+        if self._alone is None:
+            self._alone = Alone(self.compiled, self.model.ptr, self.data.ptr)
+        return self._alone
 
 
 @dataclass(eq=False)
 class Walking(control.Task):
-    """Walk straight ahead; subclasses say what an action means.
+    """Walk straight ahead.
 
     Starts are drawn from `_random`, which may be replaced by any of NumPy's generators, as wrappers of dm_control do.
     """
@@ -218,20 +143,13 @@ class Walking(control.Task):
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
-        task, stride = self.task, self.task.stride
-        start = self._random.uniform(stride.pep0, stride.aep0, (1, 6))
-        settled = settle(start, task.conditions, stride, threads=1)
-        mujoco.mj_setState(physics.model.ptr, physics.data.ptr, settled.state[0], AFTER)
-        physics.set_control(settled.ctrl[0])
-        plan = begin(task.controller, start, task.velocity, stride, threads=1)
-        self._orders, self._senses = OrdersFromPlan(settled, plan, task.steps * stride.dt), Senses(settled)
-        self._reading = plan if isinstance(plan, ReadingPlan) else None
-        self._planned_stance, self._out_of_reach = np.ones(6), np.zeros(6)
-        self._fell = False
+        self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
+        self._walkers.begin(ONLY, drawn(self._random, self.task))
+        self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
         """Advance the plan by one step and tell the joints where to go."""
-        spec, action = self.action_spec(physics), numbers("action", action)
+        spec, action = self._spec, numbers("action", action)
         if action.shape != spec.shape:
             raise InputError(f"an action has the shape {action.shape}; expected {spec.shape}")
         within = (action >= spec.minimum - ROUNDING) & (action <= spec.maximum + ROUNDING)
@@ -239,29 +157,14 @@ class Walking(control.Task):
             i = int(np.argmin(within))
             name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
             raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
-        if self._reading:
-            here = physics.position()[np.newaxis], physics.velocity()[np.newaxis]
-            tell(self._reading, self._senses.sensed(ONLY, *here))
-        if orders := self._orders.ahead(ONLY, steps=1, offset=self.tip_offsets(action)):
-            self._planned_stance = orders.plan.stance[0, 0].astype(float)
-            self._out_of_reach = orders.missed[0].sum(axis=0).astype(float)
-            control = orders.control[0]
-            joints = control[:, physics.compiled.columns.ctrl]
-            joints[:] = self.joint_targets(action, joints)
-            physics.set_control(control)
-
-    def tip_offsets(self, action: np.ndarray) -> np.ndarray | None:
-        """What feet do beside the plan, (leg, axis) [mm]."""
-
-    def joint_targets(self, action: np.ndarray, planned: np.ndarray) -> np.ndarray:
-        """What the joints do, from what they would do by the plan and the offsets, (substep, joint) [rad]."""
-        return planned
+        if self._acted.terminated or self._acted.truncated:
+            return
+        self._walkers.look(physics.alone)
+        physics.set_control(self._walkers.control(action[np.newaxis])[0])
 
     def after_step(self, physics: InsectPhysics) -> None:
-        """Note which feet stand, whether the trunk has touched the ground, and whether that ends here."""
-        sensors, force = physics.shown["sensors"], physics.shown["force"]
-        self._senses.feel(ONLY, sensors, force[:, :, physics.compiled.columns.ctrl])
-        self._fell = bool(fallen(sensors, physics.compiled)[0])
+        """Judge the step."""
+        self._acted = self._walkers.judge(physics.shown)
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Bounds of an action; the names of its numbers are joined by tabs."""
@@ -279,42 +182,16 @@ class Walking(control.Task):
 
     def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
         """The observations, in the order of their specs."""
-        own = own_observations(physics.seen(), self._senses.standing(ONLY), physics.compiled)
-        observed = {name: values[0].astype(float) for name, values in own.items()} | {
-            "command": np.array([self.task.command]),
-            "planned_stance": self._planned_stance,
-            "planned_tips": self._orders.tips[0],
-            "out_of_reach": self._out_of_reach,
-        }
-        bounds = observation_bounds(physics.compiled, self.task)
-        return OrderedDict((name, np.clip(observed[name], low, high)) for name, (low, high) in bounds.items())
+        self._walkers.look(physics.alone)
+        return OrderedDict(self._walkers.observer.named(self._walkers.observations()[0]))
 
     def get_reward(self, physics: InsectPhysics) -> float:
         """See `task`."""
-        return float(rewards(physics.seen(), np.array([self._fell]), self.task)[0])
+        here = physics.alone
+        return 0.0 if self._acted.terminated else worth(here.qvel[0], here.rotation[0], self.task.command)
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""
-        if self._fell:
+        if self._acted.terminated:
             return 0.0
-        return 1.0 if at_the_end(physics.seen(), self.task)[0] or not self._orders.steps_ahead() else None
-
-
-class JointTargets(Walking):
-    """An action gives the targets of all joints, held for the step."""
-
-    def joint_targets(self, action: np.ndarray, planned: np.ndarray) -> np.ndarray:
-        """The action itself, throughout."""
-        return action
-
-
-class TipOffsets(Walking):
-    """An action gives offsets to the tips that the controller plans."""
-
-    def tip_offsets(self, action: np.ndarray) -> np.ndarray:
-        """The action itself; a leg whose tip is out of reach keeps its last angles."""
-        return action.reshape(6, 3)
-
-
-KINDS: dict[Actions, type[Walking]] = {"joints": JointTargets, "tips": TipOffsets}
-"""Tasks by what an action means."""
+        return 1.0 if self._acted.truncated else None

@@ -7,6 +7,7 @@ are the ends of the joints' ranges or the largest offsets.
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium import spaces
 
@@ -15,12 +16,15 @@ from hexmj.bodies.loading import compile_body
 from hexmj.checks import numbers, typed
 from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
-from hexmj.environments.task import Task, action_names, observation_bounds
+from hexmj.environments.task import Task, action_names, drawn, observation_bounds
 from hexmj.environments.walkers import Walkers
 from hexmj.errors import InputError
 
 RENDER_MODES = [None, "rgb_array"]
 """How it can be drawn."""
+
+DOUBLE = np.dtype(np.float64)
+"""What actions are computed in; NumPy has one such object, and to ask whether it is that takes no time."""
 
 
 class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
@@ -43,7 +47,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self.metadata = metadata_of(self.task)
         self.observation_space, self.action_space = spaces_of(compiled, self.task)
         self._shape = (len(action_names(compiled, self.task)),)
-        self._body = Alone(compiled, self.task.stride)
+        self._body = Alone(compiled, compiled.model, mujoco.MjData(compiled.model))
         self.model, self.data = self._body.model, self._body.data
         self._walkers = Walkers(self.task, compiled, self._body, self._body.take, count=1, threads=1)
         self._frames = Frames(self.task.conditions)
@@ -80,7 +84,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         raise InputError("an environment can be neither copied nor pickled; expected another gymnasium.make")
 
     def _observation(self) -> dict[str, np.ndarray]:
-        return self._walkers.named(self._walkers.observations()[0])
+        return self._walkers.observer.named(self._walkers.observations()[0])
 
 
 def compiled_for(task: Task) -> CompiledBody:
@@ -101,11 +105,6 @@ def metadata_of(task: Task) -> dict[str, Any]:
     return {"render_modes": RENDER_MODES[1:], "render_fps": fps}
 
 
-def drawn(rng: np.random.Generator, task: Task) -> np.ndarray:
-    """The next start of one insect, (1, leg) [mm]; those of `draw_starts` if the generator has the same seed."""
-    return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))
-
-
 def checked_mode(render_mode: str | None) -> str | None:
     """A way to be drawn.
 
@@ -123,7 +122,7 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         InputError: something else.
     """
-    if not (isinstance(actions, np.ndarray) and actions.dtype == float):
+    if not (isinstance(actions, np.ndarray) and actions.dtype is DOUBLE):
         actions = numbers("action", actions)
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")

@@ -1,7 +1,7 @@
 """Compiled passes over all insects: what actions ask for, what is observed, and what a step was worth.
 
-The formulas of observations and rewards are those of `task`, which dm_env's environment uses as they stand there; for
-one insect a dozen of NumPy's calls take as long as its physics.  A test holds the two against each other.
+For one insect a dozen of NumPy's calls take as long as its physics.  `tests/plain_observations.py` has the same
+formulas as one would write them, and a test holds the two against each other.
 """
 
 from typing import Any
@@ -12,39 +12,40 @@ from numba import njit
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.stability import margins
 
-
-@njit(cache=True, nogil=True)
-def within(actions: Any, ids: Any, most: float) -> bool:
-    """Whether all numbers of some insects' actions, (insect, number), are from -most to most."""
-    for n in ids:
-        for action in actions[n]:
-            if not abs(action) <= most:
-                return False
-    return True
+ROUNDING = 1e-6
+"""Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
 
 
 @njit(cache=True, nogil=True)
-def order(actions: Any, ids: Any, usual: Any, span: Any, ahead: Any, planned: Any, offset: bool) -> tuple[Any, Any]:
-    """What some insects shall do in their next step, and what is planned for it.
+def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
+    """What some insects' actions, (insect, number) from -1 to 1, ask for, (n, number) [rad] or [mm].
+
+    `usual` is what 0 asks for, `span` how far it is from there to the least and to the greatest, (2, number).  Returns
+    also whether all actions are within their bounds.
+    """
+    wanted, within = np.empty((len(ids), actions.shape[1])), True
+    for i, n in enumerate(ids):
+        for j in range(actions.shape[1]):
+            within &= abs(actions[n, j]) <= 1.0 + ROUNDING
+            wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0, j]
+    return wanted, within
+
+
+@njit(cache=True, nogil=True)
+def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
+    """Where the tips of some insects shall be in their next step, (n, substep, leg, axis) [mm].
 
     Args:
-        actions: of all insects, (insect, number) from -1 to 1.
+        wanted: what their actions ask for, (n, number).
         ids: which insects, (n,).
-        usual: what 0 asks for, (number,).
-        span: how far it is from there to the least and to the greatest, each (number,).
         ahead: tips (insect, step, substep, leg, axis) and stance (insect, step, leg) as planned, and the next step of
             these, (insect,), which goes on.
         planned: stance and tips of all insects, which take up what is planned.
         offset: whether actions are offsets to the tips.
-
-    Returns:
-        What actions ask for, (n, number), and where the tips shall be, (n, substep, leg, axis) [mm].
     """
     tips_ahead, stance_ahead, at = ahead
-    wanted, tips = np.empty((len(ids), actions.shape[1])), np.empty((len(ids), tips_ahead.shape[2], 6, 3))
+    tips = np.empty((len(ids), tips_ahead.shape[2], 6, 3))
     for i, n in enumerate(ids):
-        for j in range(actions.shape[1]):
-            wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0][j]
         step = at[n]
         for leg in range(6):
             planned[0][n, leg] = stance_ahead[n, step, leg]
@@ -54,7 +55,7 @@ def order(actions: Any, ids: Any, usual: Any, span: Any, ahead: Any, planned: An
                     tips[i, sub, leg, axis] = tips_ahead[n, step, sub, leg, axis] + beside
                 planned[1][n, leg, axis] = tips_ahead[n, step, tips.shape[1] - 1, leg, axis]
         at[n] = step + 1
-    return wanted, tips
+    return tips
 
 
 @njit(cache=True, nogil=True)
@@ -81,21 +82,21 @@ def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def observe(body: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
+def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
     """Write everything that is observed into `flat`, (n, number), cut off at its bounds.
 
     Args:
-        body: positions, velocities, rotations and sensors, as `task.Seen` and `walkers.Bodies` have them.
+        places: of all insects, `observing.Places`.
         corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
         standing: which feet do, (n, leg).
         planned: stance (n, leg), tips (n, leg, axis), and out of reach (n, leg).
-        bounds: least and most of every number, and the margin that stands for no foot.
-        layout: joints, where feet and centre of mass begin among the sensors, the command.
+        bounds: least and greatest of every number, (2, number).
+        layout: joints, where feet and centre of mass begin among the sensors, the command, and the margin that stands
+            for no foot.
     """
-    qpos, qvel, rotation, sensors = body
+    qpos, qvel, rotation, sensors = places
     stance, tips, missed = planned
-    least, most, no_foot = bounds
-    joints, foot, centre, command = layout
+    joints, foot, centre, command, no_foot = layout
     feet, margin = np.empty((1, 6, 2)), np.empty(1)
     for n in range(len(flat)):
         seen, turn, q, v, s = flat[n], rotation[n], qpos[n], qvel[n], sensors[n]
@@ -148,34 +149,40 @@ def observe(body: Any, corners: Any, standing: Any, planned: Any, bounds: Any, l
         for i in range(at, len(seen)):
             seen[i] = missed[n, i - at]
         for i in range(len(seen)):
-            seen[i] = min(max(seen[i], least[i]), most[i])
+            seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
 
 
 @njit(cache=True, nogil=True)
-def judge(qvel: Any, rotation: Any, ids: Any, sensors: Any, trunk: Any, command: float, reward: Any, fell: Any) -> bool:
-    """Write the rewards of those that have walked, and whether their trunks have touched the ground, both (insect,).
+def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, said: Any) -> bool:
+    """Say of those that have walked a step what it was worth, and whether they fell or their time is over.
 
     Args:
-        qvel: velocities, (insect, velocity).
-        rotation: from root frames to the world, (insect, axis, axis).
+        places: of all insects as they are now, `observing.Places`.
         ids: which have walked, (n,).
-        sensors: over the step, (n, substep, column).
+        sensors: as each substep began, (n, substep, column).
         trunk: first column of contacts of the trunk's parts, and the one after the last.
         command: velocity to walk at [mm/s].
-        reward: of all insects, 0.
-        fell: of all insects, False.
+        time: steps of all insects that are done, (insect,), which go on, and those of an episode.
+        said: reward, 0, whether it fell, False, and whether its time is over, False, each (insect,).
 
     Returns:
-        Whether any fell.
+        Whether any episode is over.
     """
-    any_fell = False
+    (_, qvel, rotation, now), (done, steps), (reward, fell, over), any_over = places, time, said, False
     for i, n in enumerate(ids):
-        for t in range(sensors.shape[1]):
-            for part in range(trunk[0], trunk[1]):
+        done[n] += 1
+        for part in range(trunk[0], trunk[1]):
+            fell[n] |= now[n, part] > 0
+            for t in range(sensors.shape[1]):
                 fell[n] |= sensors[i, t, part] > 0
-        if fell[n]:
-            any_fell = True
-        else:
-            off = abs(qvel[n, 0] - command) / command
-            reward[n] = max(1.0 - off, 0.0) * max(rotation[n, 2, 2], 0.0)
-    return any_fell
+        over[n] = done[n] == steps and not fell[n]
+        if not fell[n]:
+            reward[n] = worth(qvel[n], rotation[n], command)
+        any_over |= fell[n] or over[n]
+    return any_over
+
+
+@njit(cache=True, nogil=True)
+def worth(qvel: Any, rotation: Any, command: float) -> float:
+    """Reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect as it is now."""
+    return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)

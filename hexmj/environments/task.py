@@ -1,4 +1,4 @@
-"""What an episode is, whoever asks for it: actions, observations and rewards as functions of many insects at once.
+"""What an episode is, whoever asks for it: actions, observations, rewards and ends.
 
 The insect shall walk straight ahead at a commanded velocity.  An episode begins at a random start in S, settled as for
 a physical walk.  One step of an environment is one step of the plan, with its substeps.  The controller runs along and
@@ -27,6 +27,8 @@ The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v a
 command c and the upward component u of the body's vertical; it is 0 on a fall.  An episode ends on a fall, when the
 trunk touches the ground (terminated); or after its duration, or where a foot comes to the end of a step, gap or hurdle
 (truncated).
+
+`observing` and `passes` compute all this, for every face the same.
 """
 
 from dataclasses import dataclass, field
@@ -35,7 +37,6 @@ from typing import Literal
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
@@ -43,7 +44,6 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.stability import stability_margin
 from hexmj.timing import Stride, steps_within
 
 Actions = Literal["joints", "tips"]
@@ -103,22 +103,6 @@ class Task:
         return self.velocity * self.conditions.time.vp
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """Some insects as they are now."""
-
-    qpos: np.ndarray
-    """(n, position)."""
-    qvel: np.ndarray
-    """(n, velocity)."""
-    rotation: np.ndarray
-    """From the root frame to the world, (n, axis, axis)."""
-    feet: np.ndarray
-    """In the world, (n, leg, axis) [mm]."""
-    centre_of_mass: np.ndarray
-    """In the world, (n, axis) [mm]."""
-
-
 def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Least and greatest value of every observation, each in its shape, by the observations' names in their order."""
     lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
@@ -161,67 +145,14 @@ def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.nd
     return -most, np.zeros(len(most)), most
 
 
-def own_observations(seen: Seen, standing: np.ndarray, compiled: CompiledBody) -> dict[str, np.ndarray]:
-    """What insects observe of themselves, each (n, ...) in its shape, by name; `standing` says which feet do, (n, leg).
-
-    The plan's observations come on top of it.
-    """
-    columns, qpos, qvel = compiled.columns, seen.qpos, seen.qvel
-    return {
-        "joint_angles": qpos[:, columns.qpos],
-        "joint_velocities": qvel[:, columns.qvel],
-        "orientation": qpos[:, 3:ROOT_QPOS],
-        "velocity": velocity_from_heading(seen),
-        "angular_velocity": qvel[:, 3:ROOT_QVEL],
-        "clearance": clearance(seen, compiled)[:, np.newaxis],
-        "tips": tips(seen),
-        "contact": standing,
-        "margin": margin(seen, standing, compiled)[:, np.newaxis],
-    }
+def at_the_end(feet: np.ndarray, task: Task) -> np.ndarray:
+    """Whether a foot, (..., leg, axis) in the world [mm], has come to the end of the ground that was laid, (...)."""
+    return np.any(beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, feet), axis=-1)
 
 
-def velocity_from_heading(seen: Seen) -> np.ndarray:
-    """Velocity of the root ahead, to the left and up, (n, axis) [mm/s]."""
-    angle = np.arctan2(seen.rotation[:, 1, 0], seen.rotation[:, 0, 0])
-    cosine, sine, x, y = np.cos(angle), np.sin(angle), seen.qvel[:, 0], seen.qvel[:, 1]
-    velocity = seen.qvel[:, :3].copy()
-    velocity[:, 0] = cosine * x + sine * y
-    velocity[:, 1] = cosine * y - sine * x
-    return velocity
-
-
-def clearance(seen: Seen, compiled: CompiledBody) -> np.ndarray:
-    """Height of the trunk's lowest point over the ground, (n,) [mm]."""
-    corners, radii = compiled.trunk_corners
-    above_root = (corners @ seen.rotation[:, 2, :, np.newaxis])[..., 0]
-    return (seen.qpos[:, 2:3] + above_root - radii).min(axis=1)
-
-
-def tips(seen: Seen) -> np.ndarray:
-    """Tips in the root frame, (n, leg, axis) [mm]."""
-    return (seen.feet - seen.qpos[:, np.newaxis, :3]) @ seen.rotation
-
-
-def margin(seen: Seen, standing: np.ndarray, compiled: CompiledBody) -> np.ndarray:
-    """Stability margin on the feet that stand, (n, leg), seen from the centre of mass, (n,) [mm]."""
-    found = stability_margin((seen.feet - seen.centre_of_mass[:, np.newaxis])[:, :, :2], standing, threads=1)
-    return np.maximum(found, compiled.body.lengths.no_foot_margin)
-
-
-def rewards(seen: Seen, fell: np.ndarray, task: Task) -> np.ndarray:
-    """max(0, 1 - |v - c| / c) max(0, u), and 0 on a fall, (n,)."""
-    off = np.abs(seen.qvel[:, 0] - task.command) / task.command
-    return np.maximum(1.0 - off, 0.0) * np.maximum(seen.rotation[:, 2, 2], 0.0) * ~fell
-
-
-def fallen(sensors: np.ndarray, compiled: CompiledBody) -> np.ndarray:
-    """Whether the trunk has touched the ground in any of the substeps, from (n, substep, column) to (n,)."""
-    return np.any(sensors[:, :, compiled.columns.trunk] > 0, axis=(1, 2))
-
-
-def at_the_end(seen: Seen, task: Task) -> np.ndarray:
-    """Whether a foot has come to the end of the ground that was laid, (n,)."""
-    return np.any(beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, seen.feet), axis=1)
+def drawn(rng: np.random.Generator, task: Task) -> np.ndarray:
+    """The next start of one insect, (1, leg) [mm]; those of `draw_starts` if the generator has the same seed."""
+    return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))
 
 
 def _alike(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:

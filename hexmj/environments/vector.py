@@ -14,8 +14,8 @@ from gymnasium.vector.utils import batch_space
 
 from hexmj.checks import typed, whole
 from hexmj.environments.frames import Frames
-from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, drawn, metadata_of, spaces_of
-from hexmj.environments.task import Task, action_names
+from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, metadata_of, spaces_of
+from hexmj.environments.task import Task, action_names, drawn
 from hexmj.environments.walkers import Walkers
 from hexmj.errors import InputError
 from hexmj.physics.backend import MujocoBatch
@@ -145,13 +145,13 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._ended = self._ended & ~which
 
     def _observations(self) -> Observations:
-        return self._walkers.named(self._walkers.observations())
+        return self._walkers.observer.named(self._walkers.observations())
 
     def _final(self, ended: np.ndarray) -> dict[str, Any]:
         """The last observations of those whose episode is over."""
         last, observations, infos = self._walkers.observations(), np.full(self.num_envs, None, dtype=object), {}
         for i in np.flatnonzero(ended).tolist():
-            observations[i] = self._walkers.named(last[i].copy())
+            observations[i] = self._walkers.observer.named(last[i].copy())
             infos = self._add_info(infos, {"final_info": {}}, i)
         return infos | {"final_obs": observations, "_final_obs": ended}
 

@@ -14,15 +14,9 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.controllers.asking import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
-from hexmj.environments.passes import judge, keep, observe, order, within
-from hexmj.environments.task import (
-    Seen,
-    Task,
-    action_bounds,
-    action_names,
-    at_the_end,
-    observation_bounds,
-)
+from hexmj.environments.observing import Observer, Places, Planned
+from hexmj.environments.passes import ROUNDING, judge, keep, order, scaled
+from hexmj.environments.task import Task, action_bounds, action_names, at_the_end
 from hexmj.errors import InputError
 from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
@@ -33,10 +27,6 @@ from hexmj.physics.settling import settle
 
 AHEAD = 128
 """Steps for which a plan that reads nothing is asked at once."""
-
-ROUNDING = 1e-6
-"""Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
-
 
 Take = Callable[[np.ndarray, np.ndarray], Shown]
 """One step of some bodies, (n,), with these controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
@@ -115,9 +105,10 @@ class Walkers:
             count: how many.
             threads: settle them, one per core unless given.
         """
-        self._task, self._compiled, self._bodies, self._threads = task, compiled, bodies, threads
+        self._task, self._compiled, self._threads = task, compiled, threads
         self._take = take
         self._steps, self._substeps = task.steps, task.substeps
+        self._grasps = task.conditions.contact.grasp > 0
         self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
         self._everyone, self._ids = np.arange(count), np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
@@ -127,21 +118,16 @@ class Walkers:
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
         self._ahead = tips, stance, np.zeros(count, dtype=int)  # as planned, and the step of these that comes next
         self._joints = np.empty((count, 6, compiled.joints // 6))
-        self._planned = np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6))  # stance, tips, out of reach
+        self._planned = Planned(np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6)))
         low, self._usual, high = action_bounds(compiled, task)
-        self._span = self._usual - low, high - self._usual
-        bounds = observation_bounds(compiled, task)
-        least, most = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
-        self._bounds = least, most, compiled.body.lengths.no_foot_margin
-        self._body = bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors
-        columns = compiled.columns
-        self._layout = compiled.joints, columns.foot.start, columns.centre_of_mass.start, task.command
-        self._trunk = columns.trunk.start, columns.trunk.stop
-        ends = np.cumsum([least.size for least, _ in bounds.values()]).tolist()
-        self._fields = [
-            (name, slice(end - least.size, end), least.shape if least.ndim > 1 else ())
-            for (name, (least, _)), end in zip(bounds.items(), ends, strict=True)
-        ]
+        self._span = np.array([self._usual - low, high - self._usual])
+        self.observer = Observer(compiled, task)
+        self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
+        self.look(bodies)
+
+    def look(self, bodies: Bodies) -> None:
+        """See where the bodies are, in arrays that go on."""
+        self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
         """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first time of all of them.
@@ -157,7 +143,7 @@ class Walkers:
         group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, ReadingPlan) else None)
         self._together.append(group)
         self._of |= dict.fromkeys(ids.tolist(), group)
-        self._bodies.stand(ids, settled.state, settled.ctrl)
+        self.bodies.stand(ids, settled.state, settled.ctrl)
         if len(ids) == len(self._everyone):
             self._senses = Senses(settled)
         else:
@@ -179,33 +165,47 @@ class Walkers:
         """
         if not self._begun:
             raise InputError("a step before the first reset; expected a reset")
-        ids, task, count = self._ids, self._task, len(self._everyone)
-        reward, fell = np.zeros(count), np.zeros(count, dtype=bool)
+        ids = self._ids
         if len(ids) == 0:
-            return Acted(reward, fell, fell.copy())
-        sensors = self._carry_out(ids, self._control(ids, actions))
-        self._done[ids] += 1
-        any_fell = judge(*self._body[1:3], ids, sensors, self._trunk, task.command, reward, fell)
-        over = (self._done == self._steps) & self._walking
+            return self._nothing()
+        wanted, within = scaled(actions, ids, self._usual, self._span)
+        if not within:
+            raise self._beyond(actions, ids)
+        return self.judge(self._carry_out(ids, self.control(wanted)))
+
+    def control(self, wanted: np.ndarray) -> np.ndarray:
+        """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,
+        (n, number) [rad] or [mm]; a leg that cannot reach its tip keeps its angles."""
+        self._plan_ahead()
+        ids, offset, substeps = self._ids, self._task.actions == "tips", self._substeps
+        tips = order(wanted, ids, self._ahead, self._planned[:2], offset)
+        if offset:
+            joints, reachable = self._compiled.inverse(tips)
+            keep(joints, reachable, ids, self._joints, self._planned.missed)
+            control = joints.reshape(len(ids), substeps, -1)
+        else:
+            control = wanted[:, np.newaxis].repeat(substeps, axis=1)
+        if self._grasps:
+            stance = self._planned.stance[ids, np.newaxis]
+            control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
+        return control
+
+    def judge(self, shown: Shown) -> Acted:
+        """What a step has brought about that those that walk have shown, (n, substep, ...)."""
+        ids, places, acted, sensors = self._ids, tuple(self.places), self._nothing(), shown["sensors"]
+        self._senses.feel(ids, sensors, shown["force"])
+        time, said = (self._done, self._steps), tuple(acted)
+        any_over = judge(places, ids, sensors, self._trunk, self._task.command, time, said)
         if self._ends:
-            over |= at_the_end(self._seen(), task) & self._walking
-        if any_fell or over.any():
-            over &= ~fell
-            self._leave(np.flatnonzero(fell | over))
-        return Acted(reward, fell, over)
+            acted.truncated[ids] |= at_the_end(self._feet(), self._task)[ids] & ~acted.terminated[ids]
+            any_over |= bool(acted.truncated.any())
+        if any_over:
+            self._leave(np.flatnonzero(acted.terminated | acted.truncated))
+        return acted
 
     def observations(self) -> np.ndarray:
-        """Everything observed of all insects, (insect, number); `named` says what it is."""
-        flat, standing = np.empty((len(self._everyone), len(self._bounds[0]))), self._senses.standing(self._everyone)
-        observe(self._body, self._compiled.trunk_corners, standing, self._planned, self._bounds, self._layout, flat)
-        return flat
-
-    def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
-        """What was observed, (..., number), by name and in its shape."""
-        return {
-            name: flat[..., columns].reshape(*flat.shape[:-1], *shape) if shape else flat[..., columns]
-            for name, columns, shape in self._fields
-        }
+        """Everything observed of all insects, (insect, number); `observer.named` says what it is."""
+        return self.observer.observe(self.places, self._senses.standing(self._everyone), self._planned)
 
     def _leave(self, ids: np.ndarray) -> None:
         """The episodes of some insects are over."""
@@ -229,7 +229,7 @@ class Walkers:
     def _plan(self, group: Together) -> None:
         ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
         if group.reading:
-            here = self._bodies.qpos[ids], self._bodies.qvel[ids]
+            here = self.places.qpos[ids], self.places.qvel[ids]
             tell(group.reading, replace(self._senses.sensed(ids, *here), ids=rows.copy()))
             steps = 1
         walk = advanced(group.plan, steps)
@@ -239,38 +239,25 @@ class Walkers:
         stance_ahead[ids, :steps] = walk.stance[:, rows].swapaxes(0, 1)
         at[ids], group.ahead = 0, steps
 
-    def _control(self, ids: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Of some insects for one step, (n, substep, actuator); a leg that cannot reach its tip keeps its angles."""
-        if not within(actions, ids, 1.0 + ROUNDING):
-            row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
-            name = action_names(self._compiled, self._task)[i]
-            raise InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
-        self._plan_ahead()
-        offset, substeps = self._task.actions == "tips", self._substeps
-        wanted, tips = order(actions, ids, self._usual, self._span, self._ahead, self._planned[:2], offset)
-        if offset:
-            joints, reachable = self._compiled.inverse(tips)
-            keep(joints, reachable, ids, self._joints, self._planned[2])
-            control = joints.reshape(len(ids), substeps, -1)
-        else:
-            control = wanted[:, np.newaxis].repeat(substeps, axis=1)
-        if self._task.conditions.contact.grasp:
-            stance = self._planned[0][ids, np.newaxis]
-            control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
-        return control
+    def _nothing(self) -> Acted:
+        """Has come about yet."""
+        count = len(self._everyone)
+        return Acted(np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool))
 
-    def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> np.ndarray:
-        """One step of some insects; what their sensors have shown, (n, substep, column)."""
+    def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> Shown:
+        """One step of some insects."""
         try:
-            shown = self._take(ids, control)
+            return self._take(ids, control)
         except Diverged as error:
             time, conditions = float(self._done[error.start] * self._task.stride.dt), self._task.conditions
             raise walk_error(error, "acting", time, conditions) from None
-        self._senses.feel(ids, shown["sensors"], shown["force"][:, :, self._compiled.columns.ctrl])
-        return shown["sensors"]
 
-    def _seen(self) -> Seen:
-        """All insects as they are now."""
-        columns, sensors = self._compiled.columns, self._bodies.sensors
-        feet, centre = sensors[:, columns.foot].reshape(-1, 6, 3), sensors[:, columns.centre_of_mass]
-        return Seen(self._bodies.qpos, self._bodies.qvel, self._bodies.rotation, feet, centre)
+    def _beyond(self, actions: np.ndarray, ids: np.ndarray) -> InputError:
+        """What is wrong with some insects' actions."""
+        row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
+        name = action_names(self._compiled, self._task)[i]
+        return InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
+
+    def _feet(self) -> np.ndarray:
+        """Of all insects in the world, (insect, leg, axis) [mm]."""
+        return self.places.sensors[:, self._compiled.columns.foot].reshape(-1, 6, 3)

@@ -148,11 +148,10 @@ class Insects:
             shown = self._steps.take(ids, orders.control)
         except Diverged as error:
             raise self._error(error, orders) from None
-        force = shown["force"][:, :, self._columns.ctrl]
         return shown | {
             "qpos": np.concatenate([before, shown["after"][:, :-1, :width]], axis=1),
-            "force": force,
-            "standing": self._senses.feel(ids, shown["sensors"], force),
+            "force": shown["force"][:, :, self._columns.ctrl],
+            "standing": self._senses.feel(ids, shown["sensors"], shown["force"]),
             "targets": orders.tips,
         }
 

@@ -49,8 +49,7 @@ class FineSteps:
     @classmethod
     def of(cls, engine: Engine, substeps: int, compiled: CompiledBody) -> "FineSteps":
         """Of an engine that steps such a body."""
-        allowed = SINK * compiled.conditions.path.standing_height
-        return cls(engine, substeps, compiled.depth, allowed, compiled.columns.touch)
+        return cls(engine, substeps, compiled.depth, allowed_depth(compiled), compiled.columns.touch)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """What some bodies show while they take the substeps of these controls, (n, substep, actuator).
@@ -101,34 +100,30 @@ class FineSteps:
         return shown
 
 
+def allowed_depth(compiled: CompiledBody) -> float:
+    """How deep a foot of a body may be in the ground [mm]."""
+    return SINK * compiled.conditions.path.standing_height
+
+
 def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:
     """Show something else of some rows, from a substep on."""
     for name, values in instead.items():
         shown[name][rows, begin : begin + values.shape[1]] = values
 
 
-def strikes(depth: np.ndarray, substeps: int, allowed: float) -> np.ndarray:
-    """In which physics steps a foot gets too deep, or will be too deep one step later.
+@njit(cache=True, nogil=True)
+def strikes(depth: Any, substeps: int, allowed: float) -> Any:
+    """In which physics steps a foot gets too deep, or will be too deep one step later, (n, step).
 
     The latter is asked only where a step of the plan ends: the next one can be taken again from there, not from
     before, and then it would begin with a foot that is too deep and too fast.
 
     Args:
-        depth: of the feet before the first and after each physics step, (..., 1 + step, leg) [mm]; negative above
-            ground.  It begins where a step of the plan begins.
+        depth: of the feet before the first and after each physics step, (n, 1 + step, leg) [mm]; negative above ground.
+            It begins where a step of the plan begins.
         substeps: physics steps in one of the plan.
         allowed: how deep a foot may be [mm].
-
-    Returns:
-        (..., step)
     """
-    rows = np.ascontiguousarray(depth).reshape(-1, *depth.shape[-2:])
-    return _strikes(rows, substeps, allowed).reshape(*depth.shape[:-2], -1)
-
-
-@njit(cache=True, nogil=True)
-def _strikes(depth: Any, substeps: int, allowed: float) -> Any:
-    """`strikes` of (n, 1 + step, leg)."""
     struck = np.zeros((depth.shape[0], depth.shape[1] - 1), dtype=np.bool_)
     for n in range(struck.shape[0]):
         for step in range(struck.shape[1]):

@@ -65,7 +65,7 @@ class OrdersFromPlan:
         """Steps of the plan in the next chunk, 0 where the walk has ended."""
         return min(steps_in_chunk(self._settled.substeps), self._steps - self._plan.done)
 
-    def ahead(self, ids: np.ndarray, steps: int | None = None, offset: np.ndarray | None = None) -> Orders | None:
+    def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
         """The orders of some starts for the next steps, none where the walk has ended.
 
         A leg whose tip is out of reach keeps its last angles.
@@ -73,14 +73,13 @@ class OrdersFromPlan:
         Args:
             ids: of the starts, (n,).
             steps: of the plan; a chunk unless given.
-            offset: what the feet do beside the plan, (leg, 3) [mm].
         """
         done, m = self._plan.done, self._settled.substeps
         if done == self._steps:
             return None
         plan = advanced(self._plan, steps or self.steps_ahead())
         tips = self._follow(plan, ids)
-        joints, reachable = self._settled.compiled.inverse(tips if offset is None else tips + offset)
+        joints, reachable = self._settled.compiled.inverse(tips)
         for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
             hold(joints[i], self._joints[ids[i]])
         self._joints[ids] = joints[:, -1]

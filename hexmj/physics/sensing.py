@@ -1,5 +1,6 @@
 """What insects feel, substep by substep: which feet stand, what they carry, and what they know for plans that read."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ class Senses:
         """All feet stand."""
         self._compiled = settled.compiled
         self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
-        self._longest_gap = settled.conditions.numerics.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
+        gap = settled.conditions.numerics.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
+        self._longest_gap = math.floor(gap)  # substeps
         self._before = np.ones(settled.starts.shape, dtype=bool)
         self._load, self._torques = settled.load.copy(), settled.torques.copy()
 
@@ -33,11 +35,10 @@ class Senses:
         Args:
             ids: of the starts, (n,).
             sensors: as `backend.Rolled` has them.
-            force: of the joints, (n, substep, joint).
+            force: of the actuators, the joints' first, (n, substep, actuator).
         """
-        touch = sensors[:, :, self._compiled.columns.touch]
-        self._load[ids], self._torques[ids] = touch[:, -1], force[:, -1]
-        return _standing(touch > 0, self._unloaded, ids, self._longest_gap)
+        felt = self._unloaded, self._load, self._torques
+        return _feel(ids, sensors, force, self._compiled.columns.touch.start, self._longest_gap, felt)
 
     def standing(self, ids: np.ndarray) -> np.ndarray:
         """Which feet of some starts stand now, (n, leg)."""
@@ -70,12 +71,16 @@ class Senses:
 
 
 @njit(cache=True, nogil=True)
-def _standing(touches: Any, unloaded: Any, ids: Any, longest_gap: float) -> Any:
-    """Which feet stand, from whether they touch, (n, substep, leg); `unloaded`, (start, leg), counts on."""
-    standing = np.empty(touches.shape, dtype=np.bool_)
+def _feel(ids: Any, sensors: Any, force: Any, touch: int, longest_gap: int, felt: Any) -> Any:
+    """`Senses.feel`; `felt` goes on: substeps without load and load (start, leg), and torques (start, joint)."""
+    unloaded, load, torques = felt
+    standing = np.empty((len(ids), sensors.shape[1], 6), dtype=np.bool_)
     for i, start in enumerate(ids):
-        for t in range(touches.shape[1]):
+        for t in range(sensors.shape[1]):
             for leg in range(6):
-                unloaded[start, leg] = 0 if touches[i, t, leg] else unloaded[start, leg] + 1
+                load[start, leg] = sensors[i, t, touch + leg]
+                unloaded[start, leg] = 0 if load[start, leg] > 0 else unloaded[start, leg] + 1
                 standing[i, t, leg] = unloaded[start, leg] <= longest_gap
+        for joint in range(torques.shape[1]):
+            torques[start, joint] = force[i, -1, joint]
     return standing
