@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from hexmj import LDVS, Stride, draw_starts
+from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
+from hexmj.environments.task import Task
 from hexmj.environments.vector import StickInsects
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import settle
@@ -17,14 +19,17 @@ VELOCITY, STEPS = 0.1, 1000  # nobody falls, so both loops take the same steps
 MANY, FEW_STEPS = 1000, 100
 
 
-@pytest.mark.parametrize("dt", [0.1, 0.5])
-@pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls"])
-def test_one(measure, who, dt):
-    """One walk that goes on; the bare loop plans, observes and measures nothing."""
-    walking = StickInsect(actions="tips", velocity=VELOCITY, stride=Stride(dt=dt), duration=1e5)
+@pytest.mark.parametrize(("actions", "dt"), [("joints", 0.1), ("tips", 0.1), ("tips", 0.5)])
+@pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls", "dm_env's face"])
+def test_one(measure, who, actions, dt):
+    """One insect that goes on, or stands where its joints are told nothing; the bare loop only steps."""
+    task = Task(VELOCITY, actions, stride=Stride(dt=dt), duration=1e5)
+    walking, other = StickInsect(**vars(task)), dm.load(**vars(task))
     controls, data = [], mujoco.MjData(walking.model)
     walking.reset(seed=0)
+    other.reset()
     mujoco.mj_copyData(data, walking.model, walking.data)
+    still = other.physics.compiled.home[7:] if actions == "joints" else np.zeros(18)
     for _ in range(STEPS):
         walking.step(np.zeros(18))
         controls.append(walking.data.ctrl.copy())
@@ -33,14 +38,19 @@ def test_one(measure, who, dt):
         for _ in range(STEPS):
             walking.step(np.zeros(18))
 
+    def dm_env() -> None:
+        for _ in range(STEPS):
+            other.step(still)
+
     def bare() -> None:
-        control, substeps = data.ctrl, walking.task.substeps
+        control, substeps = data.ctrl, task.substeps
         for now in controls:
             control[:] = now
             for _ in range(substeps):
                 mujoco.mj_step(walking.model, data)
 
-    work, what = ours if who == "hexmj" else bare, f"environment, 1 insect, {walking.task.substeps} substeps"
+    work = {"hexmj": ours, "dm_env's face": dm_env}.get(who, bare)
+    what = f"environment, 1 insect, {actions}, {task.substeps} substeps"
     measure(work, what, who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
 
 

@@ -272,6 +272,7 @@ def test_nonsensical_actions_are_refused(walking: Any):
         (np.full(shape, 1.5), "the action's L1_forward = 1.5; expected -1 to 1"),
         (np.full(shape, np.nan), "the action's L1_forward = nan; expected -1 to 1"),
         (np.zeros(3), "an action has the shape"),
+        (np.ma.masked_all(shape), "action = .*; expected numbers"),
         ("go", "action = 'go'; expected numbers"),
     ):
         with pytest.raises(InputError, match=sentence):
@@ -301,6 +302,20 @@ def test_divergence_is_an_error_that_can_be_replayed(walking: Any):
         for _ in range(5):
             walking.step(np.zeros(walking.action_space.shape))
     assert set(error.value.state) >= {"qpos", "qvel", "ctrl", "conditions"}
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_after_a_divergence_a_reset_is_a_new_beginning(mode):
+    task: Any = {**TIPS, "autoreset_mode": mode}
+    walking, other = StickInsects(2, **task), StickInsects(2, **task)
+    walking.reset(seed=0)
+    walking._walkers.bodies.qvel[1, 0] = 1e12
+    with pytest.raises(SimulationError):
+        for _ in range(5):
+            walking.step(np.zeros((2, 18)))
+    assert_same(walking.reset(seed=4)[0], other.reset(seed=4)[0])
+    for action in some_actions(60, 2):
+        assert_same(walking.step(action)[0], other.step(action)[0])
 
 
 @pytest.mark.parametrize("walking", [StickInsect(), StickInsects(2)], ids=["one", "many"])

@@ -1,6 +1,7 @@
 """Feet never sink in: steps in which one strikes the ground are taken finely, and no others."""
 
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
@@ -221,6 +222,24 @@ def test_a_copy_of_the_environments_physics_goes_on_the_same_way(copied, monkeyp
     assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
 
 
+def test_copies_that_share_a_model_go_on_the_same_way_at_once():
+    """As planners step them, each in a thread of its own: a fine step of one is none of another."""
+    physics = thrown()
+    timestep, hardness = physics.timestep(), physics.model.pair_solref.copy()
+    copies = [physics.copy(share_model=True) for _ in range(8)]
+
+    def step(one: InsectPhysics) -> np.ndarray:
+        for _ in range(40):
+            one.step(2)
+        return one.position()
+
+    with ThreadPoolExecutor(8) as pool:
+        ends = list(pool.map(step, copies))
+    assert_array_equal(ends, 8 * [step(physics)])
+    assert physics.timestep() == timestep
+    assert_array_equal(physics.model.pair_solref, hardness)
+
+
 def test_fine_steps_of_the_environment_last_no_longer():
     physics = thrown()
     physics.step(2)
@@ -231,10 +250,10 @@ def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
     physics, roll = thrown(), Alone._roll
     usual = physics.timestep(), physics.model.pair_solref.copy()
 
-    def diverge(self: Alone, control: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def diverge(self: Alone, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if len(control) > 2:
             raise Diverged(0, "diverged", {})
-        return roll(self, control)
+        return roll(self, control, model)
 
     monkeypatch.setattr(Alone, "_roll", diverge)
     with pytest.raises(PhysicsError):

@@ -1,5 +1,7 @@
 """A single body that steps by itself, by MuJoCo's own step: for one insect a batch would only cost time."""
 
+from copy import copy
+
 import mujoco
 import numpy as np
 
@@ -48,7 +50,7 @@ class Alone:
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
         before, substeps = self.states(ids), control.shape[1]
-        feet, sensors, force = self._roll(control[0])
+        feet, sensors, force = self._roll(control[0], self.model)
         if np.count_nonzero(strikes(self._compiled.depth(feet), substeps, self._allowed)):
             self.put(ids, before)
             return FineSteps.of(self, substeps, self._compiled).take(ids, control)
@@ -57,21 +59,19 @@ class Alone:
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `backend.Engine.roll`; no states are kept, since a plan's step is all that is taken at once."""
         if parts == 1:
-            seen = self._roll(control[0])
+            seen = self._roll(control[0], self.model)
         else:
-            model, usual, timestep = self.model, self.model.pair_solref.copy(), self.model.opt.timestep
-            model.opt.timestep, model.pair_solref[:, 0] = timestep / parts, 2 * timestep / parts
-            try:
-                mujoco.mj_step1(model, self.data)
-                seen = self._roll(control[0])
-            finally:
-                model.opt.timestep, model.pair_solref[:] = timestep, usual
-            mujoco.mj_step1(model, self.data)
+            fine = copy(self.model)  # others may step with the model meanwhile
+            fine.opt.timestep = self.model.opt.timestep / parts
+            fine.pair_solref[:, 0] = 2 * fine.opt.timestep
+            mujoco.mj_step1(fine, self.data)
+            seen = self._roll(control[0], fine)
+            mujoco.mj_step1(self.model, self.data)
         return Rolled(*seen, after=np.empty((1, control.shape[1], 0)))
 
-    def _roll(self, control: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""
-        count, model, data, step1, step2 = len(control), self.model, self.data, mujoco.mj_step1, mujoco.mj_step2
+        count, data, step1, step2 = len(control), self.data, mujoco.mj_step1, mujoco.mj_step2
         control_now, feet_now, sensors_now, force_now = self._control, self._feet, self._sensors, self._force
         feet = np.empty((1, count + 1, 6, 3))
         sensors, force = np.empty((1, count, len(sensors_now))), np.empty((1, count, len(force_now)))
@@ -83,13 +83,13 @@ class Alone:
             step1(model, data)
             feet[0, k + 1] = feet_now
         if np.count_nonzero(self._warned):  # what is not finite is seen as the next step begins
-            raise self._diverged(control)
+            raise self._diverged(control, model)
         return feet, sensors, force
 
-    def _diverged(self, control: np.ndarray) -> Diverged:
+    def _diverged(self, control: np.ndarray, model: mujoco.MjModel) -> Diverged:
         """What happened, with the state before and the controls since, (step, actuator)."""
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
-        before, model = mujoco.MjData(self.model), self.model
+        before = mujoco.MjData(model)
         mujoco.mj_setState(model, before, self._before[0], _STATE)
         state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
         now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}

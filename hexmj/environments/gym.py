@@ -122,7 +122,7 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         InputError: something else.
     """
-    if not (isinstance(actions, np.ndarray) and actions.dtype is DOUBLE):
+    if not (type(actions) is np.ndarray and actions.dtype is DOUBLE):
         actions = numbers("action", actions)
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")

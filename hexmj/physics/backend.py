@@ -108,8 +108,9 @@ class MujocoBatch:
     def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
         """Put some bodies where they stand at rest, (n, state), by controls, (n, actuator); their places are current.
 
-        Controls are those of the steps to come, so nothing is kept of these.
+        Controls are those of the steps to come, so nothing is kept of these; of bodies that diverged nothing remains.
         """
+        self._batch.warning[ids] = 0
         self.put(ids, states)
         self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
 
@@ -133,12 +134,14 @@ class MujocoBatch:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
         record = (AFTER, "sensordata", "actuator_force")
-        with stopped_clock(), unlogged():
-            seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
-            self._check(ids, before, control)
-            self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end
-        if parts > 1:
-            self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
+        try:
+            with stopped_clock(), unlogged():
+                seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
+                self._check(ids, before, control)
+                self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end
+        finally:
+            if parts > 1:
+                self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
         return Rolled(places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
