@@ -174,14 +174,6 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
 
-def circular_sd(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Circular standard deviation sqrt(-2 ln R) of phases on [0, 1), R the mean resultant length, as parts of 1."""
-    angle = 2.0 * np.pi * numbers("phase", phase)
-    resultant = np.hypot(np.sin(angle).mean(axis), np.cos(angle).mean(axis))
-    with np.errstate(divide="ignore"):  # opposite phases: R = 0, no deviation is large enough
-        return np.sqrt(-2.0 * np.log(np.minimum(resultant, 1.0))) / (2.0 * np.pi)
-
-
 def wilson_phase(v: ArrayLike) -> np.ndarray:
     """Ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
 
@@ -190,14 +182,6 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
     V / (1 + V) of the period, and by that part the front leg lags behind.
     """
     return 1.0 / (1.0 + numbers("velocity", v))
-
-
-def graham_phase(v: ArrayLike) -> np.ndarray:
-    """Ipsilateral phase of Graham's Gait I: 0.5, the tripod 'for the whole range of velocities', as the paper says.
-
-    Its protraction takes longer in a longer period; the paper gives no numbers for that.
-    """
-    return np.full(np.shape(v), TRIPOD_PHASE)
 
 
 def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName:

@@ -20,10 +20,8 @@ from hexmj.gaits import (
     PAIRS,
     Gait,
     circular_mean,
-    circular_sd,
     classify,
     gait,
-    graham_phase,
     limit_gait,
     wilson_phase,
 )
@@ -193,7 +191,6 @@ def test_reference_gaits():
     assert wilson_phase(0.1) == pytest.approx(0.91, abs=0.002)  # Section 5.3, LDVS at V = 0.1
     assert wilson_phase(1.0) == 0.5  # 'becomes the tripod gait'
     assert (np.diff(wilson_phase(v)) < 0).all()
-    assert np.array_equal(graham_phase(v), np.full(19, 0.5))
 
 
 def test_stability_of_the_limit_regime():
@@ -245,7 +242,7 @@ def test_hard_wired_phases(v, phase, printed):
     assert mean[IPSILATERAL] == pytest.approx(np.full(4, printed), abs=0.015)
     assert mean[CONTRALATERAL] == pytest.approx(np.full(3, 0.5), abs=0.001)
     assert np.ptp(found.periods, axis=1).max() < 0.1
-    assert circular_sd(found.phase, axis=0).max() < 0.005
+    assert circstd(found.phase, high=1.0, axis=0).max() < 0.005
 
 
 @settings(deadline=None)
@@ -253,7 +250,6 @@ def test_hard_wired_phases(v, phase, printed):
 def test_circular_statistics_equal_scipys(seed, centre, width):
     phase = (np.random.default_rng(seed).normal(centre, width, (50, 3))) % 1.0
     assert circle(circular_mean(phase, 0), circmean(phase, high=1.0, axis=0)).max() < 1e-12
-    assert circular_sd(phase, 0) == pytest.approx(circstd(phase, high=1.0, axis=0))
     assert circle(circular_mean(phase), circmean(phase, high=1.0)) < 1e-12
     assert ((circular_mean(phase, 0) >= 0) & (circular_mean(phase, 0) < 1)).all()
 
@@ -261,8 +257,6 @@ def test_circular_statistics_equal_scipys(seed, centre, width):
 def test_circular_statistics_across_zero():
     assert circle(circular_mean([0.95, 0.05]), 0.0) < 1e-12
     assert circular_mean([0.95, 0.05]) < 1.0
-    assert circular_sd([0.25, 0.25, 0.25]) == pytest.approx(0.0, abs=1e-7)
-    assert circular_sd([0.95, 0.05]) == pytest.approx(circular_sd([0.45, 0.55]))
 
 
 @pytest.mark.parametrize(
