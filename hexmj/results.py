@@ -13,7 +13,7 @@ from hexmj import netcdf
 from hexmj.attributes import attributes
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import MARK, read_bytes, remove_leftovers, sealed, try_writing, unsealed, write_whole
+from hexmj.files import read_sealed, remove_leftovers, sealed, try_writing, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,20 +21,19 @@ if TYPE_CHECKING:
 
 
 def load(path: Path | str) -> "xr.Dataset":
-    """Read a result that a command, `save` or its own `to_netcdf` wrote; it is the same as when it was fresh.
-
-    Damage is seen by the seal, which what `to_netcdf` wrote has not: there a bit may be another one in silence.
+    """Read a result that a command or `save` wrote; it is the same as when it was fresh.
 
     Args:
         path: such as "results/compare/comparison.nc".
 
     Raises:
-        InputError: it cannot be read, is damaged, or is no NetCDF.
+        InputError: it cannot be read, is damaged, or was written by another program.
     """
     path = path_of(path)
-    whole = read_bytes(path)
-    content = unsealed(whole) if MARK in whole else whole  # what xarray's own `to_netcdf` wrote has no seal
-    return netcdf.decode(content, f"{path} is damaged, or no NetCDF; expected a result of hexmj")
+    content = read_sealed(path)
+    return netcdf.decode(
+        content, f"{path} is damaged, or no result that hexmj wrote; `xarray.load_dataset` reads what others wrote"
+    )
 
 
 def save(result: "xr.Dataset", path: Path | str) -> Path:
