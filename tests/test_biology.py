@@ -165,6 +165,11 @@ def test_what_makes_no_sense_is_refused(wrong, said):
         Biology(LDVS, **wrong)
 
 
+def test_strides_that_do_not_fit_into_memory_are_refused_before_anybody_walks():
+    with pytest.raises(InputError, match=r"the last strides of 1000000 starts take .* GB; expected at most"):
+        conduct(Biology(LDVS, n_starts=10**6))
+
+
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     words = ("biology", "--starts", 2, "--periods", 4, "--out", tmp_path)
     code, text, _ = run(*words, "--json")
