@@ -144,7 +144,7 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return _fitted(value, one)
         raise TypeError
     if origin in (tuple, Sequence):
-        if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
+        if isinstance(value, list | tuple | range) or getattr(value, "ndim", 0):
             kinds = inner[:1] * len(value) if _is_of_any_length(wanted) else inner
             if len(kinds) == len(value):
                 return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))

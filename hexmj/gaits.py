@@ -191,7 +191,8 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
     'negative metachrony': both between 0 and 0.5, front, middle, hind.
     """
-    along = phase_12, phase_23
+    along = typed("phase_12", phase_12, float), typed("phase_23", phase_23, float)
+    typed("contralateral", contralateral, float)
     if not abs(contralateral - 0.5) <= NEAR:
         return "other"
     if all(abs(phase - TRIPOD_PHASE) <= NEAR for phase in along):

@@ -88,5 +88,6 @@ def checked_list(velocities: Sequence[float], acceleration: Acceleration | None 
     """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
     v = numbers("velocities", velocities)
     if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
-        raise InputError(f"velocities = {velocities}; expected a list of at least one, and none of them twice")
+        given = " ".join(f"{velocities}".split())
+        raise InputError(f"velocities = {given:.80}; expected a list of at least one, and none of them twice")
     return checked_velocities(v, len(v), acceleration)
