@@ -240,7 +240,7 @@ class Walkers:
         at[ids], group.ahead = 0, steps
 
     def _nothing(self) -> Acted:
-        """Has come about yet."""
+        """What a step has brought about before anybody is judged."""
         count = len(self._everyone)
         return Acted(np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool))
 
