@@ -1,4 +1,4 @@
-"""Offsets to LDVS's tips learned by PPO of stable-baselines3 (`pip install "hexmj[rl]"`), so that fewer insects fall.
+"""Offsets to LDVS's tips learned by PPO of stable-baselines3 (`pip install ".[rl]"`), so that fewer insects fall.
 
 The policy is a small network; what was learned is written as numbers, so that it walks without stable-baselines3:
 `hexmj league --controllers examples/train_ppo.py:NETWORK ldvs`.

@@ -40,6 +40,11 @@ class RenderingError(RuntimeError):
     """No video can be rendered on this machine; names the package that brings it."""
 
 
+def without_extra(extra: str, library: str) -> InputError:
+    """What to say where an optional library is not installed, and the extra that brings it."""
+    return InputError(f'{library} is not installed; in a checkout of hexmj: pip install ".[{extra}]"')
+
+
 def is_of_numbas_cache(error: BaseException) -> bool:
     """Whether an error comes from where numba keeps and finds compiled code."""
     return any(frame.filename.endswith("caching.py") for frame in extract_tb(error.__traceback__))

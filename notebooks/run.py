@@ -10,11 +10,15 @@ FOLDER = Path(__file__).parent
 LIMIT = 120
 """Time for a cell [s]."""
 
+QUIETLY = ["--log-level=ERROR"]
+"""For a kernel, which would warn that it is spoken to without encryption, by this machine alone."""
+
 
 def executed(path: Path) -> Any:
     """A notebook with what its cells show, without the times at which they ran."""
     book = nbformat.read(path, as_version=4)
-    NotebookClient(book, timeout=LIMIT, record_timing=False, resources={"metadata": {"path": str(FOLDER)}}).execute()
+    place = {"metadata": {"path": str(FOLDER)}}
+    NotebookClient(book, timeout=LIMIT, record_timing=False, resources=place, extra_arguments=QUIETLY).execute()
     for cell in book.cells:
         cell.metadata.pop("execution", None)
     book.metadata.language_info = {"name": "python"}

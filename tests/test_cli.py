@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import time
@@ -51,6 +53,19 @@ def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
             ["bash", "-c", ask + '; echo "${COMPREPLY[@]}"'], cwd=tmp_path, capture_output=True, text=True, check=True
         )
         assert set(told.stdout.split()) == known
+
+
+def test_fish_completes_by_a_pipe_since_no_argument_may_be_so_long(run, tmp_path):
+    code, script, _ = run("--completion", "fish")
+    assert code == 0
+    assert re.findall(r".*\$python_cmd .*", script) == [
+        '    set -l results (printf "%s\\n" "$pycode" | $python_cmd - $words $current)'
+    ]
+    if fish := shutil.which("fish"):
+        (tmp_path / "hexmj.fish").write_text(script)
+        ask = [fish, "--no-config", "-c", "source hexmj.fish; complete -C 'hexmj ren'"]
+        told = subprocess.run(ask, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert told.stdout.split()[0] == "render"
 
 
 @pytest.mark.parametrize(

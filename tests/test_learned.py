@@ -104,7 +104,7 @@ def test_ppo_trains(example, monkeypatch, capsys):
 def test_without_stable_baselines_it_is_said_what_brings_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
     monkeypatch.delitem(sys.modules, "hexmj.environments.stable_baselines", raising=False)
-    with pytest.raises(hexmj.InputError, match=r'pip install "hexmj\[rl\]"'):
+    with pytest.raises(hexmj.InputError, match=r'pip install "\.\[rl\]"'):
         importlib.import_module("hexmj.environments.stable_baselines")
 
 

@@ -216,10 +216,29 @@ def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     code, _, error = run("view", "--browser", "--port", 0)
     assert code == 2
-    assert 'pip install "hexmj[view]"' in error
+    assert 'pip install ".[view]"' in error
     code, _, error = run("view", "recording.nc", "--velocity", 0.5)
     assert code == 2
     assert "--velocity was given with a recording" in error
+
+
+def test_a_screen_that_is_not_there_is_a_sentence(run, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":4321")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    code, _, error = run("view")
+    sentence = "hexmj: no window can be opened (DISPLAY = :4321); --browser shows it in a browser\n"
+    assert (code, error) == (1, sentence)
+
+
+def test_who_hangs_up_is_no_error(view, caplog):
+    port = view.server.get_port()
+    for sent in (b"", b"GET / HT", b"nonsense\r\n\r\n"):
+        with socket.create_connection(("127.0.0.1", port)) as half_open:
+            half_open.sendall(sent)
+    with urlopen(view.address) as answer:
+        assert answer.status == 200
+    view.server.stop()
+    assert not caplog.records
 
 
 @pytest.mark.slow
@@ -236,8 +255,8 @@ def test_the_command_serves_until_ctrl_c(recorded, tmp_path):
         told = going.stdout.readline()
         while "http://" not in told or "Ctrl-C" not in told:
             told += going.stdout.readline()
-        address = told.partition("http://")[2].partition(";")[0]
-        with urlopen(f"http://{address.strip()}") as answer:
+        address = "http://" + told.partition("http://")[2].split()[0]
+        with urlopen(address) as answer:
             assert b"</html>" in answer.read()
         going.send_signal(signal.SIGINT)
         assert going.wait(30) == 130

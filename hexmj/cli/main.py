@@ -1,6 +1,7 @@
 """The command line: typed options in, one call to the package, tables and files out."""
 
 import os
+import re
 import shlex
 import sys
 from contextlib import nullcontext, redirect_stdout, suppress
@@ -32,6 +33,9 @@ ABOUT = (
     "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice.\n\n"
     "hexmj --version tells the version; hexmj --completion bash (zsh, fish) prints what completes words in a shell."
 )
+
+PIPED = ('$python_cmd -c "$pycode"', 'printf "%s\\n" "$pycode" | $python_cmd -')
+"""How fish asks Python for words, and how it has to: an argument may not be as long as what our options say."""
 
 GOES_ON = "Repeat the command to go on"
 AGAIN = f"\n\n{GOES_ON} with a {{}} that was stopped."
@@ -100,8 +104,8 @@ class _Completion:
     def run(self) -> None:
         with redirect_stdout(StringIO()) as script, suppress(SystemExit):
             options_of(["--tyro-write-completion", self.shell, "-"])
-        for line in script.getvalue().splitlines():  # the shell would take a description's second line for a word
-            print(line.replace(r"\n", " ") if line.startswith("COMPLETION_SPEC") else line)
+        for line in script.getvalue().replace(*PIPED).splitlines():  # the shell would take a description's second line for a word
+            print(re.sub(r"\\+n", " ", line) if line.startswith("COMPLETION_SPEC") else line)
 
 
 def main() -> None:

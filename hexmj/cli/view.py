@@ -10,7 +10,7 @@ from hexmj.cli.tables import show
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 
-GO_ON = "Ctrl-C ends it."
+END = "Ctrl-C ends it."
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class View:
         if on_screen:
             from hexmj.view.desktop import KEYS, view_live
 
-            show(f"{KEYS}; {GO_ON}")
+            show(KEYS, END)
             view_live(session)
         else:
             from hexmj.view.browser import BrowserView
 
             view = BrowserView(session, self.host, self.port)
-            show(f"{controller.name} walks at {view.address}; {GO_ON}")
+            show(f"{controller.name} walks at {view.address}", END)
             view.run()
 
     def _view_recording(self, path: Path, on_screen: bool) -> None:
@@ -83,14 +83,15 @@ class View:
             raise InputError(f"--{name} was given with a recording; expected it only where an insect walks")
         with load_recording(path) as recording:
             if on_screen:
-                from hexmj.view.desktop import view_recording
+                from hexmj.view.desktop import PAUSE, view_recording
                 from hexmj.view.session import ReplaySession
 
+                show(PAUSE, END)
                 view_recording(ReplaySession(Take.of(recording)))
                 return
             text = page_text([recording])
         from hexmj.view.served import page_server
 
         with page_server(text, self.host, self.port) as server:
-            show(f"{path} plays at http://{self.host}:{server.server_port}; {GO_ON}")
+            show(f"{path} plays at http://{self.host}:{server.server_port}", END)
             server.serve_forever(poll_interval=0.1)

@@ -8,16 +8,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+
+from hexmj.errors import without_extra
+
+try:
+    from gymnasium import spaces
+    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
+except ImportError:
+    raise without_extra("rl", "stable-baselines3") from None
 
 from hexmj.environments.learned import FELT, felt_in
 from hexmj.environments.vector import StickInsects
-from hexmj.errors import InputError
-
-try:
-    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
-except ImportError:
-    raise InputError('stable-baselines3 is not installed: pip install "hexmj[rl]"') from None
 
 MOST = 10.0
 """Greatest number that is felt, in usual sizes."""

@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from hexmj.errors import InputError
+from hexmj.errors import InputError, without_extra
 
 PATIENCE = 10.0
 """How long an answer of the scheduler is waited for [s]."""
@@ -28,7 +28,7 @@ def workers_of(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client, KilledWorker
     except ModuleNotFoundError:
-        raise InputError('a scheduler needs the package distributed: pip install "hexmj[dask]"') from None
+        raise without_extra("dask", "distributed, which a scheduler needs,") from None
     with _quiet():
         if not _found(address)["workers"]:
             print(f"hexmj: the scheduler at {address} has no workers yet; cells wait for them", file=sys.stderr)

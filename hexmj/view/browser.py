@@ -1,6 +1,7 @@
 """A live walk in a browser, by viser: the insect, its polygon, sliders, margin and footfall."""
 
 import io
+import logging
 import socket
 from collections import deque
 from collections.abc import Callable
@@ -15,15 +16,13 @@ import numpy as np
 from hexmj.bodies.loading import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.diagrams import spans
-from hexmj.errors import InputError
+from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
 from hexmj.replay.take import support_on_ground
 from hexmj.view.live import LiveWalk, Moment
-from hexmj.view.session import LiveSession, ticks
-
-MISSING = 'the browser view needs viser, which is not installed: pip install "hexmj[view]"'
+from hexmj.view.session import IMPULSE, LiveSession, ticks
 
 CHARTED = 2.0
 """Time that the charts show [s]."""
@@ -40,6 +39,11 @@ RANGES = {
 SWITCHES = ("p2", "p4_i")
 
 MEASURED, PLANNED = "#c8740a", "#1b6ca8"
+
+
+def is_of_walking(record: logging.LogRecord) -> bool:
+    """Whether a complaint of the server is more than that somebody hung up, or asked for what is no page."""
+    return record.msg != "opening handshake failed"
 
 
 def check_port(host: str, port: int) -> None:
@@ -73,9 +77,10 @@ class BrowserView:
         try:
             import viser
         except ImportError:
-            raise InputError(MISSING) from None
+            raise without_extra("view", "viser, which shows a walk in a browser,") from None
         check_port(host, port)
         self.session, self._wishes = session, SimpleQueue[Callable[[], object]]()
+        logging.getLogger("websockets.server").addFilter(is_of_walking)
         with redirect_stdout(io.StringIO()):  # the address is told by who asked for it
             self.server = server = viser.ViserServer(host=host, port=port, label="hexmj", verbose=False)
         self.address = f"http://{host}:{server.get_port()}"
@@ -140,7 +145,7 @@ class BrowserView:
             buttons.on_click(lambda _: self._wish(lambda _: self.session.begin(
                 self.session.start + (buttons.value == "next start"))))  # fmt: skip
         with gui.add_folder("Push"):
-            impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, 20.0)
+            impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, IMPULSE)
             gui.add_button("Push").on_click(lambda _: self._wish(lambda walk: walk.push(float(impulse.value))))
         controller = walk.controller
         if isinstance(controller, Cruse1998) and isinstance(controller.weights, Symmetric):

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
@@ -15,20 +16,25 @@ from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.take import support_on_ground
-from hexmj.view.session import LiveSession, ReplaySession, ticks
+from hexmj.view.session import IMPULSE, LiveSession, ReplaySession, ticks
 
-KEYS = "space pauses, up and down change V, left and right push, enter takes the next start"
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+"""Variables of the environment that name one."""
+
+REMEDY = "--browser shows it in a browser"
+
+PAUSE = "space pauses"
+KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
+
+"""What the keyboard does, while a recording plays and while an insect walks."""
 
 SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
 """Keys as GLFW numbers them."""
 
-IMPULSE = 20.0
-"""Of a push, in multiples of the body's mass times V_p."""
-
 
 def screen() -> bool:
     """Whether there is a screen to open a window on."""
-    return sys.platform != "linux" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.platform != "linux" or any(os.environ.get(name) for name in SCREENS)
 
 
 def view_live(session: LiveSession) -> None:
@@ -80,15 +86,21 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
     Raises:
         RenderingError: no window can be opened.
     """
+    import glfw
     import mujoco.viewer
 
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # GLFW only warns, and MuJoCo would then end the program
+        if not glfw.init():
+            screens = " and ".join(f"{name} = {os.environ[name]}" for name in SCREENS if os.environ.get(name))
+            raise RenderingError(f"no window can be opened ({screens or 'no screen'}); {REMEDY}")
     compiled = compile_body(conditions)
     try:
         window = mujoco.viewer.launch_passive(
             compiled.model, mujoco.MjData(compiled.model), key_callback=on_key, show_left_ui=False, show_right_ui=False
         )
     except RuntimeError as error:  # as on macOS, where only mjpython may open it
-        raise RenderingError(f"no window can be opened ({error}); --browser shows the walk in a browser") from None
+        raise RenderingError(f"no window can be opened ({error}); {REMEDY}") from None
     size = conditions.body.lengths.shortest_leg
     window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, compiled.root
     window.cam.distance, window.cam.azimuth, window.cam.elevation = 5 * size, 60.0, -25.0

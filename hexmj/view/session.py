@@ -17,6 +17,9 @@ HZ = 30.0
 LONGEST = 0.1
 """Most time that is made up for at once [s]; who is slower than that falls behind the time on the wall."""
 
+IMPULSE = 8.0
+"""Of a push, unless another is asked for, in multiples of mass times V_p: it shoves the insect 20 mm aside."""
+
 LIES = 1.5
 """How long a fallen insect lies until it begins at the next start [s]."""
 

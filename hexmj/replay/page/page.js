@@ -358,7 +358,8 @@ function ticks(low, high, count) {
 }
 
 class Chart {
-  constructor(canvas, recording, begin, end) {
+  constructor(canvas, recording) {
+    const { begin, end } = recording;
     Object.assign(this, { canvas, recording, begin, end, left: 42, right: 8, still: document.createElement("canvas") });
   }
 
@@ -380,7 +381,7 @@ class Chart {
       this.drawStill(still.getContext("2d"), theme);
     }
     draw.drawImage(still, 0, 0, canvas.clientWidth, canvas.clientHeight);
-    const x = this.column(seconds), row = this.recording.row(seconds), margin = this.recording.margin[row];
+    const x = this.column(Math.min(Math.max(seconds, this.begin), this.end)), row = this.recording.row(seconds), margin = this.recording.margin[row];
     draw.strokeStyle = draw.fillStyle = theme.css.ink;
     draw.lineWidth = 1.5;
     draw.beginPath();
@@ -534,7 +535,7 @@ function themeNow() {
 const told = (number, digits) => number.toFixed(digits).replace("-", "\u2212");
 
 class Panel {
-  constructor(recording, begin, end, root) {
+  constructor(recording, root) {
     const part = document.getElementById("panel").content.cloneNode(true);
     this.part = (name) => this.root.querySelector(`.${name}`);
     root.append(part);
@@ -547,7 +548,7 @@ class Panel {
     this.part("legend").textContent = recording.physical
       ? "bars: foot off the ground; thin: planned swing. Margin: line measured, dashes planned; hatched: outside the polygon"
       : "bars: planned swing. Margin: dashes planned; hatched: outside the polygon";
-    this.chart = new Chart(this.part("chart"), recording, begin, end);
+    this.chart = new Chart(this.part("chart"), recording);
     const tips = item(recording.tips, 0), centre = item(recording.centre_of_mass, 0);
     this.size = Math.max(...[0, 1, 2, 3, 4, 5].map((leg) => Math.hypot(tips[3 * leg] - centre[0], tips[3 * leg + 1] - centre[1])));
     try { this.scene = new Scene(this.part("world"), recording, 14 * this.size); } catch (error) {
@@ -587,12 +588,12 @@ function main() {
   const root = document.getElementById("panels");
   root.style.setProperty("--panels", recordings.length);
   root.classList.add(`panels-${recordings.length}`);
-  const panels = recordings.map((one) => new Panel(one, begin, end, root));
+  const panels = recordings.map((one) => new Panel(one, root));
   const [play, slider, clock, speeds, views] = ["play", "time", "clock", "speed", "views"].map((id) => document.getElementById(id));
   const state = { seconds: begin, playing: false, speed: 1 / 2, view: { turn: 0, rise: 0, distance: 3.6 }, theme: themeNow(), stale: true };
 
   slider.max = Math.round((end - begin) / step);
-  for (const one of SPEEDS) speeds.add(new Option(one === 1 ? "real time" : `1/${Math.round(1 / one)} of real time`, one, one === 1 / 2, one === 1 / 2));
+  for (const one of SPEEDS) speeds.add(new Option(one === 1 ? "real time" : `1/${Math.round(1 / one)} speed`, one, one === 1 / 2, one === 1 / 2));
   const redraw = () => { state.stale = true; };
   const seek = (seconds) => { state.seconds = Math.min(Math.max(seconds, begin), end); redraw(); };
   const setPlaying = (on) => {
