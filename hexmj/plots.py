@@ -24,7 +24,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "disturb": {"disturb": "studies.disturbance.figure:disturbed_figure"},
     "variants": {"variants": "studies.variants.figure:variants_figure"},
     "biology": {"biology": "studies.biology.figure:biology_figure"},
-    "league": {"league": "studies.league.figure:league_figure"},
+    "league": {"league": "studies.league.figure:league_figure", "walks": "studies.league.figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation.figure:ablation_figure"},
     "recording": {"walk": "replay.footfall:walk_figure"},
 }

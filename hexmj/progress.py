@@ -16,6 +16,9 @@ Progress = Callable[[float], None]
 EVERY = 5.0
 """Time from line to line where there is no bar [s]."""
 
+FIRST = "a first run compiles, for up to a minute"
+"""What is told where nothing is done yet after that time."""
+
 OFTEN = 0.2
 """Least time from one state of a notebook's bar to the next [s]."""
 
@@ -46,10 +49,15 @@ def progress_bar(label: str) -> Iterator[Progress]:
 @contextmanager
 def _in_terminal(label: str) -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, ProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
+    from rich.text import Text
 
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn()
+    class First(ProgressColumn):
+        def render(self, task: Any) -> Text:
+            return Text(FIRST if not task.completed and (task.elapsed or 0.0) >= EVERY else "")
+
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn(), First()
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=1.0)
         yield lambda done: bar.advance(task, done)
@@ -71,7 +79,7 @@ def _in_notebook(label: str) -> Iterator[Progress]:
     def bar(done: float) -> HTML:
         return HTML(f'{escape(label)} <progress max="1" value="{done:.3f}"></progress> {done:.0%}')
 
-    shown: Any = display(bar(0.0), display_id=True)
+    shown: Any = display(HTML(f"{bar(0.0).data} {FIRST}"), display_id=True)
     sofar, drawn = 0.0, monotonic()
 
     def told(done: float) -> None:
@@ -95,9 +103,11 @@ def _in_lines(label: str) -> Iterator[Progress]:
         sofar += done
 
     def tell() -> None:
+        nothing = f"; {FIRST}"
         while not over.wait(EVERY):
             gone = monotonic() - begun
-            left = f", about {max(gone / sofar - gone, 0.0):.0f} s to go" if sofar > 0 else ""
+            left = f", about {max(gone / sofar - gone, 0.0):.0f} s to go" if sofar > 0 else nothing
+            nothing = ""
             with suppress(OSError, ValueError, AttributeError):  # closed, or nobody listens any more
                 print(f"{literal(label)}: {sofar:.0%} in {gone:.0f} s{left}", file=sys.stderr, flush=True)
 

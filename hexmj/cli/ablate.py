@@ -1,6 +1,6 @@
 """`hexmj ablate`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from tyro.conf import OmitArgPrefixes, arg
 
+from hexmj.attributes import settings
 from hexmj.cli.options import STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import new_table
+from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
 from hexmj.studies.ablation import study
 from hexmj.studies.league.study import FRESH
@@ -37,8 +38,8 @@ class Ablate(StudyCommand):
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
     starts: int = study.Ablation.n_starts
     """Number of random starts on paper, the same for all."""
-    physical_starts: int = study.Ablation.n_physical
-    """Of these, number of starts that walk in physics."""
+    physical_starts: int | None = None
+    """Of these, number of starts that walk in physics; 100 unless given, at most all."""
     out: Path = Path("results/ablate")
     """Folder for figure, NetCDF, manifest and finished walks."""
     walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: hiding(_Walks(seed=FRESH), ["window"]))
@@ -50,13 +51,14 @@ class Ablate(StudyCommand):
     def study(self) -> study.Ablation:
         """See `StudyCommand.study`."""
         check_distinct("models", self.models)
-        models = {name: study.switched(name) for name in self.models}
+        models = study.wholes(self.models)
+        usual = min(study.Ablation.n_physical, max(1, self.starts))
         self.refuse_contact_gap(*(one for several in models.values() for one in several.values()))
         return study.Ablation(
             models,
             self.velocities,
             self.starts,
-            self.physical_starts,
+            usual if self.physical_starts is None else self.physical_starts,
             seed=self.walks.seed,
             conditions=self.conditions,
             stride=self.walks.stride,
@@ -76,16 +78,18 @@ class Ablate(StudyCommand):
         """A table for each measure, and the conditions."""
         for measure, title in study.MEASURES.items():
             yield f"{measure}: {title}; frequency, and how far it is above the whole's (* for sure)"
-            yield _table(result.sel(measure=measure))
+            yield from _tables(result.sel(measure=measure))
+        yield from (f"{words}: {', '.join(names)}" for words, names in settings(result)["not_printed"].items())
         yield self.conditions_line()
 
 
-def _table(one: "xr.Dataset") -> "Table":
+def _tables(one: "xr.Dataset") -> "Iterator[Table]":
     """A row for each controller, a column for each velocity."""
-    table = new_table("controller", *(f"V = {v:g}" for v in one.velocity.values))
-    for name in one.controller.values:
-        table.add_row(name, *(_cell(one.sel(controller=name, velocity=v)) for v in one.velocity.values))
-    return table
+    velocities = one.velocity.values
+    rows = [
+        (name, *(_cell(one.sel(controller=name, velocity=v)) for v in velocities)) for name in one.controller.values
+    ]
+    return tables_that_fit(("controller", *(f"V = {v:g}" for v in velocities)), rows)
 
 
 def _cell(one: "xr.Dataset") -> str:

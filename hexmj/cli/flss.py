@@ -70,7 +70,7 @@ class Flss(WalkingCommand):
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
         how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.sweepers.threads_each}
-        with progress_bar(f"{self.kind} FLSS") as progress, self.sweepers.executor() as executor:
+        with self.sweepers.executor() as executor, progress_bar(f"{self.kind} FLSS") as progress:
             how |= {"folder": self.out and self.out / FINISHED, "executor": executor, "progress": progress}
             if self.physical:
                 from hexmj.measures.compare import physical_flss

@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, arg
 from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import new_table
+from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
 from hexmj.literal import literal
@@ -50,9 +50,9 @@ class League(StudyCommand):
     starts: int | None = None
     """Number of random starts on paper, the same for all; 1000 unless given, 200 if quick."""
     physical_starts: int | None = None
-    """Of these, number of starts that walk in physics at every velocity; 200 unless given, 8 if quick."""
+    """Of these, number of starts that walk in physics at every velocity; 200 unless given, 8 if quick, at most all."""
     trial_starts: int | None = None
-    """Number of starts in each trial; 50 unless given, 4 if quick."""
+    """Of these, number of starts in each trial; 50 unless given, 4 if quick, at most all."""
     trial_velocity: float = study.League.tried_at
     """V_r of the trials."""
     quick: bool = False
@@ -83,6 +83,10 @@ class League(StudyCommand):
             "n_tried": self.trial_starts,
         }
         sizes = (QUICK if self.quick else {}) | {name: size for name, size in asked.items() if size is not None}
+        there = max(1, sizes.get("n_starts", study.League.n_starts))
+        for part in ("n_physical", "n_tried"):
+            if asked[part] is None:
+                sizes[part] = min(sizes.get(part, getattr(study.League, part)), there)
         return study.League(
             entrants(self.names),
             **sizes,
@@ -95,10 +99,11 @@ class League(StudyCommand):
 
     def outputs(self) -> Outputs:
         """See `StudyCommand.outputs`."""
-        from hexmj.studies.league.figure import league_figure
+        from hexmj.studies.league.figure import league_figure, walks_figure
 
+        figures = {"league.png": league_figure, "league_walks.png": walks_figure}
         others = (TABLE,) if self.no_video else (TABLE, FILM)
-        return Outputs("walking the league", "league.nc", {"league.png": league_figure}, others=others)
+        return Outputs("walking the league", "league.nc", figures, others=others)
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """All frequencies, costs and ranks."""
@@ -109,11 +114,8 @@ class League(StudyCommand):
         from hexmj.studies.league.table import tables
 
         for one in tables(result):
-            table = new_table(*one.head)
-            for row in one.rows:
-                table.add_row(*row)
             yield one.title
-            yield table
+            yield from tables_that_fit(one.head, one.rows)
         yield self.conditions_line()
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:

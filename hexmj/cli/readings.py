@@ -60,7 +60,7 @@ class Readings:
         if not 1 <= best <= len(readings):
             raise InputError(f"--best = {best}; expected 1 to {len(readings)}, the number of readings")
         out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
-        with progress_bar("reading") as progress, self.sweepers.executor() as executor:
+        with self.sweepers.executor() as executor, progress_bar("reading") as progress:
             how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads}
             scores = compare_readings(readings, best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
         files = [

@@ -41,7 +41,7 @@ class Reproduce:
             raise InputError("--only without keys; expected at least one, or no --only for all")
         results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
-        with progress_bar("reproducing") as progress, self.sweepers.executor() as executor:
+        with self.sweepers.executor() as executor, progress_bar("reproducing") as progress:
             rows, files = reproduce(
                 self.out,
                 protocol,

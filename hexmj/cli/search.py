@@ -110,6 +110,7 @@ class Search(WalkingCommand):
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
+            told |= {"minimised": problem.minimised, "lost": found.lost, "starts": found.starts}
             told |= {"refused": len(found.refused)}
             told |= {"verdict": _judged(verdict), "settings": settings, "files": files}
             vector = dict(zip(problem.form.names, found.vector.tolist(), strict=True))
@@ -209,6 +210,7 @@ class Search(WalkingCommand):
         low, high = self._range
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
         at += f", {self.over} of all variants" if self.over != "usual" else ""
+        at += ", later losses first among equals" if self.ties == "later" else ""
         method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
         return literal(f"{self.form}, {self._kind} FLSS at {at}, {method}")
 
@@ -237,6 +239,13 @@ class Search(WalkingCommand):
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
         return "\n".join(lines) + "\n"
 
+    def _counted(self, problem: "Problem", found: "Found") -> str:
+        """What the least cost is where it is no FLSS, and how many starts were lost at it."""
+        if self.ties == "equal":
+            return ""
+        lost = "" if found.lost is None else f", at which {found.lost} of {found.starts} starts were lost"
+        return f" ({problem.minimised}{lost})"
+
     def _show(
         self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
     ) -> None:
@@ -259,7 +268,7 @@ class Search(WalkingCommand):
             f"{over}{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
             judged,
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
-            f" least cost {found.cost:.4g}{refused}",
+            f" least cost {found.cost:.4g}{self._counted(problem, found)}{refused}",
             self.conditions_line(self.physical),
             *map(str, files),
         )

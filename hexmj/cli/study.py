@@ -71,7 +71,7 @@ class StudyCommand(WalkingCommand):
         study, outputs = self.study(), self.outputs()
         figures = {self.drawn.named(name): draw for name, draw in outputs.figures.items()}
         folder = results_folder(self.out, [outputs.data, *figures, outputs.manifest, *outputs.others])
-        with progress_bar(outputs.doing) as progress, self.sweepers.executor() as executor:
+        with self.sweepers.executor() as executor, progress_bar(outputs.doing) as progress:
             how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
             result = conduct(study, folder / "walks", **how)
         files = [

@@ -1,5 +1,6 @@
 """Tables, lines and JSON that the commands print, and the small files they write."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,6 +55,31 @@ def new_table(*columns: str) -> "Table":
     for column in columns:
         table.add_column(column.replace("_", " "), overflow="fold")
     return table
+
+
+def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iterator[Table]":
+    """A table as one or several below each other, each with the first column and as many others as the screen is wide.
+
+    Args:
+        head: of the columns.
+        rows: cells as texts; no cell is broken, unless it is wider than the screen.
+    """
+    from rich.console import Console
+
+    wide = Console().width
+    widths = [max(map(len, column)) + 2 for column in zip(head, *rows, strict=True)]
+    parts, used = [[0]], widths[0]
+    for column, width in enumerate(widths[1:], 1):
+        if used + width > wide and len(parts[-1]) > 1:
+            parts.append([0])
+            used = widths[0]
+        parts[-1].append(column)
+        used += width
+    for part in parts:
+        table = new_table(*(head[column] for column in part))
+        for row in rows:
+            table.add_row(*(row[column] for column in part))
+        yield table
 
 
 def show(*parts: Any) -> None:

@@ -47,8 +47,8 @@ def shell(words: Sequence[str]) -> str:
         InputError: it is not one of those that are known.
     """
     if len(words) != 1 or words[0] not in SHELLS:
-        given = " ".join(words) or "nothing"
-        raise InputError(f"--completion was given {literal(given)!r:.80}; expected one of {', '.join(SHELLS)}")
+        given = f"was given {literal(' '.join(words))!r:.80}" if words else "stands alone"
+        raise InputError(f"--completion {given}; expected one of {', '.join(SHELLS)}")
     return words[0]
 
 

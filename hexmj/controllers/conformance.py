@@ -282,7 +282,7 @@ FIRST = ("begin", "steps", "begun again", "divided")
 
 def _sliding(trials: list[Trial]) -> str:
     """How far standing tips are from receding at V_r, as tips do whose feet stay where they are on the ground."""
-    found, worst = "standing tips recede at V_r", 1e-6
+    found, worst = "feet that stand stay where they are on the ground: their tips recede at V_r", 1e-6
     for trial in trials:
         walk, dt = trial.walk, trial.stride.dt
         ahead, aside = np.diff(walk.x, axis=0) / dt + walk.velocity[1:, :, None], np.diff(walk.y, axis=0) / dt
@@ -290,7 +290,11 @@ def _sliding(trials: list[Trial]) -> str:
         if slides.max() > worst:
             worst, (step, start, leg) = slides.max(), np.argwhere(slides == slides.max())[0]
             where = place(walk, (step + 1, start, leg))
-            found = f"feet slide: standing tips are up to {worst:.2g} V_p from V_r straight back, in {where}"
+            found = (
+                "feet that stand would slide: on the ground a standing foot stays where it is while the body walks on,"
+                f" so its tip should move straight back at V_r, but one is off by {worst:.2g} V_p, in {where}; on paper"
+                " this costs nothing, in physics the feet scrape"
+            )
     return found
 
 

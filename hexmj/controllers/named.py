@@ -27,6 +27,9 @@ ENTRY_POINTS = "hexmj.controllers"
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
 
+PART = re.compile(r"(-(without|with)-\d)+$")
+"""The end of such names."""
+
 
 def load_controller(name: str) -> Controller:
     """A controller by its name.
@@ -76,7 +79,9 @@ def _varied(name: str, how: str, which: int) -> Controller:
     found: Any = load_controller(name)
     change = getattr(found, "without" if how == "without" else "having", None)
     if change is None:
-        raise InputError(f"controller {name}-{how}-{which}: {name} has no mechanisms or rules that can be switched")
+        whole = f"controller {name}-{how}-{which}: {name} has no mechanisms or rules that can be switched"
+        off = f" on; expected {name}-without-{which}" if hasattr(found, "without") else ""
+        raise InputError(whole + off)
     return change(which)
 
 

@@ -1,6 +1,7 @@
 """What a figure's title tells of a result: who walked, from how many starts, how long, under which conditions."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from hexmj.attributes import settings
@@ -50,9 +51,24 @@ def caption(result: "xr.Dataset") -> str:
 
 
 def controllers(told: dict[str, Any]) -> str:
-    """The names of a result's controllers as they stand in figures, with what is not as printed in 1998; few only."""
+    """The names of a result's controllers as they stand in figures, with what is not as printed in 1998; of many
+    controllers that alone."""
     several = told.get("controllers", {})
-    return ", ".join(f"{in_figure(name)}{_rules(one)}" for name, one in several.items()) if len(several) <= FEW else ""
+    if len(several) > FEW:
+        found = told.get("not_printed", not_printed(told))
+        return "; ".join(f"{words}: {', '.join(map(in_figure, names))}" for words, names in found.items())
+    return ", ".join(
+        in_figure(name) + (f" ({words})" if (words := rules(one)) else "") for name, one in several.items()
+    )
+
+
+def not_printed(told: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Sets of the network that do not plan as printed in 1998: the words of their order and reading -> their names."""
+    found: dict[str, list[str]] = {}
+    for name, one in told.get("controllers", {}).items():
+        if words := rules(one):
+            found.setdefault(words, []).append(name)
+    return found
 
 
 def conditions(told: dict[str, Any]) -> str:
@@ -73,17 +89,18 @@ def _walks(told: dict[str, Any]) -> list[str]:
     return found
 
 
-def _rules(controller: Any) -> str:
-    """Order of updates and reading of a set of the network, where they are not as printed."""
+def rules(controller: Any) -> str:
+    """Order of updates and reading of a set of the network, of its settings, where they are not as printed."""
     if not isinstance(controller, Mapping):
         return ""
     if "controller" in controller:
-        return _rules(controller["controller"])
-    reading = controller.get("reading")
-    found = [f"{controller['order']} order"] if controller.get("order", "printed") != "printed" else []
-    if isinstance(reading, Mapping):
-        from hexmj.controllers.cruse1998.readings import Reading, in_words
+        return rules(controller["controller"])
+    from hexmj.controllers.cruse1998.readings import Reading, in_words
 
-        chosen = Reading(**{name: value for name, value in reading.items() if name != "class"})
-        found += [f"reading {in_words(chosen)}"] if chosen != Reading() else []
-    return f" ({', '.join(found)})" if found else ""
+    choices, reading = {one.name for one in fields(Reading)}, controller.get("reading")
+    if "order" not in controller or not isinstance(reading, Mapping) or not choices <= reading.keys():
+        return ""  # such as Walknet, which is read in another way
+    found = [f"{controller['order']} order"] if controller["order"] != "printed" else []
+    chosen = Reading(**{name: reading[name] for name in choices})
+    found += [f"reading {in_words(chosen)}"] if chosen != Reading() else []
+    return ", ".join(found)

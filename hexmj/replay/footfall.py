@@ -1,10 +1,11 @@
-"""A recording as a figure: which feet stand, and the stability margin."""
+"""A recording as a figure: which feet are off the ground, as in films, and the stability margin."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexmj.diagrams import spans
+from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.literal import in_figure
 from hexmj.measures.figures import MEASURE_COLOURS
@@ -16,27 +17,38 @@ if TYPE_CHECKING:
 
 
 def walk_figure(recording: "xr.Dataset") -> "Picture":
-    """Footfall diagram (bars are protraction) and stability margin over time, from a recording."""
+    """Footfall diagram and stability margin over time, from a recording.
+
+    The bars are those of its film: a foot off the ground, or a protraction where a puppet shows the plan.
+    """
     from hexmj.pictures import picture
 
+    if not recording.sizes["step"]:
+        raise InputError(f"the recording {recording.attrs['title']!r} holds no steps; expected at least one")
     figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time = recording.time.values
     physical = "measured_stance" in recording
+    planned = recording.planned_stance.values
+    stance = recording.measured_stance.values if physical else planned
+    shown = np.isfinite(recording.qpos.values).all(axis=1)  # not after a fall
     for row, leg in enumerate(LEGS):
-        footfall.broken_barh(spans(time, ~recording.planned_stance.values[:, row]), (row - 0.38, 0.76), color="0.15")
+        off = spans(time, ~stance[:, row] & shown)
+        footfall.broken_barh(off, (row - 0.38, 0.56 if physical else 0.76), color="0.15")
         if physical:
-            off = ~recording.measured_stance.values[:, row] & np.isfinite(recording.measured_x.values[:, row])
-            footfall.broken_barh(spans(time, off), (row + 0.2, 0.18), color=MEASURE_COLOURS["measured"])
+            swings = spans(time, ~planned[:, row])
+            footfall.broken_barh(swings, (row + 0.2, 0.18), color=MEASURE_COLOURS["kinematic"])
         footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
     footfall.set(ylim=(5.6, -0.6), yticks=[], title=in_figure(recording.attrs["title"]))
-    legend = "black: protraction" + (", orange: foot off the ground" if physical else "")
+    legend = "black: foot off ground, blue: planned protraction" if physical else "bars: protraction"
     footfall.set_xlabel(legend, fontsize=8)
     margin.axhline(0.0, color="0.6", linewidth=0.8)
-    margin.plot(time, recording.planned_margin, color=MEASURE_COLOURS["kinematic"], linewidth=1.2, label="planned")
+    mark = {"marker": "o", "markersize": 3} if len(time) == 1 else {}  # a line through one point is none
+    blue = {"color": MEASURE_COLOURS["kinematic"], "linewidth": 1.2, "label": "planned"}
+    margin.plot(time, recording.planned_margin, **blue, **mark)
     if physical:
         measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
-        margin.plot(time, measured, color=MEASURE_COLOURS["measured"], linewidth=1.0, label="measured")
+        margin.plot(time, measured, color="0.15", linewidth=1.0, label="measured", **mark)
         if np.isfinite(fall := float(recording.fall_time)):
             margin.axvline(fall, color=MEASURE_COLOURS["physical"], linewidth=1.4, label="trunk on the ground")
     margin.set(xlabel="time [time units]", ylabel="stability margin [mm]", xlim=(0.0, time[-1]))

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
     from hexmj.pictures import Picture
 
+FREQUENCY = "FLSS"
+"""What a cost is, unless something else is minimised."""
+
 STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 
@@ -26,10 +29,12 @@ def convergence_figure(history: "xr.Dataset", title: str) -> "Picture":
         if here.any():
             axes.plot(evaluation[here], history.cost.values[here], ".", color=colour, markersize=2.5, alpha=0.35)
             axes.plot(evaluation[here], history.best.values[here], color=colour, linewidth=1.8, label=stage)
-    axes.set(xlabel="evaluations of the cost function", ylabel="FLSS on the starts of the stage", ylim=(-0.02, 1.02))
+    cost = history.cost.attrs["long_name"]
+    of = "cost" if cost != FREQUENCY else cost
+    axes.set(xlabel="evaluations of the cost function", ylabel=f"{of} on the starts of the stage", ylim=(-0.02, 1.02))
     axes.set_title(in_figure(title), fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
-    title = "lines: least so far, dots: candidates"
+    title = "lines: least so far, dots: candidates" + (f"\ncost: {cost}" if cost != FREQUENCY else "")
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=title, title_fontsize=8)
     return figure

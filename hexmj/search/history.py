@@ -21,11 +21,12 @@ class History:
         """Candidates of a stage, (candidate, parameter), and their costs, (candidate,)."""
         self._asked.append((stage, candidates.copy(), costs.copy()))
 
-    def dataset(self, names: Sequence[str]) -> "xr.Dataset":
+    def dataset(self, names: Sequence[str], minimised: str) -> "xr.Dataset":
         """Over `evaluation`: stage, candidate, cost, and the best cost so far, which begins anew with each stage.
 
         Args:
             names: of the parameters.
+            minimised: what a cost is, in words.
         """
         import xarray as xr
 
@@ -40,8 +41,8 @@ class History:
             {
                 "stage": ("evaluation", stage, flags),
                 "candidate": (("evaluation", "parameter"), candidates, {"long_name": "parameters"}),
-                "cost": ("evaluation", cost, {"units": "1", "long_name": "cost function G"}),
-                "best": ("evaluation", best, {"units": "1", "long_name": "least cost so far of the stage"}),
+                "cost": ("evaluation", cost, {"units": "1", "long_name": minimised}),
+                "best": ("evaluation", best, {"units": "1", "long_name": f"least so far of the stage: {minimised}"}),
             },
             coords={"parameter": list(names)},
         )

@@ -125,6 +125,17 @@ class Problem:
         planning = self.form.controller(vector)
         return ReadsLegs(planning) if self.feedback else planning
 
+    @property
+    def minimised(self) -> str:
+        """What a cost is, in words: a frequency only where ties are none."""
+        if self.ties == "equal":
+            cost = "FLSS"
+        else:
+            cost = f"(starts {'that fell' if self.conditions else 'lost'} + mean part of the time lost) / (starts + 1)"
+        return {"usual": cost, "mean": f"mean over variants of {cost}", "worst": f"greatest {cost} of all variants"}[
+            self.over
+        ]
+
     def refusal(self, vector: np.ndarray) -> str:
         """Why its controller refuses a candidate, (parameter,); nothing where it does not."""
         try:
@@ -222,6 +233,14 @@ class Sample:
         if self.problem.ties == "equal":
             return lost / self.n_starts
         return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
+
+    def lost(self, cost: float) -> int | None:
+        """How many of the starts were lost, or fell, at a cost; unknown of a mean over variants."""
+        if self.problem.over == "mean":
+            return None
+        if self.problem.ties == "equal":
+            return round(cost * self.n_starts)
+        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
 
     def check_reach(self, vector: np.ndarray, threads: int | None = None) -> None:
         """Refuse a candidate, (parameter,), whose tips no leg reaches in physics.

@@ -91,7 +91,11 @@ class Found:
     vector: np.ndarray
     """(parameter,) the best candidate of the last stage."""
     cost: float
-    """Its cost on the starts of that stage."""
+    """Its cost on the starts of that stage, see `Problem.minimised`."""
+    lost: int | None
+    """How many of these starts were lost, or fell; unknown of a mean over variants."""
+    starts: int
+    """Number of these starts."""
     history: "xr.Dataset"
     """Every candidate and cost, see `History.dataset`."""
     replayed: int
@@ -155,7 +159,7 @@ def _search(
     best, cost = run(searcher, partial(costs, "population"), effort.budget)
     if effort.refine_budget:
         best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
-    asked = history.dataset(problem.form.names)
+    asked = history.dataset(problem.form.names, problem.minimised)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     replayed = sum(one.replayed for one in kept.values())
     refused = list(filter(None, map(problem.refusal, asked.candidate.values)))
@@ -163,9 +167,11 @@ def _search(
         raise InputError(
             f"{len(refused)} of {asked.sizes['evaluation']} candidates were refused, the best one by: {why}"
         )
+    last = [*samples.values()][-1]
     if cost >= REFUSED:
-        [*samples.values()][-1].check_reach(best, threads)
-    return Found(best, cost, asked.assign_attrs(settings=settings, refused=len(refused)), replayed, refused)
+        last.check_reach(best, threads)
+    told = asked.assign_attrs(settings=settings, refused=len(refused))
+    return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
 
 
 def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:

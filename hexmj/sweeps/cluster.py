@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from hexmj.errors import InputError, without_extra
+from hexmj.literal import literal
 
 PATIENCE = 10.0
 """How long an answer of the scheduler is waited for [s]."""
@@ -25,6 +26,7 @@ def workers_of(address: str) -> Iterator[Executor]:
     Raises:
         InputError: Dask is not installed, the scheduler cannot be reached, or a cell killed its workers.
     """
+    print(f"hexmj: connecting to the scheduler at {literal(address)}", file=sys.stderr, flush=True)
     try:
         from distributed import Client, KilledWorker
     except ModuleNotFoundError:
@@ -53,7 +55,8 @@ def _found(address: str) -> dict[str, Any]:
     except (OSError, TimeoutError):
         raise InputError(f"no scheduler answers at {address}; expected an address that is {expected}") from None
     except (TypeError, ValueError) as error:
-        raise InputError(f"scheduler = {address!r}: {error}; expected an address that is {expected}") from None
+        reason = f": {error}" if "address" in str(error) else ""  # else it is Python's own
+        raise InputError(f"scheduler = {address!r}{reason}; expected an address that is {expected}") from None
     if told.get("type") != "Scheduler":
         raise InputError(f"scheduler = {address!r} is a {told.get('type')}'s address; expected {expected}")
     return told

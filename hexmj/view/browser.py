@@ -18,6 +18,7 @@ from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.diagrams import spans
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
+from hexmj.literal import literal
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
 from hexmj.replay.take import support_on_ground
@@ -38,6 +39,8 @@ RANGES = {
 
 SWITCHES = ("p2", "p4_i")
 
+MOST_PORT = 65535
+
 MEASURED, PLANNED = "#c8740a", "#1b6ca8"
 
 
@@ -52,12 +55,22 @@ def check_port(host: str, port: int) -> None:
     Raises:
         InputError: it is taken, or none of this machine's.
     """
+    if not 0 <= port <= MOST_PORT:
+        raise InputError(f"--port {port}; expected 1 to {MOST_PORT}, or 0 for any that is free")
+    try:
+        with socket.create_server((host, 0)):
+            pass
+    except (OSError, UnicodeError) as error:
+        reason = "no such name" if isinstance(error, socket.gaierror | UnicodeError) else error.strerror
+        raise InputError(
+            f"--host {host}: {literal(str(reason))}; expected an address of this machine, such as 127.0.0.1, or"
+            " 0.0.0.0 for all of them"
+        ) from None
     try:
         with socket.create_server((host, port)):
             pass
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"--host {host} --port {port}: {reason}; expected a free port, or 0 for any") from None
+    except OSError as error:
+        raise InputError(f"--port {port} at {host}: {error.strerror}; expected a free port, or 0 for any") from None
 
 
 class BrowserView:

@@ -14,35 +14,30 @@ if TYPE_CHECKING:
 
     from hexmj.pictures import Picture
 
+NONE, FEWER = "\N{EN DASH}", "\N{BULLET}"
+"""Where no walk is left, and beside a number of which some are missing."""
+
+NOTES = {NONE: "no walk is left", FEWER: "walks are missing that diverged or were out of reach"}
+
 
 def ablation_figure(result: "xr.Dataset") -> "Picture":
     """Frequencies of the whole, and below it how much more often it happens without a part, from `Ablation`."""
     from hexmj.pictures import head, picture
 
     rows, velocities = result.sizes["controller"], [f"{v:g}" for v in result.velocity.values]
-    figure = picture(3.6 + 2.5 * len(MEASURES), 1.8 + 0.42 * rows)
-    panels = figure.subplots(1, len(MEASURES), sharey=True)
+    figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, len(velocities)), 1.9 + 0.27 * rows)
+    panels, used = figure.subplots(1, len(MEASURES), sharey=True), set[str]()
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
         one = result.sel(measure=measure)
         shown = np.where(wholes[:, None], np.nan, one.more.values)
         panel.imshow(shown, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
         for row, column in np.ndindex(shown.shape):
-            text, weight = f"{one.frequency.values[row, column]:.2f}", "bold"
-            if not wholes[row]:
-                sure = one.more_low.values[row, column] > 0 or one.more_high.values[row, column] < 0
-                text, weight = f"{np.round(shown[row, column], 2) + 0.0:+.2f}", "bold" if sure else "normal"
-            colour = "white" if abs(np.nan_to_num(shown[row, column])) > 0.6 else "0.1" if weight == "bold" else "0.5"
-            panel.text(
-                column,
-                row,
-                text.replace("-", "\N{MINUS SIGN}"),
-                ha="center",
-                va="center",
-                fontsize=8,
-                color=colour,
-                fontweight=weight,
-            )
+            text, sure = written(one.isel(controller=row, velocity=column))
+            used |= {*text} & {*NOTES}
+            colour = "white" if abs(np.nan_to_num(shown[row, column])) > 0.6 else "0.1" if sure else "0.5"
+            style = {"ha": "center", "va": "center", "fontsize": 8, "color": colour}
+            panel.text(column, row, text, **style, fontweight="bold" if sure else "normal")
         panel.set_title(f"{measure}\n{title}", fontsize=9)
         panel.set_xticks(range(len(velocities)), velocities)
         panel.set_xlabel("velocity $V_r / V_p$", fontsize=9)
@@ -54,4 +49,18 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
     counts = f"{result.attrs['n_starts']} starts, {result.attrs['n_physical']} in physics, {REGIMES} for the limit"
     heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
     head(figure, heading, f"{counts}; {caption(result)}")
+    if used:
+        figure.supxlabel("; ".join(f"{mark} {note}" for mark, note in NOTES.items() if mark in used), fontsize=8)
     return figure
+
+
+def written(one: "xr.Dataset") -> tuple[str, bool]:
+    """What stands in a cell, of one controller, measure and velocity, and whether it stands out."""
+    whole = one.controller.item() == one.whole.item()
+    value = (one.frequency if whole else one.more).item()
+    if np.isnan(value):
+        return NONE, False
+    text = f"{value:.2f}" if whole else f"{np.round(value, 2) + 0.0:+.2f}".replace("-", "\N{MINUS SIGN}")
+    fewer = one.measure.item() == "physical" and one.frequency_starts.item() < one.attrs["n_physical"]
+    sure = whole or one.more_low.item() > 0 or one.more_high.item() < 0
+    return text + (FEWER if fewer else ""), sure

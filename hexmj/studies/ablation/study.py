@@ -13,12 +13,14 @@ from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
+from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.frequencies import came, differences, frequencies, padded
-from hexmj.studies.league.study import FRESH, PERIODS, REGIMES
+from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_part
+from hexmj.studies.short_names import short_names
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Stride
@@ -38,16 +40,31 @@ MEASURES = {
 """What is counted."""
 
 
-def switched(name: str) -> dict[str, Controller]:
-    """The whole controller, and what comes of it by each of the `SWITCHES` that make a difference, by their names.
+def wholes(names: Sequence[str]) -> dict[str, dict[str, Controller]]:
+    """What comes of each controller, see `switched`, by short names, see `short_names`.
 
     Raises:
         InputError: no such controller, or one of which nothing can be switched.
     """
-    found = {name: load_controller(name)}
+    short = short_names({name: load_controller(name) for name in names})
+    return {short[name]: switched(name, short[name]) for name in names}
+
+
+def switched(name: str, shown: str = "") -> dict[str, Controller]:
+    """The whole controller, and what comes of it by each of the `SWITCHES` that make a difference, by their names.
+
+    Args:
+        name: of the whole, as `load_controller` takes it.
+        shown: what it is called instead.
+
+    Raises:
+        InputError: no such controller, or one of which nothing can be switched.
+    """
+    shown = shown or name
+    found = {shown: load_controller(name)}
     for switch in SWITCHES:
         try:
-            found[f"{name}-{switch}"] = load_controller(f"{name}-{switch}")
+            found[f"{shown}-{switch}"] = load_controller(f"{name}-{switch}")
         except InputError:
             continue  # nothing to switch off, or on already
     if len(found) == 1:
@@ -82,6 +99,7 @@ class Ablation:
         check_types(self)
         for count in (self.n_starts, self.n_physical):
             check_draw(count, self.seed)
+        check_part(self, "n_physical")
         whole("periods", self.periods, CYCLES + 2)
         if not self.models:
             raise InputError("no controller was given; expected at least one")
@@ -148,6 +166,9 @@ class Ablation:
         settings |= {name: getattr(self, name) for name in ("n_starts", "n_physical", "periods", "seed")}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride), "window": "walk"}
         settings |= {"controllers": {name: plain(one) for name, one in self.controllers.items()}}
+        settings["not_printed"] = not_printed(
+            {"controllers": {name: settings["controllers"][name] for name in self.models}}
+        )
         return xr.Dataset(told, axes, attributes(settings)).assign_coords(velocity_axis(*self.observed))
 
 

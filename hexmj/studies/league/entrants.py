@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.rivals.table import RIVALS
 from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.short_names import short_names
 
 IDEAL = "-ideal"
 """What the name of an entrant ends with that begins at an ideal start."""
@@ -20,9 +21,16 @@ FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
 
 
 def entrants(names: tuple[str, ...]) -> Mapping[str, Entrant]:
-    """Entrants by the names of their controllers, which end with `IDEAL` where they begin at an ideal start.
+    """Entrants by short names, see `short_names`, in their order.
+
+    Args:
+        names: of controllers, which end with `IDEAL` where they begin at an ideal start.
 
     Raises:
         InputError: no such controller, or one without an ideal start.
     """
-    return {name: Entrant(load_controller(name.removesuffix(IDEAL)), name.endswith(IDEAL)) for name in names}
+    found = {name: load_controller(name.removesuffix(IDEAL)) for name in names}
+    short = short_names({name.removesuffix(IDEAL): one for name, one in found.items()})
+    shown = [short[name.removesuffix(IDEAL)] + (IDEAL if name.endswith(IDEAL) else "") for name in names]
+    keys = shown if len({*shown}) == len(names) else names
+    return {key: Entrant(found[name], name.endswith(IDEAL)) for key, name in zip(keys, names, strict=True)}

@@ -1,83 +1,190 @@
-"""The league on one page: a row for each entrant, the same in every panel."""
+"""The league as two figures with a row for each entrant: who loses stability, and how they walk and what they meet."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hexmj.literal import in_figure
 from hexmj.measures.captions import caption
-from hexmj.studies.league.table import by_rank
+from hexmj.studies.league.table import MEASURES, by_rank, place
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from hexmj.pictures import Picture
 
-LOSSES, SHARES, COSTS, PHASES = "YlOrRd", "YlGn", "PuBu", "twilight"
-"""Colours of what is bad, good, costly and periodic."""
+SHARES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
+"""Between these shares a colour is the same."""
+
+FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
+"""In a cell of which walks are missing, and in one of which nothing is known."""
+
+NAMED = 6
+"""Most entrants that a note names."""
+
+
+POINTS = {"range": ("#1b6ca8", "o", -0.14), "accelerated": ("#b3261e", "D", 0.14)}
+"""What is told over all velocities -> its colour, its mark, and where it stands in its row."""
+
+
+class Panel(NamedTuple):
+    """A heat map."""
+
+    title: str
+    values: np.ndarray
+    """(entrant, column)."""
+    colours: str
+    """Of matplotlib's colour maps."""
+    levels: tuple[float, ...]
+    """Between which a colour is the same."""
+    fewer: np.ndarray | None = None
+    """Where walks are missing, (entrant, column)."""
 
 
 def league_figure(result: "xr.Dataset") -> "Picture":
-    """Heat maps of all measures, the best in physics at the top, from `League`."""
-    from hexmj.pictures import head, picture
-
+    """Losses on paper and under the feet, and falls, the best in physics at the top, from `League`."""
     shown = by_rank(result)
-    velocities, rows = [f"{v:g}" for v in shown.velocity.values], shown.sizes["entrant"]
-    width = 5.0 + 1.35 * len(velocities)
-    figure = picture(max(13.0, width), 2.6 + 0.52 * rows)
-    panels = figure.subplots(2, 4, sharey=True)
-    n = {key: int(shown[f"{key}_starts"].max()) for key in ("kinematic", "physical", "fell")}
-    over_v: dict[str, tuple[str, str, float]] = {
-        f"kinematic FLSS, {n['kinematic']} starts": ("kinematic", LOSSES, 1.0),
-        f"measured FLSS, {n['physical']} starts": ("measured", LOSSES, 1.0),
-        f"physical FLSS (falls), {n['physical']} starts": ("physical", LOSSES, 1.0),
-        "regimes that are statically stable": ("stable", SHARES, 1.0),
-        "ipsilateral phase of the regimes": ("ipsilateral", PHASES, 1.0),
-        "cost of transport": ("cost", COSTS, float(np.nanmax([shown.cost.max().item(), 1e-9]))),
-    }
-    first, rest = panels[0, 0], panels.ravel()
-    for panel, (title, (name, colours, most)) in zip(rest, over_v.items(), strict=False):
-        _heat(panel, shown[name].values, colours, most)
-        panel.set_title(title, fontsize=10)
-        panel.set_xticks(range(len(velocities)), velocities)
-        panel.set_xlabel("velocity $V_r / V_p$", fontsize=9)
-    _heat(rest[6], shown.fell.values, LOSSES, 1.0)
-    rest[6].set_title(f"falls at V = {result.attrs['tried_at']:g}, {n['fell']} starts", fontsize=10)
-    rest[6].set_xticks(range(shown.sizes["trial"]), shown.trial.values, rotation=45, ha="right", fontsize=8)
-    _dots(rest[7], shown)
-    first.set_yticks(range(rows), [in_figure(name) for name in shown.entrant.values])
-    first.set_ylim(rows - 0.5, -0.5)
-    head(figure, "The league, best in physics first", caption(result))
+    missing = shown.missing.values > 0
+    titles = dict(zip(MEASURES, ("on paper (kinematic)", "under the feet (measured)", "falls (physical)"), strict=True))
+    panels = [
+        Panel(f"{title}\n{shown[f'{name}_starts'].max().item()} starts", shown[name].values, "YlOrRd", SHARES,
+              None if name == "kinematic" else missing)
+        for name, title in titles.items()
+    ]  # fmt: skip
+    figure, axes = _rows(shown, (1.0, 1.0, 1.0, 0.95))
+    images = [_heat(one, panel) for one, panel in zip(axes, panels, strict=False)]
+    for one in axes[:3]:
+        _velocities(one, shown)
+    how: dict[str, Any] = {"location": "bottom", "aspect": 60, "fraction": 0.03, "shrink": 0.7}
+    figure.colorbar(images[0], ax=axes[:3], **how).set_label("share of the starts", fontsize=9)
+    _dots(axes[3], shown)
+    heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
+    _head(figure, heading, result, _nothing(panels), _missing(shown))
     return figure
 
 
-def _heat(axes: "Axes", values: np.ndarray, colours: str, most: float) -> None:
-    """Numbers as colours, and written; grey where there is none."""
-    import matplotlib
+def walks_figure(result: "xr.Dataset") -> "Picture":
+    """Falls in trials, limit regimes and costs, the best in physics at the top, from `League`."""
+    shown = by_rank(result)
+    few = shown.fell_starts.values
+    trials = f"falls in trials at V = {result.attrs['tried_at']:g}\n{few.max()} starts"
+    panels = (
+        Panel(trials, shown.fell.values, "YlOrRd", SHARES, (few > 0) & (few < few.max())),
+        Panel("limit regimes that are\nstatically stable", shown.stable.values, "YlGn", SHARES),
+        Panel("ipsilateral phase\nof the regimes", shown.ipsilateral.values, "twilight", (*np.linspace(0, 1, 10),)),
+        Panel("cost of transport\nof walks without a fall", shown.cost.values, "PuBu", _round_levels(shown.cost.values),
+              shown.missing.values > 0),
+    )  # fmt: skip
+    figure, axes = _rows(shown, (shown.sizes["trial"] / shown.sizes["velocity"], 1.0, 1.0, 1.0))
+    labels = ("share of the starts", "share of the starts", "phase", "")
+    for one, panel, label in zip(axes, panels, labels, strict=True):
+        bar = figure.colorbar(_heat(one, panel), ax=one, location="bottom", aspect=25, fraction=0.03)
+        bar.ax.tick_params(labelsize=7)
+        if panel.colours == "twilight":
+            bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])  # 0.5 is in the middle of a colour
+        bar.set_label(label, fontsize=9)
+        _velocities(one, shown)
+    turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
+    axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, **turned)
+    axes[0].set_xlabel("")
+    heading = "The league: what walks meet, their limit regimes, and their costs; best in physics first"
+    unstable = f"{FEWER} among the trials: of fewer starts; plans not stable until halt, leg or push, or walks missing"
+    few_are = ((few > 0) & (few < few.max())).any()
+    _head(figure, heading, result, _nothing(panels), unstable if few_are else "", _missing(shown))
+    return figure
 
-    colour_of = matplotlib.colormaps[colours].with_extremes(bad="0.93")
-    image = axes.imshow(values, cmap=colour_of, vmin=0.0, vmax=most, aspect="auto")
-    size = 7.5 if values.shape[1] <= 9 else 6.5
-    for row, column in np.argwhere(np.isfinite(values)):
-        value = values[row, column]
-        dark = np.dot(image.cmap(image.norm(value))[:3], [0.3, 0.59, 0.11]) < 0.5
-        words = f"{value:.2f}".replace("0.", ".", 1) if value < 10 else f"{value:.0f}"
-        axes.text(column, row, words, ha="center", va="center", fontsize=size, color="white" if dark else "0.1")
+
+def _rows(shown: "xr.Dataset", widths: tuple[float, ...]) -> "tuple[Picture, Any]":
+    """Panels that share the entrants as their rows."""
+    from hexmj.pictures import picture
+
+    rows = shown.sizes["entrant"]
+    figure = picture(11.0, 2.6 + 0.22 * rows)
+    axes = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
+    ranks = [place(shown.isel(entrant=row).sel(measure="physical")) for row in range(rows)]
+    names = [f"{in_figure(name)}{rank}" for name, rank in zip(shown.entrant.values, ranks, strict=True)]
+    axes[0].set_yticks(range(rows), names, fontsize=9)
+    axes[0].set_ylim(rows - 0.5, -0.5)
+    return figure, axes
+
+
+def _head(figure: "Figure", heading: str, result: "xr.Dataset", *notes: str) -> None:
+    """Title above, and below what the marks in cells mean."""
+    from hexmj.pictures import head
+
+    head(figure, heading, caption(result))
+    figure.supxlabel("\n".join(filter(None, notes)), fontsize=8)
+
+
+def _nothing(panels: Sequence[Panel]) -> str:
+    """What a dash means, where there is one."""
+    unknown = any(np.isnan(panel.values).any() for panel in panels)
+    return f"{NOTHING} not asked, or no walk or regime is left" if unknown else ""
+
+
+def _round_levels(values: np.ndarray) -> tuple[float, ...]:
+    """A few round numbers around all values."""
+    from matplotlib.ticker import MaxNLocator
+
+    known = values[np.isfinite(values)]
+    ends = (known.min(), known.max()) if known.size else (0.0, 1.0)
+    return (*MaxNLocator(8, min_n_ticks=2).tick_values(ends[0], max(ends[1], ends[0] + 0.1)),)
+
+
+def _missing(shown: "xr.Dataset") -> str:
+    """Whose walks at the velocities are missing, and how many; nothing where none are."""
+    of = shown.missing.sum("velocity")
+    found = [f"{in_figure(name)} {count:g}" for name, count in zip(of.entrant.values, of.values, strict=True) if count]
+    if not found:
+        return ""
+    others = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    told = f"{', '.join(found[:NAMED])}{others}"
+    return f"{FEWER} of fewer starts: walks are missing that diverged or were out of reach (in all {told})"
+
+
+def _velocities(axes: "Axes", shown: "xr.Dataset") -> None:
+    """Columns are velocities."""
+    axes.set_xticks(range(shown.sizes["velocity"]), [f"{v:g}" for v in shown.velocity.values], fontsize=8)
+    axes.set_xlabel("velocity $V_r / V_p$", fontsize=9)
+
+
+def _heat(axes: "Axes", panel: Panel) -> Any:
+    """Numbers as colours; grey with a dash where there is none, a mark where walks are missing."""
+    import matplotlib
+    from matplotlib.colors import BoundaryNorm
+
+    colours = matplotlib.colormaps[panel.colours].with_extremes(bad="0.93")
+    how: dict[str, Any] = {"cmap": colours, "norm": BoundaryNorm(panel.levels, colours.N), "aspect": "auto"}
+    image = axes.imshow(panel.values, **how)
+    fewer = np.zeros(panel.values.shape, dtype=bool) if panel.fewer is None else panel.fewer
+    for row, column in np.argwhere(~np.isfinite(panel.values) | fewer):
+        known = np.isfinite(panel.values[row, column])
+        shade = image.cmap(image.norm(panel.values[row, column])) if known else (1.0, 1.0, 1.0, 1.0)
+        dark = np.dot(shade[:3], [0.3, 0.59, 0.11]) < 0.5
+        colour = "white" if dark else "0.1" if known else "0.6"
+        axes.text(column, row, FEWER if known else NOTHING, ha="center", va="center", fontsize=8, color=colour)
+    for edge in range(1, panel.values.shape[0]):
+        axes.axhline(edge - 0.5, color="white", linewidth=0.6)
+    axes.set_title(panel.title, fontsize=10)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
+    return image
 
 
 def _dots(axes: "Axes", shown: "xr.Dataset") -> None:
     """J_N and the FLSS of accelerating walks with their intervals."""
-    for name, label, colour, beside in (
-        ("range", "$J_N$, V = 0.1 to 0.5", "#1b6ca8", -0.14),
-        ("accelerated", "accelerated to 0.9", "#b3261e", 0.14),
-    ):
+    for name, (colour, marker, beside) in POINTS.items():
         low, middle, high = (shown[name + end].values for end in ("_low", "", "_high"))
-        style: dict[str, Any] = {"color": colour, "fmt": "o", "markersize": 4, "capsize": 2.5, "label": label}
+        style: dict[str, Any] = {"color": colour, "fmt": marker, "markersize": 4, "capsize": 2.0}
         axes.errorbar(middle, np.arange(len(middle)) + beside, xerr=[middle - low, high - middle], **style)
-    axes.set(xlim=(-0.02, 1.02), xlabel="FLSS on paper")
-    axes.grid(axis="x", color="0.9", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    for row in range(shown.sizes["entrant"]):
+        axes.axhline(row, color="0.93", linewidth=0.8, zorder=0)
+    axes.set(xlim=(-0.03, 1.03))
+    axes.set_title("on paper, over all velocities\nwith 95 % intervals", fontsize=10)
+    axes.set_xlabel("FLSS\n\N{BLACK CIRCLE} $J_N$, V drawn from 0.1 to 0.5\n\N{BLACK DIAMOND} accelerated to 0.9",
+                    fontsize=9)  # fmt: skip
+    axes.tick_params(labelsize=8, left=False)
+    axes.spines[["top", "right", "left"]].set_visible(False)

@@ -11,6 +11,7 @@ from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
+from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.studies.league import paper
@@ -42,6 +43,21 @@ REGIMES = 50
 """Starts whose limit regime is looked at, at most."""
 
 
+def check_part(study: Any, *names: str) -> None:
+    """Refuse more starts in physics than there are on paper, of which they are a part.
+
+    Args:
+        study: has `n_starts`.
+        names: of its other numbers of starts.
+
+    Raises:
+        InputError: one is above it.
+    """
+    for name in names:
+        if getattr(study, name) > study.n_starts:
+            raise InputError(f"{name} = {getattr(study, name)}; expected at most n_starts = {study.n_starts}")
+
+
 @dataclass(frozen=True)
 class League:
     """The same starts for every entrant: all of them on paper, the first of them in physics and in trials."""
@@ -55,7 +71,7 @@ class League:
     n_physical: int = 200
     """Of these, number of starts that walk in physics at every velocity."""
     n_tried: int = 50
-    """Number of starts in each trial."""
+    """Of these, number of starts in each trial."""
     tried_at: float = 0.3
     """V_r of the trials."""
     accelerating: bool = True
@@ -75,6 +91,7 @@ class League:
         check_types(self)
         for count in (self.n_starts, self.n_physical, self.n_tried):
             check_draw(count, self.seed)
+        check_part(self, "n_physical", "n_tried")
         whole("periods", self.periods, CYCLES + 2)
         if not self.entrants:
             raise InputError("no controller was given; expected at least one")
@@ -120,6 +137,7 @@ class League:
         settings: dict[str, Any] = {"study": "league"} | {name: plain(getattr(self, name)) for name in told}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
         settings["controllers"] = {name: plain(entrant) for name, entrant in self.entrants.items()}
+        settings["not_printed"] = not_printed(settings)
         return standings(self, dict(zip(self.named_cells(), data, strict=True))).assign_attrs(attributes(settings))
 
     def _on_paper(self, entrant: Entrant) -> dict[str, Cell]:

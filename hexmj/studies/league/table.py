@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.attributes import settings
+from hexmj.measures.captions import rules
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:
@@ -41,7 +43,8 @@ def league_markdown(result: "xr.Dataset") -> str:
     parts = []
     for table in tables(result):
         lines = [table.head, ["---"] * len(table.head), *table.rows]
-        parts += [f"### {table.title}", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
+        cells = ([text.replace("|", "\\|") for text in line] for line in lines)
+        parts += [f"### {table.title}", "\n".join(f"| {' | '.join(line)} |" for line in cells)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -59,12 +62,13 @@ def frequency(one: "xr.Dataset", name: str) -> str:
 
 
 def _ranks(result: "xr.Dataset") -> Table:
-    rows = []
+    rows, controllers = [], settings(result)["controllers"]
     for name in (shown := by_rank(result)).entrant.values:
         one = shown.sel(entrant=name)
-        missing = f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
-        places = [_mean(one[measure]) + _place(one.sel(measure=measure)) for measure in MEASURES]
-        rows.append((name + missing, *places, frequency(one, "range"), frequency(one, "accelerated")))
+        told = f" ({words})" if (words := rules(controllers[name])) else ""
+        told += f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
+        places = [_mean(one[measure]) + place(one.sel(measure=measure)) for measure in MEASURES]
+        rows.append((name + told, *places, frequency(one, "range"), frequency(one, "accelerated")))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
 
@@ -79,7 +83,7 @@ def _left(one: "xr.Dataset", measure: str) -> str:
     return f" of {one[f'{measure}_starts'].item()}" if measure != "kinematic" and one.missing.item() else ""
 
 
-def _place(one: "xr.Dataset") -> str:
+def place(one: "xr.Dataset") -> str:
     """Rank in brackets: '(2)', '(=3-6)', nothing where there is none."""
     best, worst = one.best.item(), one.worst.item()
     return "" if best == 0 else f" ({best})" if best == worst else f" (={best}-{worst})"
