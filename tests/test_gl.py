@@ -95,13 +95,20 @@ def test_without_the_libraries_it_is_said_what_brings_them(environment):
     assert "libEGL.so.1: cannot open shared object file); on Debian and Ubuntu" in str(gl.missing())
 
 
-@pytest.mark.parametrize(("wish", "left"), [(None, None), ("egl", None), ("osmesa", "osmesa")])
-def test_a_command_drops_the_wish_for_egl_where_it_would_keep_mujoco_from_being_imported(environment, wish, left):
+@pytest.mark.parametrize(
+    ("wish", "left"),
+    [(None, None), ("egl", None), ("glfw", "glfw"), ("off", "off"), ("osmesa", "disable"), ("nonsense", "disable")],
+)
+def test_a_command_drops_a_wish_that_would_keep_mujoco_from_being_imported(environment, wish, left):
     if wish:
         environment.setenv("MUJOCO_GL", wish)
     environment.setattr(ctypes, "CDLL", without_libraries)
+    environment.setattr(gl, "find_library", lambda name: None)
+    environment.setattr(gl, "_VAIN", [])
     gl.drop_vain_wish()
     assert os.environ.get("MUJOCO_GL") == left
+    if left == "disable":
+        assert f"there is no MUJOCO_GL = {wish}; egl, glfw and osmesa are known" in str(gl.missing())
 
 
 def test_with_the_libraries_the_wish_for_egl_stands(environment):

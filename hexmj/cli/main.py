@@ -18,10 +18,10 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
 from hexmj.cli import answers
+from hexmj.cli.surroundings import settle
 from hexmj.cli.words import checked, shell, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
-from hexmj.replay.film.gl import drop_vain_wish
 from hexmj.signals import of_stop
 
 NUMBA = (
@@ -104,13 +104,13 @@ class _Completion:
     def run(self) -> None:
         with redirect_stdout(StringIO()) as script, suppress(SystemExit):
             options_of(["--tyro-write-completion", self.shell, "-"])
-        for line in script.getvalue().replace(*PIPED).splitlines():  # the shell would take a description's second line for a word
+        for line in script.getvalue().replace(*PIPED).splitlines():
+            # The shell would take a description's second line for a word.
             print(re.sub(r"\\+n", " ", line) if line.startswith("COMPLETION_SPEC") else line)
 
 
 def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
-    drop_vain_wish()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # neither closed nor replaced
             stream.reconfigure(errors="backslashreplace")
@@ -118,6 +118,7 @@ def main() -> None:
     options: Any = None
     try:
         try:
+            settle()
             options = options_of(words := checked(sys.argv[1:]))
             with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()

@@ -9,6 +9,7 @@ import os
 import sys
 import textwrap
 import warnings
+from ctypes.util import find_library
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,6 +18,12 @@ if TYPE_CHECKING:
 LIBRARIES = ("libEGL.so.1", "libOpenGL.so.0")
 PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 """Packages of Debian and Ubuntu that bring the libraries and a software renderer."""
+
+SURE, NONE = ("glfw", "glx", "enable", "enabled", "on", "true", "1"), ("disable", "disabled", "off", "false", "0")
+"""What MUJOCO_GL may be, besides EGL and OSMesa, which may not be there: what MuJoCo brings along, and nothing."""
+
+_VAIN: list[str] = []
+"""What was asked for in vain."""
 
 WISHES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
 """Variables of the environment by which a GL has been chosen, or a screen is there."""
@@ -51,19 +58,29 @@ def context_type() -> Any:
 
 
 def drop_vain_wish() -> None:
-    """Let a command that draws nothing go on where EGL is asked for and missing: MuJoCo cannot be imported there.
+    """Let a command that draws nothing go on where a GL is asked for that is not there: MuJoCo cannot be imported then.
 
     For a program of our own only, before MuJoCo is imported; `missing` then says what to install.
     """
-    if os.environ.get("MUJOCO_GL") == "egl":
+    wish = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if sys.platform != "linux" or wish in ("", *SURE, *NONE):
+        return
+    if wish == "egl":
         try:
             _load_libraries()
         except OSError:
             del os.environ["MUJOCO_GL"]
+    elif wish != "osmesa" or not find_library("OSMesa"):
+        _VAIN.append(wish)
+        os.environ["MUJOCO_GL"] = NONE[0]
 
 
 def missing() -> str | None:
     """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
+    if _VAIN:
+        return _sentence(f"there is no MUJOCO_GL = {_VAIN[0]:.80}; egl, glfw and osmesa are known")
+    if os.environ.get("MUJOCO_GL", "").lower().strip() in NONE:
+        return _sentence("MUJOCO_GL asks for nothing")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context
