@@ -104,7 +104,8 @@ class _Completion:
     def run(self) -> None:
         with redirect_stdout(StringIO()) as script, suppress(SystemExit):
             options_of(["--tyro-write-completion", self.shell, "-"])
-        for line in script.getvalue().replace(*PIPED).splitlines():  # the shell would take a description's second line for a word
+        for line in script.getvalue().replace(*PIPED).splitlines():
+            # a shell would take a description's second line for a word
             print(re.sub(r"\\+n", " ", line) if line.startswith("COMPLETION_SPEC") else line)
 
 
