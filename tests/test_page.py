@@ -167,13 +167,24 @@ def go_to(opened: Tab, step: int) -> None:
     opened.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
+CUT = """[...document.querySelectorAll('#speed, .state')].filter((one) => {
+    const wide = one.getBoundingClientRect().width;
+    Object.assign(one.style, { flex: 'none', width: 'max-content', whiteSpace: 'nowrap' });
+    const whole = one.getBoundingClientRect().width;
+    one.removeAttribute('style');
+    return wide < whole - 1 || one.offsetParent.clientWidth < whole;
+}).length"""
+"""How many of the speed menu and what is said of the state have not the room that one line of them takes."""
+
+
 @pytest.mark.slow
 def test_a_browser_without_a_network_plays_it(fallen, plan, tmp_path):
     path = page([fallen, plan], tmp_path / "page.html")
     fell = int(np.isfinite(fallen.measured_margin.values).sum())
     with tab() as opened:
-        opened.resize(390, 844, phone=True)
+        opened.resize(360, 740, phone=True)
         opened.open(path.as_uri())
+        assert opened.value(CUT) == 0
         assert opened.value("[...document.querySelectorAll('h1')].map((one) => one.textContent)") == [WICKED, "a plan"]
         for step in (1, fell // 2, fell, fell + 2):
             go_to(opened, step)

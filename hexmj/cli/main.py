@@ -105,7 +105,7 @@ class _Completion:
         with redirect_stdout(StringIO()) as script, suppress(SystemExit):
             options_of(["--tyro-write-completion", self.shell, "-"])
         for line in script.getvalue().replace(*PIPED).splitlines():
-            # The shell would take a description's second line for a word.
+            # a shell would take a description's second line for a word
             print(re.sub(r"\\+n", " ", line) if line.startswith("COMPLETION_SPEC") else line)
 
 

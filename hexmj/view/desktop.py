@@ -4,8 +4,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Any
 
 import mujoco
@@ -44,8 +43,8 @@ def view_live(session: LiveSession) -> None:
         for passed in ticks():
             if not window.is_running():
                 return
-            with suppress(Empty):
-                _obey(session, wishes.get_nowait())
+            while not wishes.empty():
+                _obey(session, wishes.get())
             moment = session.tick(passed)
             seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
             state = f"fell on {walk.fell_on}" if walk.fell_on else f"margin {moment.margin:+.1f} mm"
@@ -59,8 +58,8 @@ def view_recording(session: ReplaySession) -> None:
         for passed in ticks():
             if not window.is_running():
                 return
-            with suppress(Empty):
-                session.paused ^= wishes.get_nowait() == SPACE
+            while not wishes.empty():
+                session.paused ^= wishes.get() == SPACE
             row = session.tick(passed)
             seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
             text = f"{take.title}, half speed, margin {take.margin[row]:+.1f} mm"
