@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from hexmj.pictures import Picture
 
+RECORDING = "recording"
+
 FIGURES: dict[str, dict[str, str]] = {
     "flss": {"flss": "measures.figures:flss_figure"},
     "compare": {"comparison": "measures.figures:comparison_figure"},
@@ -26,7 +28,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "biology": {"biology": "studies.biology.figure:biology_figure"},
     "league": {"league": "studies.league.figure:league_figure", "walks": "studies.league.figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation.figure:ablation_figure"},
-    "recording": {"walk": "replay.footfall:walk_figure"},
+    RECORDING: {"walk": "replay.footfall:walk_figure"},
 }
 """What a result is of, as its attribute `study` tells -> its figures by name, each a module and a function of it."""
 
@@ -49,7 +51,8 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
-    if gone := [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]:
+    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
+    if gone and _study(result) != RECORDING:
         raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
     chosen = next(iter(figures)) if which is None else which
     if chosen not in figures:
@@ -61,4 +64,4 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
 
 def _study(result: "xr.Dataset") -> str:
     """What a dataset is of, a key of `FIGURES` if it is a result."""
-    return "recording" if "planned_stance" in result else str(result.attrs.get("study", ""))
+    return RECORDING if "planned_stance" in result else str(result.attrs.get("study", ""))

@@ -1,15 +1,19 @@
 """Ablation: controllers without one of their parts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import hexmj
 from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
-from hexmj.studies.ablation.figure import ablation_figure
-from hexmj.studies.ablation.study import Ablation, switched
+from hexmj.studies.ablation.figure import FEWER, NONE, ablation_figure
+from hexmj.studies.ablation.study import Ablation, switched, wholes
 from hexmj.sweeps import conduct
 
 
@@ -52,6 +56,7 @@ def test_without_all_mechanisms_the_network_is_uncoordinated() -> None:
         ("ldvs-without-7", "mechanism = 7; expected one of 1, 2, 3, 4"),
         ("ldvs-with-3", "ldvs with mechanism 3; expected 2 or 4"),
         ("walknet-without-5", "walknet without rule 5; expected one of 1, 2, 3"),
+        ("walknet-with-2", "walknet has no mechanisms or rules that can be switched on; expected walknet-without-2"),
         ("graham-without-1", "graham has no mechanisms or rules that can be switched"),
         ("nobody-without-1", "'nobody' is neither one of"),
     ],
@@ -104,4 +109,45 @@ def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     one = result.sel(controller="walknet-without-1", measure="start", velocity=0.5)
     assert one.frequency == lost[0] and np.isclose(one.more, lost[0] - lost[1])
     assert one.more_low < one.more < one.more_high
-    assert len(ablation_figure(result).axes) == 4
+    figure = ablation_figure(result)
+    assert len(figure.axes) == 4 and figure.get_supxlabel() == ""
+    check_what_is_written(result)
+
+
+def check_what_is_written(result: xr.Dataset) -> None:
+    """Where walks are missing a mark stands, and where none is left a dash, never nan."""
+    at = {"controller": "walknet-without-1", "measure": "physical"}
+    for starts, mark, note in ((1, FEWER, "walks are missing"), (0, NONE, "no walk is left")):
+        changed = result.copy(deep=True)
+        changed.frequency_starts.loc[at] = starts
+        for name in ("frequency", "more", "more_low", "more_high") if not starts else ():
+            changed[name].loc[at] = np.nan
+        figure = ablation_figure(changed)
+        texts = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+        assert [sum(mark in text for text in panel) for panel in texts] == [0, 0, 0, 1]
+        assert "nan" not in str(texts) and f"{mark} {note}" in figure.get_supxlabel()
+
+
+def test_a_file_is_called_by_its_short_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("somewhere").mkdir()
+    Path("somewhere/found.toml").write_text(network_toml(hexmj.LDVS))
+    models = wholes(["somewhere/found.toml"])
+    assert [*models] == ["found"] and [*models["found"]][:2] == ["found", "found-without-1"]
+    assert models["found"]["found-without-1"] == hexmj.load_controller("somewhere/found.toml-without-1")
+
+
+def test_sets_that_are_not_read_as_printed_are_told_once() -> None:
+    study = Ablation(wholes(["lasting", "walknet"]), (0.5,), n_starts=2, n_physical=1, periods=12)
+    lost = xr.Dataset({"lost": ("start", [0, 1])})
+    result = study.result([lost for _ in study.cells()])
+    assert hexmj.settings(result)["not_printed"] == {"reading lasting": ["lasting"]}
+    assert "reading lasting: lasting; " in hexmj.plot(result).get_suptitle()
+
+
+def test_parts_of_a_set_are_known_to_be_searched_on_these_starts() -> None:
+    from hexmj.cli.main import options_of
+
+    for words, name in ((["ablate", "--models", "own-0.3"], "own-0.3"), (["flss", "--model"], "own-0.3-without-4")):
+        line = options_of([*words, *([name] if name not in words else []), "--seed", "0"]).conditions_line()
+        assert f"a search found {name} (" in line

@@ -75,6 +75,7 @@ def test_other_shells_are_refused_in_a_sentence(run, words):
     code, out, error = run(*words)
     assert (code, out) == (2, "")
     assert error.startswith("hexmj: ") and error.endswith("expected one of bash, zsh, fish\n")
+    assert words != ["--completion"] or error == "hexmj: --completion stands alone; expected one of bash, zsh, fish\n"
 
 
 def test_kinematic_side_never_imports_mujoco():

@@ -101,8 +101,9 @@ def finished(out: Path) -> int:
 
 
 def but_for_progress(error: bytes) -> bytes:
-    """What a command says beside the lines that tell every few seconds how far it has come."""
-    return b"".join(line for line in error.splitlines(keepends=True) if b"% in " not in line)
+    """What a command says beside the lines that tell that it connects and, every few seconds, how far it has come."""
+    usual = b"% in ", b"hexmj: connecting to the scheduler at "
+    return b"".join(line for line in error.splitlines(keepends=True) if not any(one in line for one in usual))
 
 
 @pytest.mark.slow
@@ -136,6 +137,7 @@ def test_a_command_waits_for_workers_and_says_nothing_else(tmp_path: Path) -> No
         out = ("--range-of", 700, "--scheduler", address, "--out", tmp_path / "cluster")
         with started(*command(*words, *out), output=subprocess.PIPE) as program:
             assert program.stderr
+            assert program.stderr.readline().decode() == f"hexmj: connecting to the scheduler at {address}\n"
             note = f"hexmj: the scheduler at {address} has no workers yet; cells wait for them\n"
             assert program.stderr.readline().decode() == note
             with workers(address, tmp_path):
@@ -334,6 +336,7 @@ def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path: Path) -> None:
     [
         (("flss", "--scheduler", "nonsense"), "scheduler = 'nonsense': missing port number in address 'nonsense'"),
         (("map", "--scheduler", "foo://x"), "scheduler = 'foo://x': unknown address scheme 'foo'"),
+        (("map", "--scheduler", "inproc://x"), "scheduler = 'inproc://x'; expected an address that is a scheduler's"),
         (("compare", "--scheduler", "tcp://a:1", "--processes", "2"), "--scheduler and --processes = 2; expected one"),
         (("flss", "--physical", "--range-of", "10"), "--range-of = 10 with --physical; expected it with kinematic"),
         (("flss", "--range-of", "0"), "range_of = 0; expected a whole number of at least 1"),
@@ -341,7 +344,9 @@ def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_words_that_make_no_sense(run, tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
     code, out, error = run(*words, "--out", tmp_path / "out")
-    assert (code, out) == (2, "") and error.startswith(f"hexmj: {sentence}")
+    *before, last = error.splitlines()
+    assert (code, out) == (2, "") and last.startswith(f"hexmj: {sentence}")
+    assert before in ([], [f"hexmj: connecting to the scheduler at {words[2]}"]), "and no line of progress"
     assert not (tmp_path / "out").exists()
 
 

@@ -1,16 +1,21 @@
 """The league: who takes part, what is asked of them, and what it comes to."""
 
 from dataclasses import dataclass, replace
+from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 
 import hexmj
+from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -21,6 +26,7 @@ from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
 from hexmj.controllers.stepwise import Step, stepwise
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.intervals import paired_difference
+from hexmj.measures.captions import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range, walk
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.drive import drive
@@ -29,14 +35,16 @@ from hexmj.physics.settling import settle
 from hexmj.studies.league import physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import EVERYONE, entrants
-from hexmj.studies.league.figure import league_figure
+from hexmj.studies.league.figure import FEWER, NOTHING, league_figure, walks_figure
 from hexmj.studies.league.frequencies import came, frequencies
 from hexmj.studies.league.paper import losses
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
 from hexmj.studies.league.trials import DISTURBED, TRIALS, walking
-from hexmj.sweeps import conduct
+from hexmj.studies.short_names import short_names
+from hexmj.sweeps import run
+from hexmj.sweeps.plain import plain
 from hexmj.timing import Stride
 
 SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --window 10 --no-video --out here"
@@ -92,8 +100,14 @@ def league() -> League:
 
 
 @pytest.fixture(scope="module")
-def result(league: League, tmp_path_factory: pytest.TempPathFactory):
-    return conduct(league, tmp_path_factory.mktemp("league"))
+def data(league: League, tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], xr.Dataset]:
+    found = run(league.cells(), tmp_path_factory.mktemp("league"))
+    return dict(zip(league.named_cells(), found, strict=True))
+
+
+@pytest.fixture(scope="module")
+def result(league: League, data) -> xr.Dataset:
+    return league.result([*data.values()])
 
 
 def test_everyone_is_found_and_can_be_asked_everything() -> None:
@@ -162,6 +176,7 @@ def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -
     assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
     assert "nan" not in league_markdown(result)
     league_figure(result)
+    walks_figure(result)
 
 
 def test_tables_and_figure_show_every_entrant(result) -> None:
@@ -171,7 +186,135 @@ def test_tables_and_figure_show_every_entrant(result) -> None:
         assert all(len(row) == len(table.head) for row in table.rows)
         assert f"### {table.title}" in text
     assert "nan" not in text
-    assert len(league_figure(result).axes) == 8
+    for draw in (league_figure, walks_figure):
+        names = [label.get_text() for label in draw(result).axes[0].get_yticklabels()]
+        assert [name.partition(" ")[0] for name in names] == by_rank(result).entrant.values.tolist()
+
+
+def marks(figure) -> list[list[str]]:
+    """What is written in the cells of each panel."""
+    return [[text.get_text() for text in axes.texts] for axes in figure.axes]
+
+
+def test_figures_say_where_walks_are_missing_and_where_nothing_is_known(result) -> None:
+    assert not result.missing.any()
+    assert FEWER not in str(marks(league_figure(result))) + league_figure(result).get_supxlabel()
+    trials, *_ = marks(walks_figure(result))
+    few, most = result.fell_starts.values, result.fell_starts.max().item()
+    assert trials.count(NOTHING) == np.isnan(result.fell).sum() > 0
+    assert trials.count(FEWER) == ((few > 0) & (few < most)).sum()
+    assert f"{NOTHING} not asked" in walks_figure(result).get_supxlabel()
+    lost = result.missing.copy()
+    lost.loc[{"entrant": "still", "velocity": 0.6}] = 1
+    fewer = result.assign(missing=lost)
+    figure = league_figure(fewer)
+    assert [one.count(FEWER) for one in marks(figure)[:3]] == [0, 1, 1]
+    assert "walks are missing that diverged or were out of reach (in all still 1)" in figure.get_supxlabel()
+    assert FEWER in marks(walks_figure(fewer))[3]
+
+
+def test_titles_and_panels_keep_clear_of_each_other(result) -> None:
+    for draw in (league_figure, walks_figure):
+        for shown in (result, result.isel(velocity=[0], entrant=[0])):
+            figure = draw(shown)
+            figure.draw_without_rendering()
+            boxes = [axes.title.get_window_extent() for axes in figure.axes if axes.get_title()]
+            assert len(boxes) == 4
+            assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
+            assert boxes[0].x0 >= 0 and boxes[-1].x1 <= figure.bbox.width
+
+
+def test_a_set_that_is_not_read_as_printed_is_told_everywhere(league: League, data) -> None:
+    """Whatever it did: here all of them did what ldvs does."""
+    others = replace(league, entrants=entrants(("lasting", "ldvs", "walknet", "walknet-reacog")))
+    result = others.result([data["ldvs", what] for _, what in others.named_cells()])
+    assert hexmj.settings(result)["not_printed"] == {"reading lasting": ["lasting"]}
+    assert "| lasting (reading lasting) |" in league_markdown(result)
+    for which in ("league", "walks"):
+        title = hexmj.plot(result, which).get_suptitle()
+        assert "reading lasting: lasting; " in title and title.count("lasting") == 2
+
+
+def test_sequential_sets_and_those_that_read_legs_are_told_too() -> None:
+    slow = replace(hexmj.load_controller("lasting"), order="sequential")  # pyright: ignore[reportArgumentType]
+    for one in (slow, ReadsLegs(slow)):
+        assert rules(plain(one)) == "sequential order, reading lasting"
+    for name in ("ldvs", "walknet", "graham"):
+        assert rules(plain(hexmj.load_controller(name))) == ""
+
+
+OWN = """
+from dataclasses import dataclass
+from hexmj.controllers.rivals.metronomes import Metronome
+
+@dataclass(frozen=True)
+class One(Metronome):
+    name: str = "one"
+
+@dataclass(frozen=True)
+class Ldvs(One):
+    name: str = "ldvs"
+
+@dataclass(frozen=True)
+class Long(One):
+    name: str = "one that has a very long name"
+
+@dataclass(frozen=True)
+class Bar(One):
+    name: str = "a|b"
+"""
+
+
+def test_controllers_of_files_have_short_names_and_all_different_ones(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for folder in ("a/b", "c/b"):
+        Path(folder).mkdir(parents=True)
+        Path(folder, "own.py").write_text(OWN)
+        Path(folder, "found.toml").write_text(network_toml(hexmj.LDVS))
+    expected = {
+        "a/b/own.py:One": "a/b/own.py:One",
+        "c/b/own.py:One": "c/b/own.py:One",
+        "a/b/own.py:Ldvs": "own.py:Ldvs",
+        "a/b/own.py:Long": "own.py:Long",
+        "c/b/own.py:Bar": "own.py:Bar",
+        "a/b/found.toml": "found",
+        "ldvs-without-3": "ldvs-without-3",
+        "ldvs": "ldvs",
+    }
+    assert short_names({name: hexmj.load_controller(name) for name in expected}) == expected
+    takes_part = entrants(("a/b/own.py:One", "a/b/own.py:One-ideal", "graham-ideal"))
+    assert [*takes_part] == ["one", "one-ideal", "graham-ideal"]
+    assert [one.ideal for one in takes_part.values()] == [False, True, True]
+
+
+def test_tables_are_as_wide_as_the_screen_and_break_no_cell(monkeypatch) -> None:
+    head, rows = ("controller", *map(str, range(9))), [("a" * 20, *("0.123 (.01-.99)",) * 9)]
+    for columns in (60, 80, 400):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        lines = StringIO()
+        for table in tables_that_fit(head, rows):
+            Console(file=lines, width=columns).print(table)
+        text = lines.getvalue()
+        assert text.count("0.123 (.01-.99)") == 9 and all(f" {name} " in text for name in head)
+        assert text.count("a" * 20) == -(-9 // ((columns - 22) // 17))
+
+
+@pytest.mark.parametrize("name", ["n_physical", "n_tried"])
+def test_no_more_starts_walk_in_physics_than_on_paper(league: League, name: str) -> None:
+    how: dict[str, Any] = {name: 13}
+    with pytest.raises(InputError, match=f"{name} = 13; expected at most n_starts = 12"):
+        replace(league, **how)
+
+
+def test_fewer_starts_on_paper_are_all_that_walk_unless_more_are_asked_for() -> None:
+    from hexmj.cli.main import options_of
+
+    few = options_of(["league", "--starts", "20"]).study()
+    assert (few.n_starts, few.n_physical, few.n_tried) == (20, 20, 20)
+    assert options_of(["ablate", "--starts", "20"]).study().n_physical == 20
+    for command in ("league", "ablate"):
+        with pytest.raises(InputError, match="n_physical = 4; expected at most n_starts = 2"):
+            options_of([command, "--starts", "2", "--physical-starts", "4"]).study()
 
 
 @pytest.mark.slow
@@ -299,8 +442,10 @@ def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch:
     example = Path(__file__).parents[1] / "examples" / "tripod.py"
     options_of(["league", "--controllers", f"{example}:Tripod", "ldvs", *SMALL.split()]).run()
     shown = capsys.readouterr().out
-    assert "Standings" in shown and "tripod.py" in shown
-    assert {"league.nc", "league.png", "league.md", "manifest.json"} <= {one.name for one in Path("here").iterdir()}
+    assert "Standings" in shown and " tripod " in shown
+    assert {"league.nc", "league.png", "league_walks.png", "league.md", "manifest.json"} <= {
+        one.name for one in Path("here").iterdir()
+    }
 
 
 FAR = """
@@ -330,8 +475,9 @@ def test_who_cannot_be_filmed_costs_neither_tables_nor_manifest(
     options_of(words).run()
     shown = capsys.readouterr()
     assert "no video: " in shown.err and "Standings" in shown.out
-    assert "below far.py:Far on the same starts" in " ".join(shown.out.split()), "the first from random starts"
-    assert {"league.nc", "league.png", "league.md", "manifest.json"} == {one.name for one in Path("here").glob("*.*")}
+    assert "below far on the same starts" in " ".join(shown.out.split()), "the first from random starts"
+    written = {"league.nc", "league.png", "league_walks.png", "league.md", "manifest.json"}
+    assert written == {one.name for one in Path("here").glob("*.*")}
 
 
 @pytest.mark.parametrize(

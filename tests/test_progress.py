@@ -80,6 +80,23 @@ def test_without_a_terminal_lines_are_printed(monkeypatch, capsys):
     assert first.startswith(r"walking\n: 50% in 0 s, about 0 s to go")
 
 
+def test_a_terminal_is_told_of_compiling_while_nothing_is_done(monkeypatch):
+    """And no longer."""
+    screen = Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(progress, "EVERY", 0.0)
+    with progress.progress_bar("walking") as told:
+        told(0.5)
+        before = len(screen.text)
+        time.sleep(0.3)
+    assert progress.FIRST not in screen.text[before:]
+    with progress.progress_bar("walking"):
+        time.sleep(0.3)
+    assert progress.FIRST in screen.text
+
+
 def test_a_command_without_a_terminal_prints_lines_on_standard_error():
     words = ["flss", "--starts", "2000", "--velocities", "0.5", "--json"]
     program = f"""
@@ -94,7 +111,9 @@ from hexmj.cli.main import main
 main()
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stderr.startswith("kinematic FLSS: 0% in 0 s\n")
+    first, *others = done.stderr.splitlines()
+    assert first == f"kinematic FLSS: 0% in 0 s; {progress.FIRST}"
+    assert not any(progress.FIRST in line for line in others), "it is said once"
     assert done.stdout.startswith("{")
 
 
@@ -119,5 +138,5 @@ def test_a_notebook_shows_the_browsers_own_bar(monkeypatch):
     monkeypatch.setattr("IPython.display.display", display)
     monkeypatch.setattr(progress, "OFTEN", 0.0)
     CALLS["flss"](progress=True)
-    assert states[0] == 'computing <progress max="1" value="0.000"></progress> 0%'
+    assert states[0] == f'computing <progress max="1" value="0.000"></progress> 0% {progress.FIRST}'
     assert states[-1].endswith(" 100%")

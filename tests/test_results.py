@@ -95,6 +95,21 @@ def check_it_stays_the_same(result: xr.Dataset, folder: Path) -> None:
                 assert pixels(read, which) == pixels(result, which)
 
 
+def lone(figure: Any) -> list[str]:
+    """Lines through a single point that have no mark, and so are not seen."""
+    lines = [line for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()) == 1]
+    return [line.get_label() for line in lines if line.get_marker() in ("None", "", " ", None)]
+
+
+def test_what_is_drawn_at_one_velocity_is_seen():
+    recording = recorded()
+    for result in (*(MADE[name]().isel(velocity=[0]) for name in ("flss", "compare")), recording.isel(step=slice(1))):
+        figure = hexmj.plot(result)
+        assert lone(figure) == [] and any(axes.get_lines() for axes in figure.axes)
+    with pytest.raises(InputError, match=r"the recording .* holds no steps; expected at least one"):
+        hexmj.plot(recording.isel(step=slice(0)))
+
+
 @pytest.mark.parametrize("name", MADE)
 def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(MADE[name](), tmp_path)
@@ -138,6 +153,8 @@ def test_the_title_tells_what_was_chosen():
         assert words in title
     assert "height" not in title, "what is as usual is not told"
     assert "ldvs, reading the legs" in hexmj.plot(flss()).get_suptitle()
+    walknet = hexmj.flss(hexmj.load_controller("walknet"), [0.5], n_starts=5)
+    assert hexmj.plot(walknet).get_suptitle().count("reading") == 0, "its own reading is another thing"
     lasting = hexmj.flss(hexmj.load_controller("lasting"), [0.5], n_starts=5)
     assert "lasting (reading lasting)" in hexmj.plot(lasting).get_suptitle()
 

@@ -299,6 +299,37 @@ def test_ties_are_broken_by_later_losses_and_nothing_else_is():
     assert len(set(flss)) > 3
     assert ((costs >= 0) & (costs <= 1)).all()
     assert (costs[np.lexsort((part, flss))] == np.sort(costs)).all()
+    for sample, known in ((plain, flss), (later, costs)):
+        assert [sample.lost(cost) for cost in known] == np.rint(n * flss).tolist()
+
+
+@pytest.mark.parametrize(
+    ("ties", "over", "said"),
+    [
+        ("equal", "usual", "FLSS"),
+        ("equal", "worst", "greatest FLSS of all variants"),
+        ("later", "usual", "(starts lost + mean part of the time lost) / (starts + 1)"),
+        ("later", "mean", "mean over variants of (starts lost + mean part of the time lost) / (starts + 1)"),
+    ],
+)
+def test_a_cost_is_called_what_it_is(ties: Any, over: Any, said: str):
+    problem = Problem(NetworkForm("hws"), 0.4, 0.4, 10.0, ties=ties, over=over)
+    found = search(problem, Effort(starts=4, budget=10, refine_starts=6, refine_budget=2))
+    assert found.history.cost.attrs["long_name"] == said
+    assert found.starts == 6 and (found.lost is None) == (over == "mean")
+    figure = convergence_figure(found.history, "title")
+    label, below = figure.axes[0].get_ylabel(), figure.legends[0].get_title().get_text()
+    assert label.startswith("FLSS on") == (said == "FLSS")
+    assert below.endswith(f"cost: {said}") == (said != "FLSS")
+
+
+def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
+    words = ["--form", "hws", "--ties", "later", "--window", "10", "--starts", 10, "--budget", 10, "--refine-budget", 0]
+    code, shown, _ = run("search", *words, "--verdict-starts", 20, "--out", tmp_path)
+    told = " ".join(shown.split())
+    assert code == 0 and "later losses first among equals" in told
+    assert "((starts lost + mean part of the time lost) / (starts + 1), at which " in told
+    assert " of 10 starts were lost)" in told
 
 
 def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():

@@ -22,6 +22,7 @@ from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.video import _view, render
+from hexmj.replay.footfall import walk_figure
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.replay.schema import MEASURED, PLANNED
 from hexmj.replay.take import Take
@@ -119,6 +120,23 @@ def test_a_gif_plays_the_same_walk(fallen, tmp_path):
     with Image.open(tmp_path / "film.gif") as film:
         assert (getattr(film, "n_frames", 1), film.size) == (frames, (320, 240))
         assert sum(film.info["duration"] for film in ImageSequence.Iterator(film)) == pytest.approx(1200, abs=100)
+
+
+@pytest.mark.parametrize("kind", ["fallen", "plan"])
+def test_a_film_and_the_figure_of_its_walk_have_the_same_bars(kind: str, request):
+    """Which are black in both: a foot off the ground, or a protraction of a puppet."""
+    recording = request.getfixturevalue(kind)
+    take = Take.of(recording)
+    footfall = walk_figure(recording).axes[0]
+    time, step = recording.time.values, recording.attrs["dt"]
+    bars = [one for one in footfall.collections if np.ptp(one.get_facecolor()[0][:3]) == 0]
+    assert len(bars) == 6
+    for leg, one in enumerate(bars):
+        spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in one.get_paths()]
+        drawn = [any(low < end - step / 2 < high for low, high in spans) for end in time[: len(take.stance)]]
+        assert np.array_equal(drawn, ~take.stance[:, leg])
+        assert all(high <= time[len(take.stance) - 1] + 1e-9 for _, high in spans), "none after a fall"
+        assert all(path.vertices[:, 1].min() < leg < path.vertices[:, 1].max() for path in one.get_paths())
 
 
 def test_what_is_stable_is_told_without_colours(fallen):

@@ -212,7 +212,14 @@ def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         code, _, error = run("view", "--browser", "--port", taken.getsockname()[1])
         assert (code, error.count("\n")) == (2, 1)
-        assert "expected a free port" in error
+        assert f"--port {taken.getsockname()[1]} at 127.0.0.1: " in error and "expected a free port" in error
+    for words, said in (
+        (("--port", -1), "--port -1; expected 1 to 65535, or 0 for any that is free"),
+        (("--port", 70000), "--port 70000; expected 1 to 65535"),
+        (("--host", "nonsense.invalid"), "--host nonsense.invalid: no such name; expected an address of this machine"),
+    ):
+        code, _, error = run("view", "--browser", *words)
+        assert (code, error.count("\n")) == (2, 1) and error.startswith(f"hexmj: {said}")
     monkeypatch.setitem(sys.modules, "viser", None)
     code, _, error = run("view", "--browser", "--port", 0)
     assert code == 2

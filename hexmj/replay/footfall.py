@@ -49,10 +49,10 @@ def walk_figure(recording: "xr.Dataset") -> "Picture":
     if physical:
         measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
         margin.plot(time, measured, color="0.15", linewidth=1.0, label="measured", **mark)
-        if np.isfinite(fall := float(recording.fall_time)):
+        if (fall := float(recording.fall_time)) <= time[-1]:
             margin.axvline(fall, color=MEASURE_COLOURS["physical"], linewidth=1.4, label="trunk on the ground")
     margin.set(xlabel="time [time units]", ylabel="stability margin [mm]", xlim=(0.0, time[-1]))
-    margin.legend(frameon=False, fontsize=8, loc="lower right", ncols=3)
+    figure.legend(frameon=False, fontsize=8, loc="outside lower center", ncols=3)
     for axes in (footfall, margin):
         axes.spines[["top", "right"]].set_visible(False)
     return figure

@@ -28,7 +28,10 @@ def convergence_figure(history: "xr.Dataset", title: str) -> "Picture":
         here = history.stage.values == number
         if here.any():
             axes.plot(evaluation[here], history.cost.values[here], ".", color=colour, markersize=2.5, alpha=0.35)
-            axes.plot(evaluation[here], history.best.values[here], color=colour, linewidth=1.8, label=stage)
+            mark = "o" if here.sum() == 1 else None  # a line through one point is none
+            axes.plot(
+                evaluation[here], history.best.values[here], color=colour, linewidth=1.8, marker=mark, label=stage
+            )
     cost = history.cost.attrs["long_name"]
     of = "cost" if cost != FREQUENCY else cost
     axes.set(xlabel="evaluations of the cost function", ylabel=f"{of} on the starts of the stage", ylim=(-0.02, 1.02))

@@ -21,6 +21,9 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 """Of the strategies."""
 UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
+BESIDE = 0.05
+"""Room on both sides of the velocities."""
+
 ROWS = {"kinematic": "on paper (kinematic)", "physical": "falls (physical)"}
 """Measure -> what its row of panels is called."""
 
@@ -52,6 +55,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
             frequency_curve(axes, x, one.isel(case=case), measure, **STYLES[strategy])
         axes.set(ylim=(-0.03, 1.03))
         velocity_ticks(axes, one.velocity.values)
+        axes.set_xlim(one.velocity.values.min() - BESIDE, one.velocity.values.max() + BESIDE)
         tidy(axes)
     for column, kind in enumerate(kinds):
         panels[0, column].set_title(_title(kind), fontsize=10)

@@ -19,8 +19,14 @@ if TYPE_CHECKING:
 SHARES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
 """Between these shares a colour is the same."""
 
+PHASES = (*np.arange(-1, 26, 2) / 24,)
+"""Likewise of phases, whose usual ones, twelfths of a cycle, are in the middle of a colour."""
+
 FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
 """In a cell of which walks are missing, and in one of which nothing is known."""
+
+BAR: dict[str, Any] = {"location": "bottom", "fraction": 0.03, "format": "%g"}
+"""Of the colours, below their panels."""
 
 NAMED = 6
 """Most entrants that a note names."""
@@ -58,7 +64,7 @@ def league_figure(result: "xr.Dataset") -> "Picture":
     images = [_heat(one, panel) for one, panel in zip(axes, panels, strict=False)]
     for one in axes[:3]:
         _velocities(one, shown)
-    how: dict[str, Any] = {"location": "bottom", "aspect": 60, "fraction": 0.03, "shrink": 0.7}
+    how: dict[str, Any] = BAR | {"aspect": 460 / figure.get_figheight(), "shrink": 0.7}
     figure.colorbar(images[0], ax=axes[:3], **how).set_label("share of the starts", fontsize=9)
     _dots(axes[3], shown)
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
@@ -74,17 +80,17 @@ def walks_figure(result: "xr.Dataset") -> "Picture":
     panels = (
         Panel(trials, shown.fell.values, "YlOrRd", SHARES, (few > 0) & (few < few.max())),
         Panel("limit regimes that are\nstatically stable", shown.stable.values, "YlGn", SHARES),
-        Panel("ipsilateral phase\nof the regimes", shown.ipsilateral.values, "twilight", (*np.linspace(0, 1, 10),)),
+        Panel("ipsilateral phase\nof the regimes", shown.ipsilateral.values, "twilight", PHASES),
         Panel("cost of transport\nof walks without a fall", shown.cost.values, "PuBu", _round_levels(shown.cost.values),
               shown.missing.values > 0),
     )  # fmt: skip
-    figure, axes = _rows(shown, (shown.sizes["trial"] / shown.sizes["velocity"], 1.0, 1.0, 1.0))
+    figure, axes = _rows(shown, (1.33, 1.0, 1.0, 1.0))
     labels = ("share of the starts", "share of the starts", "phase", "")
     for one, panel, label in zip(axes, panels, labels, strict=True):
-        bar = figure.colorbar(_heat(one, panel), ax=one, location="bottom", aspect=25, fraction=0.03)
+        bar = figure.colorbar(_heat(one, panel), ax=one, **BAR, aspect=190 / figure.get_figheight())
         bar.ax.tick_params(labelsize=7)
         if panel.colours == "twilight":
-            bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])  # 0.5 is in the middle of a colour
+            bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])
         bar.set_label(label, fontsize=9)
         _velocities(one, shown)
     turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
@@ -131,7 +137,7 @@ def _round_levels(values: np.ndarray) -> tuple[float, ...]:
 
     known = values[np.isfinite(values)]
     ends = (known.min(), known.max()) if known.size else (0.0, 1.0)
-    return (*MaxNLocator(8, min_n_ticks=2).tick_values(ends[0], max(ends[1], ends[0] + 0.1)),)
+    return (*MaxNLocator(6, min_n_ticks=2).tick_values(ends[0], max(ends[1], ends[0] + 0.1)),)
 
 
 def _missing(shown: "xr.Dataset") -> str:

@@ -97,6 +97,7 @@ def _v_axis(axes: "Axes", result: "xr.Dataset") -> None:
     axes.set_xscale("log")
     axes.set_xticks(result.vp.values, [f"{vp:g}" for vp in result.vp.values])
     axes.minorticks_off()
+    axes.set_xlim(0.85 * result.vp.values.min(), result.vp.values.max() / 0.85)
     tidy(axes)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(frameon=False, fontsize=9)
