@@ -129,14 +129,15 @@ def test_a_film_and_the_figure_of_its_walk_have_the_same_bars(kind: str, request
     take = Take.of(recording)
     footfall = walk_figure(recording).axes[0]
     time, step = recording.time.values, recording.attrs["dt"]
-    bars = [one for one in footfall.collections if np.ptp(one.get_facecolor()[0][:3]) == 0]
+    bars = [one for one in footfall.collections if np.ptp(np.asarray(one.get_facecolor())[0, :3]) == 0]
     assert len(bars) == 6
     for leg, one in enumerate(bars):
-        spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in one.get_paths()]
+        corners = [np.asarray(path.vertices) for path in one.get_paths()]
+        spans = [(np.min(corner[:, 0]), np.max(corner[:, 0])) for corner in corners]
         drawn = [any(low < end - step / 2 < high for low, high in spans) for end in time[: len(take.stance)]]
         assert np.array_equal(drawn, ~take.stance[:, leg])
         assert all(high <= time[len(take.stance) - 1] + 1e-9 for _, high in spans), "none after a fall"
-        assert all(path.vertices[:, 1].min() < leg < path.vertices[:, 1].max() for path in one.get_paths())
+        assert all(np.min(corner[:, 1]) < leg < np.max(corner[:, 1]) for corner in corners)
 
 
 def test_what_is_stable_is_told_without_colours(fallen):
