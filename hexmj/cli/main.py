@@ -148,6 +148,8 @@ def main() -> None:
         _drop_output()
         sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
     except Exception as error:
+        if "can't start new thread" in str(error):
+            sys.exit(_complain("the memory, or a limit of processes, does not suffice for a thread", 2))
         if not is_of_numbas_cache(error):
             raise
         sys.exit(_complain(f"{NUMBA} ({type(error).__name__}: {error})", 2))

@@ -26,11 +26,11 @@ def workers_of(address: str) -> Iterator[Executor]:
     Raises:
         InputError: Dask is not installed, the scheduler cannot be reached, or a cell killed its workers.
     """
-    print(f"hexmj: connecting to the scheduler at {literal(address)}", file=sys.stderr, flush=True)
     try:
         from distributed import Client, KilledWorker
     except ModuleNotFoundError:
         raise without_extra("dask", "distributed, which a scheduler needs,") from None
+    print(f"hexmj: connecting to the scheduler at {literal(address)}", file=sys.stderr, flush=True)
     with _quiet():
         if not _found(address)["workers"]:
             print(f"hexmj: the scheduler at {address} has no workers yet; cells wait for them", file=sys.stderr)

@@ -58,17 +58,14 @@ def check_port(host: str, port: int) -> None:
     if not 0 <= port <= MOST_PORT:
         raise InputError(f"--port {port}; expected 1 to {MOST_PORT}, or 0 for any that is free")
     try:
-        known = socket.getaddrinfo(host, None)
-    except (OSError, UnicodeError):
-        known = []
-    try:
+        socket.getaddrinfo(host, None)
         with socket.create_server((host, 0)):
             pass
     except (OSError, UnicodeError) as error:
-        reason = error.strerror if known and isinstance(error, OSError) else "no such name"
+        unknown = isinstance(error, socket.gaierror | UnicodeError)
         raise InputError(
-            f"--host {host}: {literal(str(reason))}; expected an address of this machine, such as 127.0.0.1, or"
-            " 0.0.0.0 for all of them"
+            f"--host {literal(host)}: {'no such name' if unknown else error.strerror}; expected an address of this"
+            " machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
     try:
         with socket.create_server((host, port)):

@@ -1,8 +1,8 @@
 """Every combination of readings and orders against the plain network, to the last bit; each is compiled by itself.
 
-    python -m tests.long.every_reading
+    PYTHONPATH=tests python -m tests.long.every_reading
 
-Random weights, starts, geometries and accelerations as in `tests/test_network.py`, which has six of the 72.
+Random weights, starts, geometries and accelerations as in `tests/test_network.py`, which has six of the 144.
 """
 
 import sys
