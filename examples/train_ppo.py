@@ -1,6 +1,6 @@
 """Reflexes that keep LDVS upright, learned by PPO of stable-baselines3 (`pip install "hexmj[rl]"`).
 
-An action is six gains, the same in every leg, which are held while the insect walks for 10 time units; the reflexes
+An action is four gains, the same in every leg, which are held while the insect walks for 10 time units; the reflexes
 answer at every step.  `python examples/train_ppo.py` writes the gains that PPO found beside itself; they walk without
 stable-baselines3: `hexmj league --controllers examples/train_ppo.py:RIGHTING ldvs`.
 """
@@ -18,9 +18,10 @@ from hexmj.environments.learned import TILT, TURNING, WithOffsets
 FOUND = Path(__file__).with_name("righting.json")
 VELOCITY, WINDOW, STARTS = 0.6, 40.0, 200  # V_r, the window `start` [time units], and fresh starts to judge by
 STRIDE, HELD = hexmj.Stride(dt=0.2), 50  # time step while learning [time units], and steps that an action lasts
-INSECTS, ACTIONS, ROLLOUTS = 128, 2, 40  # so many actions of each insect between two updates
+INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # so many actions of each insect between two updates
 SPREAD = 0.2  # of the gains that are tried; it stays
 FALL, TIPPING = 200.0, 0.25  # cost of a fall, and of the square of tipping ahead; a step is worth 1 at most
+LEAN = 0.5  # at which a gain of 1 lifts by all, as usual tipping does [usual tilt]
 
 LEFT = np.array([1, 1, 1, -1, -1, -1])  # +1 on the left
 AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
@@ -28,15 +29,13 @@ AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
 
 @dataclass(frozen=True)
 class Righting:
-    """Where the tips stand, and how they press down or give way as the body leans and tips; -1 to 1 of the most."""
+    """Where the tips stand, and how they answer as the body leans and tips ahead or back; -1 to 1."""
 
     forward: float = 0.0
     outward: float = 0.0
-    up_as_it_leans_ahead: float = 0.0
-    """Up where the body leans to; less than 0 presses down there."""
-    up_as_it_leans_aside: float = 0.0
-    up_as_it_tips_ahead: float = 0.0
-    up_as_it_tips_aside: float = 0.0
+    up_as_it_leans: float = 0.0
+    """Up in front as it leans ahead; less than 0 presses down where it leans to."""
+    up_as_it_tips: float = 0.0
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
         """Offsets of the tips, (n, leg * axis)."""
@@ -45,12 +44,10 @@ class Righting:
 
 def offsets(gains: np.ndarray, felt: np.ndarray) -> np.ndarray:
     """Offsets, (n, leg * axis), by gains, (n or 1, gain)."""
-    forward, outward, *up = np.broadcast_to(gains, (len(felt), 6)).T[..., None]
-    (ahead, left), (over_right, over_front, _) = felt[:, TILT].T[..., None], felt[:, TURNING].T[..., None]
-    reasons = ahead * AHEAD, left * LEFT, over_front * AHEAD, -over_right * LEFT
-    height = sum(gain * reason for gain, reason in zip(up, reasons, strict=True))
-    moved = np.stack([forward + 0 * height, outward * LEFT, height], axis=-1)
-    return np.clip(moved, -1, 1).reshape(-1, 18)
+    forward, outward, leans, tips = np.broadcast_to(gains, (len(felt), 4)).T[..., None]
+    leaning, tipping = felt[:, TILT][:, :1] / LEAN, felt[:, TURNING][:, 1:2]
+    up = (leans * leaning + tips * tipping) * AHEAD
+    return np.clip(np.stack([forward + 0 * up, outward * LEFT, up], axis=-1), -1, 1).reshape(-1, 18)
 
 
 def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray:
@@ -67,7 +64,7 @@ def main() -> None:
     insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=STRIDE)
     size, net = INSECTS * ACTIONS, {"net_arch": [], "log_std_init": float(np.log(SPREAD))}
     agent = PPO(
-        "MlpPolicy", HeldInsects(insects, 6, HELD, offsets, reward), policy_kwargs=net, n_steps=ACTIONS,
+        "MlpPolicy", HeldInsects(insects, 4, HELD, offsets, reward), policy_kwargs=net, n_steps=ACTIONS,
         batch_size=size, n_epochs=10, gamma=0.9, gae_lambda=0.9, learning_rate=1e-2, seed=1, device="cpu",
     )  # fmt: skip
     agent.policy.log_std.requires_grad = False
