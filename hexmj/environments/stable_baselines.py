@@ -91,12 +91,12 @@ class HeldInsects(VecEnvWrapper):
         """Actions of so many numbers, -1 to 1, each held for so many steps."""
         nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
         super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, (numbers,), np.float32))
-        self._steps, self._moves, self._reward = steps, moves, reward
+        self._insects, self._steps, self._moves, self._reward = insects, steps, moves, reward
         self._constant = np.ones((self.num_envs, 1), np.float32)
 
     def reset(self) -> np.ndarray:
         """Begin all episodes."""
-        self._felt = self.venv.reset()
+        self._felt = self._insects.reset()
         return self._constant
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -108,8 +108,8 @@ class HeldInsects(VecEnvWrapper):
         reward, done = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for _ in range(self._steps):
-            self.venv.step_async(self._moves(self._actions, self._felt))
-            self._felt, gained, ends, told = self.venv.step_wait()
+            self._insects.step_async(self._moves(self._actions, self._felt))
+            self._felt, gained, ends, told = self._insects.step_wait()
             fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in told])
             reward += ~done * self._reward(gained, self._felt, fell)
             for i in np.flatnonzero(ends & ~done).tolist():
