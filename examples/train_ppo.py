@@ -1,79 +1,93 @@
-"""Offsets to LDVS's tips learned by PPO of stable-baselines3 (`pip install ".[rl]"`), so that fewer insects fall.
+"""Reflexes that keep LDVS upright, learned by PPO of stable-baselines3 (`pip install ".[rl]"`).
 
-The policy is a small network; what was learned is written as numbers, so that it walks without stable-baselines3:
-`hexmj league --controllers examples/train_ppo.py:NETWORK ldvs`.
+An action is four gains, the same in every leg, which are held while the insect walks for 10 time units; the reflexes
+answer at every step.  `python examples/train_ppo.py` writes the gains that PPO found beside itself; they walk without
+stable-baselines3: `hexmj league --controllers examples/train_ppo.py:RIGHTING ldvs`.
 """
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 
 import numpy as np
 
 import hexmj
-from hexmj.environments.learned import FELT, WithOffsets
+from hexmj.environments.learned import TILT, TURNING, WithOffsets
 
-FOUND = Path(__file__).with_name("network.json")
-VELOCITY, WINDOW = 0.6, 40.0  # V_r, and the window `start` [time units]
-INSECTS, STEPS, HIDDEN = 64, 300_000, 32
-COARSE = 0.5  # time step of the plan [time units]: an action lasts 6.25 ms at V_p = 80 mm/s
-QUIET = 0.2  # size of the first actions: loud ones shake the insect off its feet
-MOST_FELT = 10.0
+FOUND = Path(__file__).with_name("righting.json")
+VELOCITY, WINDOW, STARTS = 0.6, 40.0, 200  # V_r, the window `start` [time units], and fresh starts to judge by
+STRIDE, HELD = hexmj.Stride(dt=0.2), 50  # time step while learning [time units], and steps that an action lasts
+INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # so many actions of each insect between two updates
+SPREAD = 0.2  # of the gains that are tried; it stays
+FALL, TIPPING = 200.0, 0.25  # cost of a fall, and of the square of tipping ahead; a step is worth 1 at most
+LEAN = 0.5  # at which a gain of 1 lifts by all, as usual tipping does [usual tilt]
+
+LEFT = np.array([1, 1, 1, -1, -1, -1])  # +1 on the left
+AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
 
 
 @dataclass(frozen=True)
-class Network:
-    """Layers of tanh, the last one linear; without any no offsets."""
+class Righting:
+    """Where the tips stand, and how they answer as the body leans and tips ahead or back; -1 to 1."""
 
-    layers: tuple[tuple[tuple[tuple[float, ...], ...], tuple[float, ...]], ...] = ()
-    """Weights and biases of each."""
+    forward: float = 0.0
+    outward: float = 0.0
+    up_as_it_leans: float = 0.0
+    """Up in front as it leans ahead; less than 0 presses down where it leans to."""
+    up_as_it_tips: float = 0.0
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
         """Offsets of the tips, (n, leg * axis)."""
-        now = np.clip(felt, -MOST_FELT, MOST_FELT)
-        for weights, biases in self.layers[:-1]:
-            now = np.tanh(now @ np.array(weights).T + np.array(biases))
-        for weights, biases in self.layers[-1:]:
-            return now @ np.array(weights).T + np.array(biases)
-        return np.zeros((len(felt), 18))
+        return offsets(np.array([astuple(self)]), felt)
+
+
+def offsets(gains: np.ndarray, felt: np.ndarray) -> np.ndarray:
+    """Offsets, (n, leg * axis), by gains, (n or 1, gain)."""
+    forward, outward, leans, tips = np.broadcast_to(gains, (len(felt), 4)).T[..., None]
+    leaning, tipping = felt[:, TILT][:, :1] / LEAN, felt[:, TURNING][:, 1:2]
+    up = (leans * leaning + tips * tipping) * AHEAD
+    return np.clip(np.stack([forward + 0 * up, outward * LEFT, up], axis=-1), -1, 1).reshape(-1, 18)
+
+
+def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray:
+    """The environment's for walking upright at the velocity, less what a fall and tipping ahead or back cost."""
+    return walked - TIPPING * np.minimum(felt[:, TURNING][:, 1] ** 2, 9.0) - FALL * fell
 
 
 def main() -> None:
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
-    from stable_baselines3.common.vec_env import VecNormalize  # pyright: ignore[reportMissingImports]
 
-    from hexmj.environments.stable_baselines import FeltInsects
+    from hexmj.environments.stable_baselines import FeltInsects, HeldInsects
 
-    began, insects = (
-        time.monotonic(),
-        FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=hexmj.Stride(dt=COARSE)),
-    )
-    net: dict = {"net_arch": [HIDDEN, HIDDEN], "log_std_init": float(np.log(QUIET))}
+    began, cpu = time.monotonic(), time.process_time()
+    insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=STRIDE)
+    size, net = INSECTS * ACTIONS, {"net_arch": [], "log_std_init": float(np.log(SPREAD))}
     agent = PPO(
-        "MlpPolicy", VecNormalize(insects, norm_obs=False, gamma=0.98), policy_kwargs=net,
-        n_steps=80, batch_size=1024, n_epochs=10, gamma=0.98,
-        learning_rate=1e-3, seed=1, device="cpu",
+        "MlpPolicy", HeldInsects(insects, 4, HELD, offsets, reward), policy_kwargs=net, n_steps=ACTIONS,
+        batch_size=size, n_epochs=10, gamma=0.9, gae_lambda=0.9, learning_rate=1e-2, seed=1, device="cpu",
     )  # fmt: skip
-    agent.learn(STEPS)
-    policy = agent.policy
-    layers = [one for one in policy.mlp_extractor.policy_net if hasattr(one, "weight")] + [policy.action_net]
-    kept = [[one.weight.detach().numpy().round(4).tolist(), one.bias.detach().numpy().tolist()] for one in layers]
-    FOUND.write_text(json.dumps(kept), encoding="utf-8")
-    print(f"{FOUND.name} after {time.monotonic() - began:.0f} s, {FELT} numbers felt")
-    result = hexmj.compare({"ldvs": hexmj.LDVS, "network": found()}, [VELOCITY], n_starts=200, window="start", seed=77)
-    for name, falls in zip(("ldvs", "network"), result.physical.values[:, 0], strict=True):
-        print(f"{name}: physical FLSS of the start at V = {VELOCITY:g} is {falls:.2f} of 200 fresh starts")
+    agent.policy.log_std.requires_grad = False
+    agent.learn(ROLLOUTS * size)
+    gains = agent.predict(np.ones(1, np.float32), deterministic=True)[0].astype(float).round(3)
+    kept = {"made by": "python examples/train_ppo.py", "gains": asdict(Righting(*gains.tolist()))}
+    FOUND.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+    spent = f"{time.monotonic() - began:.0f} s, {time.process_time() - cpu:.0f} s of processor time"
+    print(f"{FOUND.name} after {agent.num_timesteps} actions in {spent}")
+    both = {"ldvs": hexmj.LDVS, "righting": found()}
+    result = hexmj.compare(both, [VELOCITY], n_starts=STARTS, window="start", seed=77)
+    ends = (result[name].values[:, 0] for name in ("physical", "physical_low", "physical_high"))
+    for name, falls, low, high in zip(both, *ends, strict=True):
+        print(f"{name}: {falls:.2f} ({low:.2f} to {high:.2f}) fall at V = {VELOCITY:g}, of {STARTS} fresh starts")
 
 
 def found() -> WithOffsets:
-    """LDVS with the network that was found."""
-    kept = json.loads(FOUND.read_text(encoding="utf-8")) if FOUND.exists() else []
-    layers = tuple((tuple(map(tuple, weights)), tuple(biases)) for weights, biases in kept)
-    return WithOffsets(Network(layers), name="network")
+    """LDVS with the gains that were found."""
+    return WithOffsets(Righting(**json.loads(FOUND.read_text(encoding="utf-8"))["gains"]), name="righting")
 
 
-NETWORK = found()
+if FOUND.exists():
+    RIGHTING = found()
 
 if __name__ == "__main__":
     main()

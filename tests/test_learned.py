@@ -1,6 +1,7 @@
 """What was learned walks as a controller, and the examples that train do so, made small."""
 
 import importlib
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -12,6 +13,7 @@ import hexmj
 from hexmj.controllers.conformance import check_controller
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
+from hexmj.loaded import importable
 
 ROOT = Path(__file__).parents[1]
 
@@ -92,13 +94,47 @@ def test_cma_trains(example, monkeypatch, capsys):
 def test_ppo_trains(example, monkeypatch, capsys):
     pytest.importorskip("stable_baselines3", exc_type=ImportError)
     module = example("train_ppo")
-    for name, small in {"INSECTS": 4, "STEPS": 512, "WINDOW": 5.0}.items():
+    for name, small in {"INSECTS": 4, "ROLLOUTS": 2, "HELD": 10, "WINDOW": 5.0, "STARTS": 3}.items():
         monkeypatch.setattr(module, name, small)
-    compare = hexmj.compare
-    monkeypatch.setattr(hexmj, "compare", lambda *args, **options: compare(*args, **options | {"n_starts": 3}))
     module.main()
-    assert "network: physical FLSS of the start at V = 0.6 is" in capsys.readouterr().out
-    assert module.found().policy(np.zeros((2, FELT))).shape == (2, 18)
+    said = capsys.readouterr().out
+    assert "16 actions" in said and "righting: " in said and "fall at V = 0.6, of 3 fresh starts" in said
+    assert module.found().policy != module.Righting()
+
+
+@pytest.mark.slow
+def test_an_action_is_held_and_rewarded_until_the_first_end():
+    """An episode of 3 steps ends within an action of 4; the fourth is another's, and nobody pays for it."""
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    face, counted = importlib.import_module("hexmj.environments.stable_baselines"), []
+
+    def still(actions: np.ndarray, felt: np.ndarray) -> np.ndarray:
+        counted.append(actions)
+        return np.zeros((len(felt), 18))
+
+    insects = face.FeltInsects(2, velocity=0.3, duration=0.3)
+    held = face.HeldInsects(insects, 5, 4, still, lambda walked, felt, fell: np.ones(len(walked)))
+    assert held.reset().shape == (2, 1)
+    seen, reward, done, infos = held.step(np.full((2, 5), 0.5))
+    assert len(counted) == 4 and counted[0].shape == (2, 5) and seen.shape == (2, 1)
+    np.testing.assert_array_equal(reward, 0.75)
+    assert done.all() and all(one["TimeLimit.truncated"] and one["terminal_observation"] == 1 for one in infos)
+
+
+def test_what_ppo_found_is_there_and_is_the_same_in_every_leg_mirrored(example):
+    module = example("train_ppo")
+    policy, seen = module.RIGHTING.policy, np.random.default_rng(0).normal(size=(3, FELT))
+    assert np.abs(policy(seen)).max() > 0.1
+    mirrored = seen.copy()
+    mirrored[:, [1, 5, 7]] *= -1.0  # lean to the left, and turning about the axes ahead and up
+    legs = policy(seen).reshape(3, 2, 3, 3)[:, ::-1] * [1.0, -1.0, 1.0]
+    np.testing.assert_allclose(policy(mirrored), legs.reshape(3, 18), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name, learned", [("train_cma", "REFLEXES"), ("train_ppo", "RIGHTING")])
+def test_without_what_was_found_there_is_no_controller(name, learned, tmp_path):
+    copy = shutil.copy(ROOT / "examples" / f"{name}.py", tmp_path)
+    assert not hasattr(importable(copy), learned)
 
 
 def test_without_stable_baselines_it_is_said_what_brings_it(monkeypatch):

@@ -1,10 +1,10 @@
 """Many insects for stable-baselines3, whose vector environments are not Gymnasium's: a thin face of `vector`.
 
 It observes what the insects feel (`learned.felt_in`), in single precision as its networks do, so that what is learned
-walks as a controller by `learned.WithOffsets`.
+walks as a controller by `learned.WithOffsets`.  `HeldInsects` are the same for actions that last.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from hexmj.errors import without_extra
 
 try:
     from gymnasium import spaces
-    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
+    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper  # pyright: ignore[reportMissingImports]
 except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
@@ -22,6 +22,12 @@ from hexmj.environments.vector import StickInsects
 
 MOST = 10.0
 """Greatest number that is felt, in usual sizes."""
+
+Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Offsets of the tips, (n, leg * axis), of actions, (n, number), and what is felt, (n, `FELT`)."""
+
+Reward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Of the environment's reward, what is felt and who fell, each (n, ...): the reward to learn by, (n,)."""
 
 
 class FeltInsects(VecEnv):
@@ -73,6 +79,44 @@ class FeltInsects(VecEnv):
 
     def _chosen(self, indices: int | Sequence[int] | None) -> list[int]:
         return list(self._get_indices(indices))
+
+
+class HeldInsects(VecEnvWrapper):
+    """Insects whose actions are few numbers for reflexes, held for many steps while the reflexes go on at each.
+
+    Nothing is observed but a constant: what is learned are the numbers themselves.  The reward is the mean of the
+    steps'; an insect whose episode ends goes on with a fresh one, unrewarded until the next action.
+    """
+
+    def __init__(self, insects: FeltInsects, numbers: int, steps: int, moves: Moves, reward: Reward) -> None:
+        """Actions of so many numbers, -1 to 1, each held for so many steps."""
+        nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
+        super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, (numbers,), np.float32))
+        self._insects, self._steps, self._moves, self._reward = insects, steps, moves, reward
+        self._constant = np.ones((self.num_envs, 1), np.float32)
+
+    def reset(self) -> np.ndarray:
+        """Begin all episodes."""
+        self._felt = self._insects.reset()
+        return self._constant
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Take the actions that `step_wait` will carry out."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """All steps of one action."""
+        reward, done = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for _ in range(self._steps):
+            self._insects.step_async(self._moves(self._actions, self._felt))
+            self._felt, gained, ends, told = self._insects.step_wait()
+            fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in told])
+            reward += ~done * self._reward(gained, self._felt, fell)
+            for i in np.flatnonzero(ends & ~done).tolist():
+                infos[i] = told[i] | {"terminal_observation": self._constant[i]}
+            done |= ends
+        return self._constant, (reward / self._steps).astype(np.float32), done, infos
 
 
 def _seen(observations: dict[str, np.ndarray]) -> np.ndarray:
