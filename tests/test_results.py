@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 from PIL import Image
 
 import hexmj
@@ -213,6 +214,13 @@ def test_a_damaged_result_is_no_result(tmp_path):
         path.write_bytes(wrong)
         with pytest.raises(InputError, match="is damaged"):
             hexmj.load(path)
+
+
+@pytest.mark.parametrize("name", ["walknet", "walknet-reacog", "walknet-load", "walknet-without-2"])
+def test_a_figure_of_walknet_whose_reading_is_not_the_networks(name: str):
+    result = hexmj.flss(hexmj.load_controller(name), [0.3], n_starts=3, window="start")
+    told = " ".join(text.get_text() for text in hexmj.plot(result).findobj(Text))
+    assert name in told and "reading" not in told
 
 
 def test_what_has_lost_its_velocities_gets_a_sentence():

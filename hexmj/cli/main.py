@@ -1,5 +1,6 @@
 """The command line: typed options in, one call to the package, tables and files out."""
 
+import errno
 import os
 import re
 import shlex
@@ -33,6 +34,9 @@ ABOUT = (
     "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice.\n\n"
     "hexmj --version tells the version; hexmj --completion bash (zsh, fish) prints what completes words in a shell."
 )
+
+SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
+"""What the system has too little of, where no file is named."""
 
 PIPED = ('$python_cmd -c "$pycode"', 'printf "%s\\n" "$pycode" | $python_cmd -')
 """How fish asks Python for words, and how it has to: an argument may not be as long as what our options say."""
@@ -146,7 +150,8 @@ def main() -> None:
         sys.exit(141)
     except OSError as error:
         _drop_output()
-        sys.exit(_complain(f"{error.filename or 'standard output'}: {error.strerror or error}", 2))
+        where = error.filename or ("the system" if error.errno in SHORT else "standard output")
+        sys.exit(_complain(f"{where}: {error.strerror or error}", 2))
     except Exception as error:
         if "can't start new thread" in str(error):
             sys.exit(_complain("the memory, or a limit of processes, does not suffice for a thread", 2))
