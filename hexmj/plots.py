@@ -28,6 +28,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "biology": {"biology": "studies.biology.figure:biology_figure"},
     "league": {"league": "studies.league.figure:league_figure", "walks": "studies.league.figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation.figure:ablation_figure"},
+    "search": {"convergence": "search.convergence:convergence_figure"},
     RECORDING: {"walk": "replay.footfall:walk_figure"},
 }
 """What a result is of, as its attribute `study` tells -> its figures by name, each a module and a function of it."""

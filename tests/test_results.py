@@ -15,6 +15,7 @@ from PIL import Image
 import hexmj
 from hexmj.errors import InputError
 from hexmj.plots import FIGURES
+from hexmj.search.stages import search
 from hexmj.sweeps import Study, conduct
 
 ALPHA = "ß: 1 $"
@@ -73,11 +74,17 @@ def study(name: str) -> xr.Dataset:
     return conduct(small[name]())
 
 
+def searched() -> xr.Dataset:
+    problem = hexmj.Problem(hexmj.NetworkForm("hws"), 0.4, 0.4, 10.0)
+    return search(problem, hexmj.Effort(starts=3, budget=10, refine_starts=3, refine_budget=2)).history
+
+
 MADE: dict[str, Callable[[], xr.Dataset]] = {
     "flss": flss,
     "compare": compared,
     "physical": fallen,
     "recording": recorded,
+    "search": searched,
 }
 STUDIES = [name for name in FIGURES if name not in MADE]
 

@@ -317,7 +317,7 @@ def test_a_cost_is_called_what_it_is(ties: Any, over: Any, said: str):
     found = search(problem, Effort(starts=4, budget=10, refine_starts=6, refine_budget=2))
     assert found.history.cost.attrs["long_name"] == said
     assert found.starts == 6 and (found.lost is None) == (over == "mean")
-    figure = convergence_figure(found.history, "title")
+    figure = convergence_figure(found.history.assign_attrs(title="title"))
     label, below = figure.axes[0].get_ylabel(), figure.legends[0].get_title().get_text()
     assert label.startswith("FLSS on") == (said == "FLSS")
     assert below.endswith(f"cost: {said}") == (said != "FLSS")
@@ -440,7 +440,7 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
     assert found.cost <= first < uncoordinated
     assert found.cost == history.best.values[-1] == history.cost.values[100:].min()
     assert (np.diff(history.best.values[:100]) <= 0).all()
-    assert convergence_figure(history, "title").axes[0].get_lines()
+    assert hexmj.plot(history).axes[0].get_lines()
 
 
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])

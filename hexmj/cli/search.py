@@ -218,10 +218,11 @@ class Search(WalkingCommand):
         from hexmj.search.convergence import convergence_figure
 
         text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
+        history = found.history.assign_attrs(title=self._title)
         files = [
-            save_dataset(found.history, self.out / "history.nc"),
+            save_dataset(history, self.out / "history.nc"),
             save_text(text, self.out / FOUND),
-            save_figure(convergence_figure(found.history, self._title), self.out / self._figure),
+            save_figure(convergence_figure(history), self.out / self._figure),
         ]
         return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
 

@@ -17,7 +17,7 @@ FREQUENCY = "FLSS"
 STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 
-def convergence_figure(history: "xr.Dataset", title: str) -> "Picture":
+def convergence_figure(history: "xr.Dataset") -> "Picture":
     """Every candidate's cost and the least so far against the number of evaluations, from `History.dataset`."""
     from hexmj.pictures import picture
 
@@ -35,7 +35,7 @@ def convergence_figure(history: "xr.Dataset", title: str) -> "Picture":
     cost = history.cost.attrs["long_name"]
     of = "cost" if cost != FREQUENCY else cost
     axes.set(xlabel="evaluations of the cost function", ylabel=f"{of} on the starts of the stage", ylim=(-0.02, 1.02))
-    axes.set_title(in_figure(title), fontsize=9)
+    axes.set_title(in_figure(history.attrs["title"]), fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
     title = "lines: least so far, dots: candidates" + (f"\ncost: {cost}" if cost != FREQUENCY else "")

@@ -45,4 +45,5 @@ class History:
                 "best": ("evaluation", best, {"units": "1", "long_name": f"least so far of the stage: {minimised}"}),
             },
             coords={"parameter": list(names)},
+            attrs={"study": "search", "title": minimised},
         )
