@@ -17,6 +17,8 @@ from hexmj.paper.readings import (
     CALIBRATED,
     CHOICES,
     agreeing,
+    choice_in,
+    chosen,
     combinations,
     effects,
     gained,
@@ -125,13 +127,15 @@ def test_held_out_claims_rank_and_calibrated_ones_do_not():
     assert "| ipsilateral lasting | 3 / 3 | 3 / 3 | 0 / 0 | 0.25 / 0.25 | 9, -9, -25, centred |" in page
     assert "gains ldvs-late, hws-majority; loses none" in page
     assert "| ipsilateral lasting | 2 of 2 | 0.0123 |" in page
-    assert len(readings_figure(scores, readings).axes) == len(CHOICES)
+    assert len(readings_figure(scores).axes) == len(CHOICES)
 
 
 def test_choices_are_read_and_titled():
     one = read(SCORING, {"order": "undelayed", "cap": "sum", "looks": "periods", "margin": 1.0})
     assert title(one) == "order undelayed, cap sum, looks periods, margin 1.0"
     assert (one.order, one.reading, one.looks, one.margin) == ("undelayed", Reading(cap="sum"), "periods", 1.0)
+    for one in combinations(SCORING):
+        assert {name: choice_in(title(one), name) for name in CHOICES} == {name: chosen(one, name) for name in CHOICES}
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,9 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 }
 """Choices that every walk depends on, the printed one first; all are combined."""
 
+AS_PRINTED = "as printed"
+"""Title of the reading with no other choice."""
+
 ASIDE: dict[str, tuple[Any, ...]] = {
     "neutral": ("present", "final"),
     "looks": ("steps", "periods"),
@@ -59,7 +62,13 @@ def chosen(protocol: Protocol, name: str) -> Any:
 def title(protocol: Protocol) -> str:
     """What is not read as printed, in words."""
     other = [name for name, choices in (CHOICES | ASIDE).items() if chosen(protocol, name) != choices[0]]
-    return ", ".join(f"{name} {chosen(protocol, name)}" for name in other) or "as printed"
+    return ", ".join(f"{name} {chosen(protocol, name)}" for name in other) or AS_PRINTED
+
+
+def choice_in(title: str, name: str) -> str:
+    """A choice of `CHOICES`, from a title."""
+    made = {} if title == AS_PRINTED else dict(one.split(" ", 1) for one in title.split(", "))
+    return made.get(name, CHOICES[name][0])
 
 
 def compare_readings(
@@ -85,7 +94,8 @@ def compare_readings(
     order = ranking(scores)[:best]
     closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
     names = scores.reading.values[order]
-    return scores.assign(look_closer(closest, folder, **how)).assign_coords(best=names)
+    whole = scores.assign(look_closer(closest, folder, **how)).assign_coords(best=names)
+    return whole.assign_attrs(study="readings")
 
 
 def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
@@ -147,6 +157,6 @@ def gained(scores: "xr.Dataset", reading: str, window: str) -> tuple[list[str], 
     """Held-out claims that agree under a reading but not as printed, and the reverse; constants as inferred."""
     kept = [key for key in scores.claim.values if key not in CALIBRATED]
     at = scores.agrees.sel(claim=kept, window=window, constants="inferred") == 1
-    one, printed = at.sel(reading=reading).values, at.sel(reading="as printed").values
+    one, printed = at.sel(reading=reading).values, at.sel(reading=AS_PRINTED).values
     keys = np.array(kept)
     return keys[one & ~printed].tolist(), keys[printed & ~one].tolist()

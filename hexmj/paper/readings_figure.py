@@ -1,12 +1,10 @@
 """The comparison of readings as a figure: what each choice changes."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.paper.protocol import Protocol
-from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, chosen
+from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, choice_in
 from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ WORDS = {
 COLOURS = {"walk": "#1b6ca8", "start": "#e08e1b"}
 
 
-def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Picture":
+def readings_figure(scores: "xr.Dataset") -> "Picture":
     """Held-out claims that agree, a dot for every reading and window, by each choice; bars are means."""
     from matplotlib.lines import Line2D
 
@@ -34,7 +32,7 @@ def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Pict
     panels = figure.subplots(1, len(CHOICES), sharey=True, width_ratios=[len(one) for one in CHOICES.values()])
     count, shift = agreeing(scores).sel(constants="inferred"), dict(zip(COLOURS, (-0.13, 0.13), strict=True))
     for axes, (name, choices) in zip(panels, CHOICES.items(), strict=True):
-        of = np.array([choices.index(chosen(one, name)) for one in readings])
+        of = np.array([choices.index(choice_in(one, name)) for one in scores.reading.values.tolist()])
         for window, colour in COLOURS.items():
             values = count.sel(window=window).values
             for i in sorted(set(of.tolist())):
@@ -54,5 +52,8 @@ def readings_figure(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "Pict
         Line2D([], [], linestyle="", marker=".", color=one, label=f"window {name}") for name, one in COLOURS.items()
     ]
     figure.legend(handles=dots, frameon=False, fontsize=9, loc="outside lower center", ncols=2)
-    head(figure, f"{len(readings)} readings of the 1998 paper; the printed choice stands first; constants as inferred")
+    head(
+        figure,
+        f"{scores.sizes['reading']} readings of the 1998 paper; the printed choice stands first; constants as inferred",
+    )
     return figure
