@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import hexmj
 from hexmj.cli.main import options_of
 from hexmj.controllers.cruse1998 import HWS, LDVS, READINGS, Reading
 from hexmj.errors import InputError
@@ -27,7 +28,6 @@ from hexmj.paper.readings import (
     refined_as,
     title,
 )
-from hexmj.paper.readings_figure import readings_figure
 from hexmj.paper.readings_table import readings_markdown
 from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, refined
 from hexmj.starts import draw_starts
@@ -127,7 +127,7 @@ def test_held_out_claims_rank_and_calibrated_ones_do_not():
     assert "| ipsilateral lasting | 3 / 3 | 3 / 3 | 0 / 0 | 0.25 / 0.25 | 9, -9, -25, centred |" in page
     assert "gains ldvs-late, hws-majority; loses none" in page
     assert "| ipsilateral lasting | 2 of 2 | 0.0123 |" in page
-    assert len(readings_figure(scores).axes) == len(CHOICES)
+    assert len(hexmj.plot(scores.assign_attrs(study="readings")).axes) == len(CHOICES)
 
 
 def test_choices_are_read_and_titled():

@@ -67,8 +67,8 @@ def title(protocol: Protocol) -> str:
 
 def choice_in(title: str, name: str) -> str:
     """A choice of `CHOICES`, from a title."""
-    made = {} if title == AS_PRINTED else dict(one.split(" ", 1) for one in title.split(", "))
-    return made.get(name, CHOICES[name][0])
+    made = {} if title == AS_PRINTED else {one.split()[0]: one.split()[1] for one in title.split(", ")}
+    return made.get(name, str(CHOICES[name][0]))
 
 
 def compare_readings(
