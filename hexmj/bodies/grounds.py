@@ -90,10 +90,10 @@ def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: 
     Returns:
         (...,) [mm].
     """
-    x, z = feet[..., 0], feet[..., 2]
-    near, length = ground.ground_at, ground.ground_length
+    z = feet[..., 2]
     if ground.ground == "flat":
         return radius - z
+    x, near, length = feet[..., 0], ground.ground_at, ground.ground_length
     if ground.ground == "rough":
         return np.maximum(radius - z, _depth_in_bumps(ground, lengths, feet, radius))
     off_middle = np.abs(x - near - length / 2)

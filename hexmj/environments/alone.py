@@ -26,12 +26,12 @@ class Alone:
         self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
         self.sensors = data.sensordata[np.newaxis]
         self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
-        self._foot, self._feet = compiled.columns.foot, data.sensordata[compiled.columns.foot].reshape(6, 3)
-        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
+        self._foot = compiled.columns.foot
+        self._warned, self._begun = data.warning.number, np.empty((1, mujoco.mj_stateSize(model, _STATE)))
 
     def states(self, ids: np.ndarray) -> np.ndarray:
         """See `backend.Engine.states`."""
-        self._before = states = np.empty((1, self._size))
+        states = np.empty_like(self._begun)
         mujoco.mj_getState(self.model, self.data, states[0], _STATE)
         return states
 
@@ -49,10 +49,11 @@ class Alone:
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
-        before, substeps = self.states(ids), control.shape[1]
+        substeps = control.shape[1]
+        mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
         feet, sensors, force = self._roll(control[0], self.model)
         if np.count_nonzero(strikes(self._compiled.depth(feet), substeps, self._allowed)):
-            self.put(ids, before)
+            self.put(ids, self._begun)
             return FineSteps.of(self, substeps, self._compiled).take(ids, control)
         return {"sensors": sensors, "force": force}
 
@@ -71,26 +72,23 @@ class Alone:
 
     def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""
-        count, data, step1, step2 = len(control), self.data, mujoco.mj_step1, mujoco.mj_step2
-        control_now, feet_now, sensors_now, force_now = self._control, self._feet, self._sensors, self._force
-        feet = np.empty((1, count + 1, 6, 3))
-        sensors, force = np.empty((1, count, len(sensors_now))), np.empty((1, count, len(force_now)))
-        feet[0, 0] = feet_now
+        count, data, now, pulled = len(control), self.data, self._sensors, self._force
+        sensors, force = np.empty((1, count + 1, len(now))), np.empty((1, count, len(pulled)))
         for k in range(count):
-            control_now[:] = control[k]
-            step2(model, data)
-            sensors[0, k], force[0, k] = sensors_now, force_now
-            step1(model, data)
-            feet[0, k + 1] = feet_now
+            self._control[:] = control[k]
+            (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
+            sensors[0, k], force[0, k] = now, pulled  # those of places as the step began
+        mujoco.mj_step1(model, data)
+        sensors[0, count] = now
         if np.count_nonzero(self._warned):  # what is not finite is seen as the next step begins
             raise self._diverged(control, model)
-        return feet, sensors, force
+        return sensors[:, :, self._foot].reshape(1, count + 1, 6, 3), sensors[:, :count], force
 
     def _diverged(self, control: np.ndarray, model: mujoco.MjModel) -> Diverged:
         """What happened, with the state before and the controls since, (step, actuator)."""
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
         before = mujoco.MjData(model)
-        mujoco.mj_setState(model, before, self._before[0], _STATE)
+        mujoco.mj_setState(model, before, self._begun[0], _STATE)
         state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
         now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
         return Diverged(0, ", ".join(kinds) or "a state that is not finite", state | now)

@@ -40,7 +40,7 @@ def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
         ids: which insects, (n,).
         ahead: tips (insect, step, substep, leg, axis) and stance (insect, step, leg) as planned, and the next step of
             these, (insect,), which goes on.
-        planned: stance and tips of all insects, which take up what is planned.
+        planned: of all insects, `observing.Planned`; stance and tips take up what is planned.
         offset: whether actions are offsets to the tips.
     """
     tips_ahead, stance_ahead, at = ahead

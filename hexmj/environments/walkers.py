@@ -128,6 +128,7 @@ class Walkers:
     def look(self, bodies: Bodies) -> None:
         """See where the bodies are, in arrays that go on."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
+        self._passed = tuple(self.places), tuple(self._planned)  # to compiled code, which takes these over faster
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
         """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first time of all of them.
@@ -178,7 +179,7 @@ class Walkers:
         (n, number) [rad] or [mm]; a leg that cannot reach its tip keeps its angles."""
         self._plan_ahead()
         ids, offset, substeps = self._ids, self._task.actions == "tips", self._substeps
-        tips = order(wanted, ids, self._ahead, self._planned[:2], offset)
+        tips = order(wanted, ids, self._ahead, self._passed[1], offset)
         if offset:
             joints, reachable = self._compiled.inverse(tips)
             keep(joints, reachable, ids, self._joints, self._planned.missed)
@@ -192,10 +193,10 @@ class Walkers:
 
     def judge(self, shown: Shown) -> Acted:
         """What a step has brought about that those that walk have shown, (n, substep, ...)."""
-        ids, places, acted, sensors = self._ids, tuple(self.places), self._nothing(), shown["sensors"]
+        ids, acted, sensors = self._ids, self._nothing(), shown["sensors"]
         self._senses.feel(ids, sensors, shown["force"])
         time, said = (self._done, self._steps), tuple(acted)
-        any_over = judge(places, ids, sensors, self._trunk, self._task.command, time, said)
+        any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, said)
         if self._ends:
             acted.truncated[ids] |= at_the_end(self._feet(), self._task)[ids] & ~acted.terminated[ids]
             any_over |= bool(acted.truncated.any())
@@ -205,7 +206,8 @@ class Walkers:
 
     def observations(self) -> np.ndarray:
         """Everything observed of all insects, (insect, number); `observer.named` says what it is."""
-        return self.observer.observe(self.places, self._senses.standing(self._everyone), self._planned)
+        places, planned = self._passed
+        return self.observer.observe(places, self._senses.standing(), planned)
 
     def _leave(self, ids: np.ndarray) -> None:
         """The episodes of some insects are over."""

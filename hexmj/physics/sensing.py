@@ -40,8 +40,8 @@ class Senses:
         felt = self._unloaded, self._load, self._torques
         return _feel(ids, sensors, force, self._compiled.columns.touch.start, self._longest_gap, felt)
 
-    def standing(self, ids: np.ndarray) -> np.ndarray:
-        """Which feet of some starts stand now, (n, leg)."""
+    def standing(self, ids: np.ndarray | slice = np.s_[:]) -> np.ndarray:
+        """Which feet of some starts stand now, (n, leg); of all unless told."""
         return self._unloaded[ids] <= self._longest_gap
 
     def sensed(self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> Sensed:
