@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +13,7 @@ WALK = ("walk", "--physical", "--window", "1")
 FEW = ("flss", "--velocities", "0.5", "--starts", "3", "--window", "start")
 
 
-def run(words: tuple[str, ...], **around: str) -> subprocess.CompletedProcess[str]:
+def done_with(words: tuple[str, ...], **around: str) -> subprocess.CompletedProcess[str]:
     """A command that ends within a minute; its code and what it said, and never a traceback."""
     done = subprocess.run(
         [sys.executable, "-m", "hexmj", *words],
@@ -23,27 +25,27 @@ def run(words: tuple[str, ...], **around: str) -> subprocess.CompletedProcess[st
 
 @pytest.mark.parametrize("columns", ["1", "7", "39"])
 def test_a_terminal_of_few_columns_gets_its_help(columns: str):
-    assert run(("--help",), COLUMNS=columns).returncode == 0
+    assert done_with(("--help",), COLUMNS=columns).returncode == 0
 
 
 def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):
-    done = run((*FEW, "--out", str(tmp_path)), MPLBACKEND="nonsense")
+    done = done_with((*FEW, "--out", str(tmp_path)), MPLBACKEND="nonsense")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "flss.png").exists()
 
 
 @pytest.mark.parametrize("threads", ["0", "-3", "many"])
 def test_threads_of_numba_that_are_none(threads: str):
-    done = run(FEW, NUMBA_NUM_THREADS=threads)
+    done = done_with(FEW, NUMBA_NUM_THREADS=threads)
     assert done.returncode == 2
     assert f"NUMBA_NUM_THREADS = {threads}; expected a whole number" in done.stderr
 
 
 @pytest.mark.parametrize("wish", ["nonsense", "osmesa", "off"])
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
-    done = run((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
+    done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
     assert done.returncode == 0, done.stderr
-    done = run(("render", "--window", "1", "--out", str(tmp_path / "film.mp4")), MUJOCO_GL=wish)
+    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film.mp4")), MUJOCO_GL=wish)
     if done.returncode:  # OSMesa may be there
         assert done.returncode == 1
         assert done.stderr.startswith("hexmj: Nothing can be rendered here (")
@@ -58,3 +60,12 @@ def test_a_folder_that_has_gone(tmp_path: Path):
         ["sh", "-c", script], cwd=gone, env=os.environ | there, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (2, "hexmj: the current folder is no longer there; expected one that is\n")
+
+
+def test_no_thread_is_a_sentence(run: Any, monkeypatch: pytest.MonkeyPatch):
+    def no_thread(self: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", no_thread)
+    code, _, error = run("flss", "--velocities", "0.5", "--starts", 3, "--window", "start")
+    assert (code, error) == (2, "hexmj: the memory, or a limit of processes, does not suffice for a thread\n")
