@@ -5,12 +5,10 @@ unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 """
 
 import sys
-from dataclasses import is_dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import hexmj.as_run  # from now on
-from hexmj.field_docs import FieldDocs
 
 if TYPE_CHECKING:
     from hexmj import environments as environments
@@ -105,8 +103,6 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__dir__())}")
     value = getattr(import_module(f"hexmj.{_HOME[name]}"), name)
-    if isinstance(value, type) and is_dataclass(value):
-        value.__doc__ = FieldDocs(value.__doc__ or "")  # pyright: ignore[reportAttributeAccessIssue]  # for `help`
     globals()[name] = value
     return value
 

@@ -12,7 +12,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("field_docs",),
     ("as_run", "attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
     ("pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking

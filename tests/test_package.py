@@ -1,11 +1,9 @@
 """What people expect of a package beside its code: one version everywhere, a citation, files that are where they are
 said to be."""
 
-import pydoc
 import re
 import subprocess
 import tomllib
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
@@ -69,17 +67,3 @@ def test_pages_link_to_pages_that_are_there():
     for name in ("README.md", "CONTRIBUTING.md"):
         for link in re.findall(r"\]\((?!https?:)([^)#]+)", read(name)):
             assert (ROOT / link).exists(), link
-
-
-def test_help_tells_what_fields_are():
-    assert "    vp: " in (text := pydoc.render_doc(hexmj.Conditions))
-    assert "links the plan's time unit" in text
-    told = [
-        line for line in (hexmj.Stride.__doc__ or "").splitlines() if line.startswith("    dt: Time step of a plan")
-    ]
-    assert len(told) == 1
-    classes = [one for name in hexmj.__all__ if is_dataclass(one := getattr(hexmj, name)) and isinstance(one, type)]
-    assert len(classes) > 10
-    for one in classes:
-        for field in fields(one):
-            assert f"    {field.name}: " in (one.__doc__ or ""), one
