@@ -11,7 +11,6 @@ import ast
 import sys
 import sysconfig
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
@@ -34,9 +33,6 @@ CARRIERS = {
 
 _PARSING = Lock()
 """Python 3.11 counts the depth of all trees that threads make at once as that of one."""
-
-TRIES = 20
-"""Of parsing a source while other threads do, in libraries that know nothing of the lock."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -165,15 +161,6 @@ def _is_installed(file: Path) -> bool:
     return any(file.is_relative_to(one) for one in _INSTALLED) or not INSTALLED.isdisjoint(file.parts)
 
 
-def _parsed(python: bytes) -> ast.Module:
-    """A source; Python 3.11 may take the depth of what a library parses in another thread for its own: then again."""
-    with _PARSING:
-        for _ in range(TRIES):
-            with suppress(SystemError):
-                return ast.parse(python)
-        return ast.parse(python)
-
-
 @cache
 def _read(name: str, file: Path) -> _Module:
     try:
@@ -185,7 +172,8 @@ def _read(name: str, file: Path) -> _Module:
     python = b"" if file.name.endswith(as_run.COMPILED) else content  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
-        nodes = list(ast.walk(_parsed(python)))
+        with _PARSING:
+            nodes = list(ast.walk(ast.parse(python)))
     except (SyntaxError, ValueError) as error:
         raise InputError(f"{file} cannot be read as Python: {error}") from None
     guarded = [
