@@ -106,9 +106,9 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
         InputError: less than a step, or more than `MOST_STEPS`.
     """
     duration, dt = numbers("duration", duration), stride.dt
-    if not ((duration >= dt) & (duration <= MOST_STEPS * dt)).all():
+    if (odd := duration[~((duration >= dt) & (duration <= MOST_STEPS * dt))]).size:
         raise InputError(
-            f"duration = {duration}; expected at least one step, {dt:g}, and at most {MOST_STEPS * dt:g} time units"
+            f"duration = {odd[0]:g}; expected at least one step, {dt:g}, and at most {MOST_STEPS * dt:g} time units"
         )
     return np.floor(duration / dt + 1e-6).astype(int)
 

@@ -92,6 +92,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: walk(stride=0), "stride = 0; expected a Stride"),
     (lambda: walk(acceleration=0.1), "acceleration = 0.1; expected an Acceleration or None"),
     (lambda: walk(acceleration=False), "acceleration = False; expected an Acceleration or None"),
+    (lambda: walk(duration=-4), "duration = -4; expected at least one step, 0.1, and at most 1e+06 time units"),
     (lambda: walk(duration="x"), "duration = 'x'; expected a number"),
     (lambda: walk(duration=None), "duration = None; expected a number"),
     (lambda: walk(duration=True), "duration = True; expected a number"),

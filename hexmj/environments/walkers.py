@@ -110,7 +110,7 @@ class Walkers:
         self._steps, self._substeps = task.steps, task.substeps
         self._grasps = task.conditions.contact.grasp > 0
         self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
-        self._everyone, self._ids = np.arange(count), np.arange(0)
+        self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self._begun = False
         self._of: dict[int, Together] = {}
@@ -145,7 +145,7 @@ class Walkers:
         self._together.append(group)
         self._of |= dict.fromkeys(ids.tolist(), group)
         self.bodies.stand(ids, settled.state, settled.ctrl)
-        if len(ids) == len(self._everyone):
+        if len(ids) == self._count:
             self._senses = Senses(settled)
         else:
             self._senses.restart(ids, settled)
@@ -243,7 +243,7 @@ class Walkers:
 
     def _nothing(self) -> Acted:
         """What a step has brought about before anybody is judged."""
-        count = len(self._everyone)
+        count = self._count
         return Acted(np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool))
 
     def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> Shown:
