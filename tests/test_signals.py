@@ -36,7 +36,8 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
     finally:
         running.kill()
     assert running.returncode == 130, error
-    assert error.startswith(b"hexmj: stopped") and error.count(b"\n") == 1
+    said = [line for line in error.splitlines() if b"% in " not in line]  # progress, on a busy machine
+    assert len(said) == 1 and said[0].startswith(b"hexmj: stopped"), error
     assert out == b""
 
 
