@@ -86,8 +86,7 @@ class MujocoBatch:
         self._state = [self._batch.bind(name) for name in STATE]
         self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]
         self.qpos, self.qvel = self._state[:2]
-        self._replayed = {name: self._batch.bind(name) for name in (*STATE, "xfrc_applied")}
-        self.push = self._replayed["xfrc_applied"][:, compiled.root, 1]
+        self.push = self._batch.bind("xfrc_applied")[:, compiled.root, 1]
         self.sensors, self._foot = self._batch.bind("sensordata"), compiled.columns.foot
         self.force = self._batch.bind("actuator_force")
 
@@ -148,18 +147,20 @@ class MujocoBatch:
 
     def replayed(self, ids: np.ndarray) -> dict[str, np.ndarray]:
         """What replays some bodies from now on; MuJoCo takes back states and pushes of one that diverges."""
-        return {name: values[ids] for name, values in self._replayed.items()}
+        return {name: values[ids] for name, values in zip(STATE, self._state, strict=True)} | {"push": self.push[ids]}
 
     def saved(self, before: dict[str, np.ndarray], i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
         """What replays the i-th body of those, with its controls since, (step, actuator), time step and contacts."""
-        model = self._batch.get_model(start)
+        model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
+        applied[self._root, 1] = before["push"][i]
         now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
-        return {name: values[i] for name, values in before.items()} | now
+        return {name: before[name][i] for name in STATE} | {"xfrc_applied": applied} | now
 
     def put_back(self, saved: dict[str, np.ndarray]) -> None:
         """Put the only body where it was saved."""
-        for name, values in self._replayed.items():
+        for name, values in zip(STATE, self._state, strict=True):
             values[0] = saved[name]
+        self._batch.bind("xfrc_applied")[0] = saved["xfrc_applied"]
 
     def _check(self, ids: np.ndarray, before: dict[str, np.ndarray], control: np.ndarray) -> None:
         """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""

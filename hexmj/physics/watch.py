@@ -7,9 +7,10 @@ of mass, while the root may move faster as the insect is turned over: of those p
 `docs/exploded_walks.md` has the figures.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from hexmj.errors import StillThrown
 from hexmj.physics.settling import Settled
@@ -44,26 +45,45 @@ def explosion(
         impulse: of a push, (n,) [g mm/s].
         settled: what the walks began with.
     """
-    compiled, pushed = settled.compiled, impulse[:, np.newaxis] != 0.0
-    place = np.where(pushed[..., np.newaxis], centre, qpos[..., :3])
-    speed = np.linalg.norm(np.diff(place, axis=1), axis=2) / compiled.model.opt.timestep
-    height, upright = place[:, 1:, 2] - settled.conditions.ground.top, 1.0 - 2.0 * (qpos[:, 1:, 4:6] ** 2).sum(axis=2)
-    energy, most = height + speed**2 / _twice_gravity(settled), most_energy(settled, impulse)[:, np.newaxis]
-    within = np.arange(1, qpos.shape[1]) < valid[:, np.newaxis]
-    over = (upright < 0.0) & (energy > TUMBLING * compiled.body.lengths.shortest_leg) & ~pushed & within
-    odd = over | ((energy > most) & within)
-    if not odd.any():
+    most, tumbling = most_energy(settled, impulse), TUMBLING * settled.compiled.body.lengths.shortest_leg
+    top, timestep, twice_g = settled.conditions.ground.top, settled.compiled.model.opt.timestep, _twice_gravity(settled)
+    row, t = _first_odd(qpos, centre, valid, impulse != 0.0, most, tumbling, top, timestep, twice_g)
+    if row < 0:
         return None
-    row, t = np.argwhere(odd)[0]
-    if over[row, t]:
-        what = f"it tilts by {np.arccos(upright[row, t]):.3g} rad, past a right angle, and was not pushed"
-    else:
-        watched = "centre of mass" if pushed[row, 0] else "root"
+    name, place = ("centre of mass", centre[row]) if impulse[row] else ("root", qpos[row, :, :3])
+    height, speed = place[t, 2] - top, np.linalg.norm(place[t] - place[t - 1]) / timestep
+    if height + speed**2 / twice_g > most[row]:
         what = (
-            f"its {watched} is {height[row, t]:.3g} mm above the ground and moves at {speed[row, t]:.3g} mm/s; expected"
-            f" height and v^2 / 2g of at most {most[row, 0]:.3g} mm together"
+            f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; expected height and"
+            f" v^2 / 2g of at most {most[row]:.3g} mm together"
         )
-    return Explosion(int(row), int(t) + 1, what)
+    else:
+        tilt = np.arccos(_upright(qpos[row, t]))
+        what = f"it tilts by {tilt:.3g} rad, past a right angle, and was not pushed"
+    return Explosion(row, t, what)
+
+
+@njit(cache=True, nogil=True)
+def _first_odd(
+    qpos: Any, centre: Any, valid: Any, pushed: Any, most: Any, tumbling: float, top: float, timestep: float, twice_g: Any
+) -> tuple[int, int]:
+    """Row and substep in which something moves as no walk does; -1 if nothing does."""
+    for n in range(len(qpos)):
+        place = centre[n] if pushed[n] else qpos[n]
+        for t in range(1, valid[n]):
+            squared = 0.0
+            for axis in range(3):
+                squared += (place[t, axis] - place[t - 1, axis]) ** 2
+            energy = place[t, 2] - top + squared / timestep**2 / twice_g
+            if energy > most[n] or (energy > tumbling and not pushed[n] and _upright(qpos[n, t]) < 0.0):
+                return n, t
+    return -1, -1
+
+
+@njit(cache=True, nogil=True)
+def _upright(qpos: Any) -> float:
+    """Cosine of the tilt of a root, from its positions."""
+    return 1.0 - 2.0 * (qpos[4] ** 2 + qpos[5] ** 2)
 
 
 def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: np.ndarray, settled: Settled) -> None:
