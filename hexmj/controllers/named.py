@@ -15,7 +15,6 @@ from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.controllers.rivals.table import RIVALS
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.literal import literal
@@ -43,9 +42,10 @@ def load_controller(name: str) -> Controller:
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
     """
-    for ours in (PRESETS, RIVALS):
-        if typed("name", name, str) in ours:
-            return ours[name]
+    if typed("name", name, str) in PRESETS:
+        return PRESETS[name]
+    if name in (rivals := _rivals()):
+        return rivals[name]
     if varied := VARIED.fullmatch(name):
         return _varied(varied["name"], varied["how"], int(varied["which"]))
     where, colon, what = name.rpartition(":")
@@ -70,8 +70,15 @@ def load_controller(name: str) -> Controller:
 def known_names() -> Iterator[str]:
     """Names of the presets, the rivals and the entry points."""
     yield from PRESETS
-    yield from RIVALS
+    yield from _rivals()
     yield from (point.name for point in entry_points(group=ENTRY_POINTS))
+
+
+def _rivals() -> dict[str, Controller]:
+    """By their names; imported once one is asked for."""
+    from hexmj.controllers.rivals.table import RIVALS
+
+    return RIVALS
 
 
 def _varied(name: str, how: str, which: int) -> Controller:
