@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -89,7 +89,7 @@ def _varied(name: str, how: str, which: int) -> Controller:
         whole = f"controller {name}-{how}-{which}: {name} has no mechanisms or rules that can be switched"
         off = f" on; expected {name}-without-{which}" if hasattr(found, "without") else ""
         raise InputError(whole + off)
-    return change(which)
+    return _made(lambda: change(which), f"{name}-{how}-{which}", "expected a controller, or an InputError")
 
 
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
@@ -115,17 +115,24 @@ def _found(where: str, what: str, name: str) -> Controller:
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
         missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
         raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(classes) or 'none'}")
-    try:
+
+    def make() -> Any:
         found = getattr(module, what)
-        found = found() if isinstance(found, type) else found
-    except (Exception, SystemExit) as error:  # whatever the user's code raises
-        raise InputError(
-            f"controller {name!r}: {what} cannot be made: {error}; expected a class with defaults for all fields"
-        ) from None
+        return found() if isinstance(found, type) else found
+
+    return _made(make, name, "expected a class with defaults for all fields")
+
+
+def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:
+    """A controller that a user's code makes, whatever that raises; what is no `InputError` is the cause of ours."""
     try:
+        found = make()
         check_controller_type(found)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
+    except (Exception, SystemExit) as error:
+        told = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise InputError(f"controller {name!r} cannot be made: {told:.300}; {expected}") from error
     return found
 
 

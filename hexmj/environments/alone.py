@@ -29,12 +29,6 @@ class Alone:
         self._foot = compiled.columns.foot
         self._warned, self._begun = data.warning.number, np.empty((1, mujoco.mj_stateSize(model, _STATE)))
 
-    def states(self, ids: np.ndarray) -> np.ndarray:
-        """See `backend.Engine.states`."""
-        states = np.empty_like(self._begun)
-        mujoco.mj_getState(self.model, self.data, states[0], _STATE)
-        return states
-
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """See `backend.Engine.put`."""
         mujoco.mj_setState(self.model, self.data, states[0], _STATE)
@@ -59,6 +53,8 @@ class Alone:
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `backend.Engine.roll`; no states are kept, since a plan's step is all that is taken at once."""
+        before = np.empty_like(self._begun)
+        mujoco.mj_getState(self.model, self.data, before[0], _STATE)
         if parts == 1:
             seen = self._roll(control[0], self.model)
         else:
@@ -68,7 +64,7 @@ class Alone:
             mujoco.mj_step1(fine, self.data)
             seen = self._roll(control[0], fine)
             mujoco.mj_step1(self.model, self.data)
-        return Rolled(*seen, after=np.empty((1, control.shape[1], 0)))
+        return Rolled(before, *seen, after=np.empty((1, control.shape[1], 0)))
 
     def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""

@@ -4,7 +4,7 @@ Another engine is another module with an `Engine` in it.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -25,6 +25,8 @@ AFTER = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco
 class Rolled:
     """What some bodies have shown over physics steps."""
 
+    before: np.ndarray
+    """(n, state) as they began; what `Engine.put` takes."""
     feet: np.ndarray
     """(n, 1 + step, leg, 3) before the first and after each step, in the world [mm]."""
     sensors: np.ndarray
@@ -35,12 +37,17 @@ class Rolled:
     """(n, step, state) after each step; what `Engine.put` takes."""
 
 
+class Replayed(NamedTuple):
+    """What replays some bodies from a moment on."""
+
+    states: np.ndarray
+    """(n, state)."""
+    push: np.ndarray
+    """(n,) force on the root to the left [g mm/s^2]."""
+
+
 class Engine(Protocol):
     """Bodies that step side by side, none of which knows of another."""
-
-    def states(self, ids: np.ndarray) -> np.ndarray:
-        """What some bodies go on from, (n, state)."""
-        ...
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """Put some bodies where they shall go on from, (n, state)."""
@@ -91,7 +98,7 @@ class MujocoBatch:
         self.force = self._batch.bind("actuator_force")
 
     def states(self, ids: np.ndarray) -> np.ndarray:
-        """See `Engine.states`."""
+        """What some bodies go on from, (n, state)."""
         return np.concatenate([values[ids] for values in self._state], axis=1)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
@@ -143,18 +150,19 @@ class MujocoBatch:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
-        return Rolled(places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
+        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
 
-    def replayed(self, ids: np.ndarray) -> dict[str, np.ndarray]:
+    def replayed(self, ids: np.ndarray) -> Replayed:
         """What replays some bodies from now on; MuJoCo takes back states and pushes of one that diverges."""
-        return {name: values[ids] for name, values in zip(STATE, self._state, strict=True)} | {"push": self.push[ids]}
+        return Replayed(self.states(ids), self.push[ids])
 
-    def saved(self, before: dict[str, np.ndarray], i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
+    def saved(self, before: Replayed, i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
         """What replays the i-th body of those, with its controls since, (step, actuator), time step and contacts."""
         model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
-        applied[self._root, 1] = before["push"][i]
+        applied[self._root, 1] = before.push[i]
+        state = dict(zip(STATE, np.split(before.states[i], self._ends), strict=True))
         now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
-        return {name: before[name][i] for name in STATE} | {"xfrc_applied": applied} | now
+        return state | {"xfrc_applied": applied} | now
 
     def put_back(self, saved: dict[str, np.ndarray]) -> None:
         """Put the only body where it was saved."""
@@ -162,7 +170,7 @@ class MujocoBatch:
             values[0] = saved[name]
         self._batch.bind("xfrc_applied")[0] = saved["xfrc_applied"]
 
-    def _check(self, ids: np.ndarray, before: dict[str, np.ndarray], control: np.ndarray) -> None:
+    def _check(self, ids: np.ndarray, before: Replayed, control: np.ndarray) -> None:
         """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""
         warned = self._batch.warning[ids, :, 1] > 0
         broken = ~np.isfinite(self.qpos[ids]).all(axis=1)

@@ -93,13 +93,11 @@ class Insects:
             SimulationError: a simulation that diverged, or a walk that exploded.
             InputError: a walk that leads beyond the ground.
         """
-        before: dict[str, np.ndarray] = {}
-        done: list[Orders] = []
-        shown: list[Shown] = []
-        for orders in ordered:
-            if not done:
-                self._apply_push(orders, steps)
-                before = self._batch.replayed(orders.ids)
+        first = next(rest := iter(ordered))
+        self._apply_push(first, steps)
+        before = self._batch.replayed(first.ids)
+        done, shown = [first], [self._show(first)]
+        for orders in rest:
             shown.append(self._show(orders))
             done.append(orders)
         whole: dict[str, Any] = {name: _joined([part[name] for part in shown]) for name in SHOWN}
@@ -107,16 +105,16 @@ class Insects:
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
         centre = whole["sensors"][:, :, self._columns.centre_of_mass]
-        if odd := explosion(whole["qpos"], centre, valid, self._impulse[done[0].ids], self.settled):
+        if odd := explosion(whole["qpos"], centre, valid, self._impulse[first.ids], self.settled):
             control = _joined([orders.control for orders in done])[odd.row, : odd.substep + 1]
-            start = int(done[0].ids[odd.row])
+            start = int(first.ids[odd.row])
             state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
-            raise self._error(Diverged(start, odd.what, state, odd.substep), done[0])
-        self._check_ground(whole["sensors"], valid, done[0].ids)
+            raise self._error(Diverged(start, odd.what, state, odd.substep), first)
+        self._check_ground(whole["sensors"], valid, first.ids)
         missed = _joined([orders.missed for orders in done]).sum(axis=2)
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
         plan = joined([orders.plan for orders in done])
-        return Chunk(plan, done[0].first, done[0].ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
+        return Chunk(plan, first.first, first.ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
 
     def check_landed(self, ids: np.ndarray) -> None:
         """Refuse starts that have not fallen, (n,), and are still thrown by their push.

@@ -59,20 +59,23 @@ class FineSteps:
         Raises:
             Diverged: a body that diverged.
         """
-        m, end, before = self.substeps, control.shape[1], self.engine.states(ids)
-        shown, struck = self._roll(ids, control, 0, end, 1)
+        m, end = self.substeps, control.shape[1]
+        before, shown, struck = self._roll(ids, control, 0, end, 1)
         for begin in range(0, end, m):
             if (again := np.flatnonzero(struck == begin)).size:
                 few, then = ids[again], min(begin + m, end)
                 self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
                 _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
                 if then < end:
-                    rest, struck[again] = self._roll(few, control[again], then, end, 1)
+                    _, rest, struck[again] = self._roll(few, control[again], then, end, 1)
                     _show(shown, again, then, rest)
         return shown
 
-    def _roll(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> tuple[Shown, np.ndarray]:
-        """Every part of some substeps; and where the first step begins in which a foot strikes, (n,), or `end`."""
+    def _roll(
+        self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int
+    ) -> tuple[np.ndarray, Shown, np.ndarray]:
+        """Every part of some substeps, after the states before, (n, state); and where the first step begins in which a
+        foot strikes, (n,), or `end`."""
         try:
             seen = self.engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
         except Diverged as error:
@@ -81,12 +84,12 @@ class FineSteps:
         depth, m = self.depth_of(seen.feet), self.substeps
         strike = strikes(depth, parts * m, self.allowed)
         shown = {"sensors": seen.sensors, "force": seen.force, "depth": depth[:, 1:].max(axis=2), "after": seen.after}
-        return shown, np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
+        struck = np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
+        return seen.before, shown, struck
 
     def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
         """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""
-        before = self.engine.states(ids)
-        every, struck = self._roll(ids, control, begin, end, parts)
+        before, every, struck = self._roll(ids, control, begin, end, parts)
         shown = {
             "sensors": in_whole_steps(every["sensors"], parts, self.touch),
             "force": every["force"][:, ::parts],

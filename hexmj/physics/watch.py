@@ -47,7 +47,7 @@ def explosion(
     """
     most, tumbling = most_energy(settled, impulse), TUMBLING * settled.compiled.body.lengths.shortest_leg
     top, timestep, twice_g = settled.conditions.ground.top, settled.compiled.model.opt.timestep, _twice_gravity(settled)
-    row, t = _first_odd(qpos, centre, valid, impulse != 0.0, most, tumbling, top, timestep, twice_g)
+    row, t = _first_odd((qpos, centre), valid, impulse != 0.0, (most, tumbling), (top, timestep, twice_g))
     if row < 0:
         return None
     name, place = ("centre of mass", centre[row]) if impulse[row] else ("root", qpos[row, :, :3])
@@ -64,10 +64,9 @@ def explosion(
 
 
 @njit(cache=True, nogil=True)
-def _first_odd(
-    qpos: Any, centre: Any, valid: Any, pushed: Any, most: Any, tumbling: float, top: float, timestep: float, twice_g: Any
-) -> tuple[int, int]:
+def _first_odd(shown: Any, valid: Any, pushed: Any, limits: Any, scale: Any) -> tuple[int, int]:
     """Row and substep in which something moves as no walk does; -1 if nothing does."""
+    (qpos, centre), (most, tumbling), (top, timestep, twice_g) = shown, limits, scale
     for n in range(len(qpos)):
         place = centre[n] if pushed[n] else qpos[n]
         for t in range(1, valid[n]):

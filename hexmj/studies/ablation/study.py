@@ -65,8 +65,9 @@ def switched(name: str, shown: str = "") -> dict[str, Controller]:
     for switch in SWITCHES:
         try:
             found[f"{shown}-{switch}"] = load_controller(f"{name}-{switch}")
-        except InputError:
-            continue  # nothing to switch off, or on already
+        except InputError as error:
+            if error.__cause__:
+                raise  # what a user's code raised
     if len(found) == 1:
         raise InputError(
             f"{name} has no mechanisms or rules that can be switched; expected a set of the network, or Walknet"

@@ -17,9 +17,9 @@ LESS, MORE = "-", "+"
 """Beside a frequency that is below, or above, that of the reference for sure."""
 
 WEDGED = 5.0
-"""What a cockroach's hind leg reaches about its coxa-femur joint, over weight times length of the leg, as it wedges itself
-into a crevice: muscles pull with over 50 times the weight at a tenth of the leg's arm (Full & Ahn 1995, J. exp. Biol.
-198, 1285, abstract).  Of a stick insect nothing was found."""
+"""What a cockroach's hind leg reaches about its coxa-femur joint as it wedges itself into a crevice, over weight times
+length of the leg: its muscles pull with over 50 times the weight at a tenth of the leg's arm (Full & Ahn 1995, J. exp.
+Biol. 198, 1285, abstract).  Of a stick insect nothing was found."""
 
 MEASURES = {"kinematic": "Kinematic FLSS", "measured": "Measured FLSS", "physical": "Physical FLSS"}
 
