@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import metadata
 from pathlib import Path
 
 import pytest
@@ -134,3 +135,9 @@ def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):
         assert not loading.search(page.read_text(encoding="utf-8")), page
     for sheet in tmp_path.rglob("*.css"):
         assert not re.search(r"@import|url\([\"']?(?:https?:)?//", sheet.read_text(encoding="utf-8")), sheet
+
+
+def test_a_package_index_is_told_nothing_by_relative_paths():
+    told = str(metadata("hexmj").get_payload())
+    assert told.count("# hexmj") == 1 and "## A dozen lines" in told
+    assert not re.findall(r"\]\((?!https://)", told)
