@@ -1,6 +1,7 @@
 """The comparison of readings as a page: Markdown."""
 
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
 from hexmj.controllers.cruse1998 import READINGS
@@ -30,53 +31,67 @@ def readings_rows(scores: "xr.Dataset", places: Sequence[int]) -> list[tuple[str
 
 def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str:
     """The page: best readings, what each choice alone changes, a closer look, and every reading."""
-    held = [key for key in scores.claim.values if key not in CALIBRATED]
-    size = readings[0]
-    lines = [
-        "# Readings of the 1998 paper",
-        "",
-        f"{len(held)} held-out and {scores.sizes['claim'] - len(held)} calibrated claims on the printed sets; each"
-        f" is judged on {size.samples * size.sample} starts and {size.gait_starts} gaits, seed {size.seed}.  Before the"
+    ranked = ranking(scores).tolist()
+    sections = {
+        "# Readings of the 1998 paper": [
+            _judged_on(scores, readings[0]),
+            *_table(HEADS, readings_rows(scores, ranked[: scores.sizes["best"]])),
+        ],
+        "## As printed, and the named readings": _named_ones(scores, readings),
+        "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred":
+            _changes(scores, readings),
+        "## A closer look at the best": [*_aside(scores), "", *_ideal_sets(scores)],
+        "## Every reading": _table(HEADS, readings_rows(scores, ranked)),
+    }  # fmt: skip
+    return "\n\n".join(f"{head}\n\n" + "\n".join(lines) for head, lines in sections.items()) + "\n"
+
+
+def _judged_on(scores: "xr.Dataset", one: Protocol) -> str:
+    held = len(_held_out(scores))
+    return (
+        f"{held} held-out and {scores.sizes['claim'] - held} calibrated claims on the printed sets; each"
+        f" is judged on {one.samples * one.sample} starts and {one.gait_starts} gaits, seed {one.seed}.  Before the"
         " slash: constants as inferred, by which readings are ranked; behind it: refined, on calibrated claims alone."
-        "  'Calibrated' and 'missed by', how far answers lie outside of their rules in sum, are of the better window.",
-        "",
-        *_table(HEADS, readings_rows(scores, ranking(scores).tolist()[: scores.sizes["best"]])),
-        "",
-        "## As printed, and the named readings",
-        "",
-        *_table(HEADS, readings_rows(scores, _named(readings))),
-        "",
-    ]
-    for name in [title(readings[i]) for i in _named(readings)][1:]:
-        for window in WINDOWS:
-            more, less = gained(scores, name, window)
-            lines.append(
-                f"- {name}, window {window}: gains {', '.join(more) or 'none'}; loses {', '.join(less) or 'none'}"
-            )
+        "  'Calibrated' and 'missed by', how far answers lie outside of their rules in sum, are of the better window.\n"
+    )
+
+
+def _named_ones(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
+    """All that have a name, and what each gains and loses against the printed one."""
+    places = _named(readings)
+    lines = [*_table(HEADS, readings_rows(scores, places)), ""]
+    for name, window in product([title(readings[i]) for i in places[1:]], WINDOWS):
+        more, less = (", ".join(keys) or "none" for keys in gained(scores, name, window))
+        lines.append(f"- {name}, window {window}: gains {more}; loses {less}")
+    return lines
+
+
+def _changes(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
     changed = effects(scores, readings)
     rows = [
         (choice, *(f"{changed.sel(choice=choice, window=window).item():.1f}" for window in WINDOWS))
         for choice in changed.choice.values
     ]
-    lines += [
-        "",
-        "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred",
-        "",
-    ]
-    lines += [*_table(("choice", *WINDOWS), rows), "", "## A closer look at the best", ""]
-    looked = (scores.aside_agrees == 1).sel(claim=held).sum("claim").max("window")
+    return _table(("choice", *WINDOWS), rows)
+
+
+def _aside(scores: "xr.Dataset") -> list[str]:
+    """The best with each of the choices of which only acceleration or the measure knows."""
+    looked = (scores.aside_agrees == 1).sel(claim=_held_out(scores)).sum("claim").max("window")
     without = agreeing(scores).sel(constants="refined").max("window")
     rows = [
         (name, str(without.sel(reading=name).item()), *map(str, looked.sel(best=name).values.tolist()))
         for name in scores.best.values
     ]
-    lines += [
+    told = (
         "Held-out claims that agree with the choices of which only acceleration or the measure knows: refined"
-        " constants, in the better window.",
-        "",
-        *_table(("reading", "none of them", *scores.aside.values), rows),
-        "",
-    ]
+        " constants, in the better window."
+    )
+    return [told, "", *_table(("reading", "none of them", *scores.aside.values), rows)]
+
+
+def _ideal_sets(scores: "xr.Dataset") -> list[str]:
+    """What a search found under each of the best."""
     judged = (scores.ideal_agrees == 1).any("window")
     rows = [
         (
@@ -87,14 +102,12 @@ def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str
         for name in scores.best.values
     ]
     heads = ("reading", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
-    lines += [
-        "FLSS of ideal sets that a short search found under each, window walk, refined constants.",
-        "",
-        *_table(heads, rows),
-        "",
-    ]
-    lines += ["## Every reading", "", *_table(HEADS, readings_rows(scores, ranking(scores).tolist()))]
-    return "\n".join(lines) + "\n"
+    told = "FLSS of ideal sets that a short search found under each, window walk, refined constants."
+    return [told, "", *_table(heads, rows)]
+
+
+def _held_out(scores: "xr.Dataset") -> list[str]:
+    return [key for key in scores.claim.values if key not in CALIBRATED]
 
 
 def _named(readings: Sequence[Protocol]) -> list[int]:
