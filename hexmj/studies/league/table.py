@@ -138,8 +138,8 @@ def _costs(result: "xr.Dataset") -> Table:
     rows = []
     for name in at.entrant.values:
         one = at.sel(entrant=name)
-        shown = (*(one[key].item() for key in ("speed", "slip", "cost", "torque")), one.torque.item() / WEDGED)
-        cells = (f"{value:.3g}" for value in shown)
+        cells = [f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque")]
+        cells.append(f"{one.torque.item() / WEDGED:.2f}")
         missing = f" (walks missing: {one.missing.item():g})" if one.missing else ""
         rows.append((name + missing, *map(_known, cells)))
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
