@@ -43,7 +43,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
         which: of several figures; the first one unless given.
 
     Raises:
-        InputError: a dataset that no figure belongs to, or no such figure.
+        InputError: a dataset that no figure belongs to, no such figure, or a part of a result that shows too little.
     """
     import xarray as xr
 
@@ -61,7 +61,14 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
     module, _, name = figures[chosen].partition(":")
     draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
-    return draw(result)
+    try:
+        return draw(result)
+    except (LookupError, TypeError, ValueError) as error:
+        sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
+        raise InputError(
+            f"the figure {chosen!r} cannot be drawn of this part of a result, {sizes} ({error!r:.200});"
+            " expected the result as it was computed"
+        ) from error
 
 
 def _study(result: "xr.Dataset") -> str:

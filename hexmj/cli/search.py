@@ -1,6 +1,5 @@
 """`hexmj search`."""
 
-import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -228,6 +227,8 @@ class Search(WalkingCommand):
 
     def _toml(self, problem: "Problem", found: "Found") -> str:
         """What `load_controller` reads to the same bits: weights, or a controller and its fields."""
+        import tomli_w
+
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.presets import network_toml
 
@@ -236,9 +237,7 @@ class Search(WalkingCommand):
             return network_toml(controller)
         table = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
         values = table.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
-        lines = [f"controller = {json.dumps(table['controller'], ensure_ascii=False)}", "", "[fields]"]
-        lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
-        return "\n".join(lines) + "\n"
+        return tomli_w.dumps({"controller": table["controller"], "fields": values})
 
     def _counted(self, problem: "Problem", found: "Found") -> str:
         """What the least cost is where it is no FLSS, and how many starts were lost at it."""
