@@ -1,7 +1,8 @@
-"""Small cells for the tests of sweeps, and a user's file; sources that another process can import."""
+"""Small cells for the tests of sweeps, and what is left of them; a user's file, and where processes find both."""
 
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -85,3 +86,16 @@ def counted_cells(log: Path, n: int = 6, **settings: object) -> list[Cell]:
 
 def calls(log: Path) -> list[str]:
     return (log / "calls").read_text().split("\n")[:-1] if (log / "calls").exists() else []
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def assert_same_bits(these: Sequence[xr.Dataset], those: Sequence[xr.Dataset]) -> None:
+    assert len(these) == len(those)
+    for one, other in zip(these, those, strict=True):
+        assert one.identical(other) and one.attrs == other.attrs
+        for name in one.variables:
+            assert one[name].dtype == other[name].dtype
+            assert one[name].dtype == object or one[name].values.tobytes() == other[name].values.tobytes()
