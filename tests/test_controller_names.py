@@ -91,15 +91,12 @@ def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
     path.write_text(f'controller = "{name}"\n[fields]\nname = "found"\n')
     usual: Any = hexmj.load_controller(name)
     assert hexmj.load_controller(str(path)) == replace(usual, name="found")
-    path.write_text(f'controller = "{path}"\n[fields]\n')
-    with pytest.raises(hexmj.InputError, match=r"expected module:object, file.py:object, a rival or an entry point"):
-        hexmj.load_controller(str(path))
 
 
 def test_toml_that_names_itself_is_refused(tmp_path):
     path = tmp_path / "ring.toml"
     path.write_text(f"controller = '{path}'\n[fields]\n")
-    with pytest.raises(hexmj.InputError, match="expected module:object"):
+    with pytest.raises(hexmj.InputError, match=r"expected module:object, file.py:object, a rival or an entry point"):
         hexmj.load_controller(str(path))
 
 
