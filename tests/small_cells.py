@@ -76,6 +76,10 @@ def of_object(controller: object, n: int) -> xr.Dataset:
     return xr.Dataset({"steps": ("step", controller.steps(n))})  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def squares(rows: np.ndarray) -> np.ndarray:
+    return (rows**2).sum(axis=1)
+
+
 def odd_cells(n: int = 6) -> list[Cell]:
     return [Cell(f"seed {seed}", odd_bits, {"seed": seed}) for seed in range(n)]
 
