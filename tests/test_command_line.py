@@ -17,7 +17,9 @@ def test_help_names_every_command_and_imports_nothing_slow():
     script = "import sys; from hexmj.cli.main import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
     assert all(name in done.stdout for name in COMMANDS)
-    assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & set(done.stderr.split())
+    modules = set(done.stderr.split())
+    assert "hexmj.cli.main" in modules
+    assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & modules
 
 
 @pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search", "disturb"])
@@ -30,15 +32,6 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
 
 def test_version_is_one_line(run):
     assert run("--version") == (0, f"hexmj {version('hexmj')}\n", "")
-
-
-def test_kinematic_side_never_imports_mujoco():
-    script = (
-        "import sys, numpy as np, hexmj\n"
-        "hexmj.flss(hexmj.LDVS, [0.5], n_starts=10); hexmj.walk(np.zeros((1, 6)), hexmj.LDVS, 0.5, 10.0)\n"
-        "assert 'mujoco' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):

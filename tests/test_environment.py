@@ -166,7 +166,8 @@ def test_divergence_raises():
     ],
 )
 def test_nonsense_is_refused(nonsense: dict):
-    with pytest.raises(InputError):
+    (name,) = nonsense
+    with pytest.raises(InputError, match=f"{name} = .*; (expected|valid)"):
         dm.load(**nonsense)
 
 
