@@ -29,7 +29,6 @@ import sys
 from pathlib import Path
 import used, controller
 from hexmj.sweeps import Cell
-from hexmj.sweeps.cells import plain
 from toy.study import cell
 
 def record():

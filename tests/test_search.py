@@ -38,12 +38,11 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
 def test_a_stopped_search_goes_on_to_the_same_bits(tmp_path, algorithm, stop):
     effort = Effort(algorithm, budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
     whole = search(PROBLEM, effort)
-    gone, asked = 0.0, []
+    gone = 0.0
 
     def power_cut(done: float) -> None:
         nonlocal gone
         gone += done
-        asked.append(done)
         if gone > stop:
             raise KeyboardInterrupt
 

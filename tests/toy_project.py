@@ -30,11 +30,9 @@ TOY = {
 
 PRINT_STEM = """
 from hexmj.loaded import importable
-from hexmj.sweeps import code as sources
 from hexmj.sweeps import Cell
 from toy.study import cell
-one = Cell("toy", cell, {"controller": importable("mine.py").Tripod()})
-print(one.record())
+print(Cell("toy", cell, {"controller": importable("mine.py").Tripod()}).record())
 """
 
 
