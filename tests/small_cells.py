@@ -1,7 +1,8 @@
-"""Small cells for the tests of sweeps, and a user's file; sources that another process can import."""
+"""Small cells for the tests of sweeps, and what is left of them; a user's file, and where processes find both."""
 
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,6 +76,10 @@ def of_object(controller: object, n: int) -> xr.Dataset:
     return xr.Dataset({"steps": ("step", controller.steps(n))})  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def squares(rows: np.ndarray) -> np.ndarray:
+    return (rows**2).sum(axis=1)
+
+
 def odd_cells(n: int = 6) -> list[Cell]:
     return [Cell(f"seed {seed}", odd_bits, {"seed": seed}) for seed in range(n)]
 
@@ -85,3 +90,16 @@ def counted_cells(log: Path, n: int = 6, **settings: object) -> list[Cell]:
 
 def calls(log: Path) -> list[str]:
     return (log / "calls").read_text().split("\n")[:-1] if (log / "calls").exists() else []
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def assert_same_bits(these: Sequence[xr.Dataset], those: Sequence[xr.Dataset]) -> None:
+    assert len(these) == len(those)
+    for one, other in zip(these, those, strict=True):
+        assert one.identical(other) and one.attrs == other.attrs
+        for name in one.variables:
+            assert one[name].dtype == other[name].dtype
+            assert one[name].dtype == object or one[name].values.tobytes() == other[name].values.tobytes()

@@ -24,7 +24,7 @@ from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import flss
 from hexmj.sweeps import Cell, run
 from hexmj.sweeps.cluster import workers_of
-from small_cells import ENVIRONMENT, calls, counted_cells, odd_cells
+from small_cells import ENVIRONMENT, calls, contents, counted_cells, odd_cells
 
 DASK = [sys.executable, "-m", "dask"]
 WORKERS = ("--nworkers", "2", "--nthreads", "1", "--no-dashboard", "--death-timeout", "60")
@@ -87,10 +87,6 @@ def wait_for(what: Callable[[], object], seconds: float = 60.0) -> None:
     while not what():
         assert time.monotonic() < until, "it did not happen"
         time.sleep(0.02)
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def finished(out: Path) -> int:

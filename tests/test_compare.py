@@ -151,3 +151,8 @@ def test_a_name_that_the_results_need_is_refused(run, tmp_path, monkeypatch):
     code, _, error = run("compare", "--processes", 0, "--out", tmp_path / "out")
     assert code == 2 and "--processes = 0; expected at least 1" in error
     assert not (tmp_path / "out").exists()
+
+
+def test_arguments_that_nobody_knows_are_refused():
+    with pytest.raises(InputError, match="argument 'condition'; valid names: executor"):
+        compare(LDVS, [0.3], n_starts=2, window=5.0, condition=1)  # pyright: ignore[reportCallIssue]

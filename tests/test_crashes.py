@@ -19,14 +19,12 @@ from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.sweeps import Cell, KeptValues, run
+from small_cells import ENVIRONMENT, squares
 from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
 from tests.soak.faults import KINDS
 
 pytestmark = pytest.mark.slow
-
-PATHS = (str(folder) for folder in Path(__file__).parents[:2])
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}
 
 
 @pytest.fixture(scope="module")
@@ -175,10 +173,6 @@ def test_a_folder_that_is_renamed_in_the_middle(tmp_path: Path) -> None:
         run(cells, folder)
     assert not folder.exists()
     assert [path.name[:2] for path in to.iterdir()] == ["0-"]
-
-
-def squares(rows: np.ndarray) -> np.ndarray:
-    return (rows**2).sum(axis=1)
 
 
 @pytest.mark.parametrize("gone", ["folder", "file"])

@@ -31,6 +31,7 @@ from hexmj.results import results_folder, save_dataset
 from hexmj.starts import draw_starts
 from hexmj.sweeps import Cell, KeptValues, run
 from hexmj.timing import Stride
+from small_cells import squares
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +41,6 @@ def recording() -> xr.Dataset:
 
 def numbers(seed: int) -> xr.Dataset:
     return xr.Dataset({"x": ("n", np.random.default_rng(seed).standard_normal(50))})
-
-
-def squares(rows: np.ndarray) -> np.ndarray:
-    return (rows**2).sum(axis=1)
 
 
 CELL = Cell("numbers", numbers, {"seed": 1})

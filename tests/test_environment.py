@@ -1,4 +1,4 @@
-"""The dm_env face: its contract, its agreement with the physical walk, and what the viewer needs."""
+"""The dm_env face: its contract, its actions, how episodes end, and what the viewer needs."""
 
 import unittest
 
@@ -6,28 +6,17 @@ import numpy as np
 import pytest
 from dm_control.rl import control
 from dm_control.viewer.runtime import Runtime, State
-from dm_env import TimeStep, specs
+from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
 
+from episodes import KINDS, ZEROS, episode
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
-from hexmj.controllers.cruse1998 import HWS, LDVS
-from hexmj.controllers.protocol import Controller
-from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
 from hexmj.errors import InputError
-from hexmj.legs import CENTRED, FIG1, LEGS
-from hexmj.measures.physical import physical_walk
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import settle
+from hexmj.legs import LEGS
 from hexmj.replay.film import gl
-from hexmj.stability import walk_margin
-from hexmj.starts import draw_starts
 from hexmj.timing import Stride
-
-ZEROS = np.zeros(18)
-KINDS = pytest.mark.parametrize("actions", ["joints", "tips"])
 
 
 class _Contract(EnvironmentTestMixin):
@@ -46,133 +35,6 @@ class TestJointsContract(_Contract, unittest.TestCase):
 class TestTipsContract(_Contract, unittest.TestCase):
     def make_object_under_test(self):
         return dm.load(actions="tips", duration=2.0)
-
-
-def run(walking: control.Environment, action: np.ndarray) -> list[TimeStep]:
-    """One episode with the same action throughout."""
-    steps = [walking.reset()]
-    while not steps[-1].last():
-        steps.append(walking.step(action))
-    return steps
-
-
-def folded(walking: control.Environment) -> np.ndarray:
-    """Joint targets that pull all feet up to the body."""
-    spec = walking.action_spec()
-    action = 0.5 * (spec.minimum + spec.maximum).reshape(6, 3)
-    action[:, 1] = spec.maximum.reshape(6, 3)[:, 1]
-    return action.ravel()
-
-
-@pytest.mark.parametrize("velocity", [0.3, 0.5])
-def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
-    """Until the end or the fall, which is seen at the end of its step."""
-    starts, duration = draw_starts(2, 0), 100.0
-    walked = physical_walk(starts, LDVS, velocity, duration)
-    settled, m = settle(starts), Conditions().substeps(Stride())
-    standing = np.zeros((2, 1000 * m + 1, 6), dtype=bool)
-    for chunk in drive(settled, begin(LDVS, settled.starts, velocity, settled.stride), duration):
-        standing[chunk.ids, chunk.first : chunk.first + chunk.standing.shape[1]] = chunk.standing
-    margins = walk_margin(walked.measured)
-    walking = dm.load(velocity, actions="tips", duration=duration)
-    physics = walking.physics
-    for start in range(2):
-        qpos, seen = [], []
-        step = walking.reset()
-        while not step.last():
-            step = walking.step(ZEROS)
-            qpos.append(physics.position())
-            seen.append(step.observation)
-        count = len(qpos) - int(step.discount == 0)
-        np.testing.assert_array_equal(qpos[:count], walked.qpos[:count, start])
-        planned = walked.planned
-        np.testing.assert_array_equal([o["planned_stance"] for o in seen], planned.stance[: len(seen), start])
-        tips = np.array([o["planned_tips"] for o in seen])
-        np.testing.assert_allclose(tips[..., :2], planned.feet[: len(seen), start], rtol=0, atol=1e-12)
-        contact = np.array([o["contact"] for o in seen])[:count]
-        np.testing.assert_array_equal(contact, standing[start, m - 1 : m * count : m])
-        same = (contact == walked.measured.stance[:count, start]).all(axis=1)
-        assert same.mean() > 0.95
-        margin = np.array([o["margin"][0] for o in seen])[:count]
-        np.testing.assert_allclose(margin[same], margins[:count, start][same], rtol=0, atol=1e-9)
-        assert sum(o["out_of_reach"].sum() for o in seen) == walked.outcomes.unreachable[start]
-        fall = walked.outcomes.fall[start]
-        assert step.discount == float(np.isinf(fall))
-        assert len(qpos) == (1000 if np.isinf(fall) else np.ceil(fall / Stride().dt - 1e-6))
-    assert np.isinf(walked.outcomes.fall).all() == (velocity == 0.3)
-
-
-@pytest.mark.parametrize(
-    ("controller", "conditions", "stride"),
-    [
-        (HWS, Conditions.of(vp=200.0, friction=0.5), Stride()),
-        (HWS, Conditions.of(vp=40.0, standing_height=12.0), Stride(dt=0.5, geometry=CENTRED)),
-        (ReadsLegs(LDVS), Conditions(), Stride()),
-        (ReadsLegs(HWS), Conditions.of(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
-    ],
-    ids=["slippery", "slow and centred", "reads the legs", "reads the legs, loaded"],
-)
-def test_other_controllers_and_conditions_are_those_of_the_physical_walk(
-    controller: Controller, conditions: Conditions, stride: Stride
-):
-    """To the last bit, and until the fall; a controller that reads the legs is told the same."""
-    walked = physical_walk(draw_starts(1, 7, stride), controller, 0.3, 40.0, conditions=conditions, stride=stride)
-    walking = dm.load(
-        0.3, actions="tips", controller=controller, conditions=conditions, stride=stride, duration=40.0, seed=7
-    )
-    step, qpos = walking.reset(), []
-    while not step.last():
-        step = walking.step(ZEROS)
-        qpos.append(walking.physics.position())
-    assert np.isinf(walked.outcomes.fall[0])
-    np.testing.assert_array_equal(qpos, walked.qpos[:, 0])
-    assert len(qpos) == round(40.0 / stride.dt)
-
-
-def test_what_is_read_from_the_legs_is_felt():
-    """Or the test above would notice nothing."""
-    seen = []
-    for controller in (LDVS, ReadsLegs(LDVS)):
-        walking = dm.load(0.3, actions="tips", controller=controller, duration=40.0, seed=7)
-        run_steps(walking, 300)
-        seen.append(walking.physics.position())
-    assert (seen[0] != seen[1]).all()
-
-
-def test_rows_of_control_are_taken_one_after_the_other():
-    """However many substeps are taken at once; the last row stays."""
-    walking = dm.load(actions="joints", duration=5.0)
-    walking.reset()
-    one, rows = walking.physics, np.linspace(0.0, 0.3, 3)[:, None] + walking.physics.control()
-    other = one.copy()
-    one.set_control(rows)
-    other.set_control(rows)
-    one.step(4)
-    for _ in range(4):
-        other.step()
-    np.testing.assert_array_equal(one.control(), rows[2])
-    np.testing.assert_allclose(other.position(), one.position(), rtol=0, atol=1e-12)
-
-
-@KINDS
-def test_same_seed_same_bits(actions):
-    def episodes(seed: int) -> list[np.ndarray]:
-        walking = dm.load(actions=actions, duration=3.0, seed=seed)
-        bits = []
-        for _ in range(2):
-            action = ZEROS if actions == "tips" else walking.reset().observation["joint_angles"]
-            bits += [value for step in run(walking, action) for value in step.observation.values()]
-        return bits
-
-    first, second, other = episodes(3), episodes(3), episodes(4)
-    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
-    assert not all(np.array_equal(a, b) for a, b in zip(first, other, strict=True))
-
-
-def test_episodes_take_the_drawn_starts_one_after_the_other():
-    walking = dm.load(seed=5)
-    tips = np.array([walking.reset().observation["planned_tips"] for _ in range(18)])
-    np.testing.assert_allclose(tips[..., 0] - FIG1.origin, draw_starts(18, 5), atol=1e-12)
 
 
 @KINDS
@@ -216,79 +78,17 @@ def test_physics_is_reached_by_names():
     assert sum(named.sensordata[f"{leg}_touch"][0] for leg in LEGS) == pytest.approx(weight, rel=0.02)
 
 
-def test_observed_tips_are_those_of_the_joints():
-    walking = dm.load(actions="tips")
-    seen = run_steps(walking, 100).observation
-    tips = walking.physics.compiled.forward(seen["joint_angles"].reshape(6, 3))
-    np.testing.assert_allclose(seen["tips"], tips, rtol=0, atol=1e-9)
-
-
-def run_steps(walking: control.Environment, count: int) -> TimeStep:
-    """The last of some steps with zeros."""
-    walking.reset()
-    return [walking.step(ZEROS) for _ in range(count)][-1]
-
-
-def seen(walking: control.Environment) -> dict[str, np.ndarray]:
-    """What is observed now."""
-    return walking.task.get_observation(walking.physics)
-
-
-def test_velocity_is_seen_from_the_heading():
-    walking = dm.load()
-    walking.reset()
-    with walking.physics.reset_context():
-        data = walking.physics.data
-        data.qpos[2:7] = 20.0, np.cos(0.4), 0.0, 0.0, np.sin(0.4)
-        data.qvel[:3] = 10.0 * np.cos(0.8), 10.0 * np.sin(0.8), 3.0
-    np.testing.assert_allclose(seen(walking)["velocity"], [10.0, 0.0, 3.0], atol=1e-12)
-
-
-def test_clearance_at_home_is_that_of_the_metathorax():
-    walking = dm.load()
-    walking.reset()
-    walking.physics.reset(walking.physics.model.name2id("home", "key"))
-    assert seen(walking)["clearance"] == pytest.approx(10.4 - 2.0 - 1.6)
-
-
-def test_no_foot_in_contact_has_a_margin_of_its_own():
-    """It lies below every margin that one foot in contact can have, at any reach of the legs."""
-    walking = dm.load()
-    walking.reset()
-    physics, walkers = walking.physics, walking.task._walkers
-
-    def margin(standing: np.ndarray) -> float:
-        flat = walkers.observer.observe(walkers.places, standing[np.newaxis], walkers._planned)
-        return walkers.observer.named(flat)["margin"][0, 0]
-
-    one = [margin(row) for row in np.eye(6, dtype=bool)]
-    assert margin(np.zeros(6, dtype=bool)) == STICK_INSECT.lengths.no_foot_margin < min(one) < 0
-    legs = physics.compiled.kinematics
-    reach = np.linalg.norm(legs.coxa_position[:, :2], axis=1) + legs.coxa + legs.femur + legs.tibia
-    farthest = STICK_INSECT.lengths.farthest_centre_of_mass
-    assert reach.max() + farthest < -STICK_INSECT.lengths.no_foot_margin
-
-
-def test_reward_is_its_formula():
-    walking = dm.load(0.25)
-    walking.reset()
-    task, physics = walking.task, walking.physics
-    command = 0.25 * Conditions().time.vp
-    with physics.reset_context():
-        physics.data.qpos[2:7] = 20.0, 1.0, 0.0, 0.0, 0.0
-    for speed, reward in ((1, 1), (0, 0), (0.5, 0.5), (1.5, 0.5), (2, 0), (3, 0), (-1, 0)):
-        physics.data.qvel[0] = speed * command
-        assert task.get_reward(physics) == pytest.approx(reward)
-    for roll, reward in ((0.0, 1.0), (np.pi / 3, 0.5), (np.pi / 2, 0.0), (np.pi, 0.0)):
-        with physics.reset_context():
-            physics.data.qpos[2:7] = 60.0, np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0
-            physics.data.qvel[0] = command
-        assert task.get_reward(physics) == pytest.approx(reward, abs=1e-12)
+def folded(walking: control.Environment) -> np.ndarray:
+    """Joint targets that pull all feet up to the body."""
+    spec = walking.action_spec()
+    action = 0.5 * (spec.minimum + spec.maximum).reshape(6, 3)
+    action[:, 1] = spec.maximum.reshape(6, 3)[:, 1]
+    return action.ravel()
 
 
 def test_a_fall_ends_the_episode_with_discount_zero():
     walking = dm.load(actions="joints")
-    steps = run(walking, folded(walking))
+    steps = episode(walking, folded(walking))
     assert len(steps) < 200
     assert steps[-1].discount == 0.0
     assert steps[-1].reward == 0.0
@@ -300,7 +100,7 @@ def test_a_fall_ends_the_episode_with_discount_zero():
 
 
 def test_the_end_of_the_time_keeps_the_discount():
-    steps = run(dm.load(actions="tips", duration=2.0), ZEROS)
+    steps = episode(dm.load(actions="tips", duration=2.0), ZEROS)
     assert len(steps) - 1 == 20
     assert steps[-1].discount == 1.0
     assert all(0.0 <= step.reward <= 1.0 for step in steps[1:])
@@ -366,7 +166,8 @@ def test_divergence_raises():
     ],
 )
 def test_nonsense_is_refused(nonsense: dict):
-    with pytest.raises(InputError):
+    (name,) = nonsense
+    with pytest.raises(InputError, match=f"{name} = .*; (expected|valid)"):
         dm.load(**nonsense)
 
 

@@ -24,6 +24,7 @@ from hexmj.files import replacing, write_whole
 from hexmj.replay.film.encoder import encoder
 from hexmj.results import save_dataset, save_figure, save_text
 from hexmj.sweeps import Cell, KeptValues, run
+from small_cells import squares
 
 ROOM = 30_000
 """Bytes that a full disk still takes of a file."""
@@ -91,10 +92,6 @@ def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):
     before = kept.read_bytes()
     assert [one.sizes["n"] for one in run(cells(10_000), tmp_path)] == [5, 10_000]
     assert kept.read_bytes() == before
-
-
-def squares(rows: np.ndarray) -> np.ndarray:
-    return (rows**2).sum(axis=1)
 
 
 @pytest.mark.parametrize("room", [0, 10, 800, 3000, 20_000])

@@ -1,9 +1,6 @@
 """Kinematics in closed form against MuJoCo's own; the numeric ones equal to it, and right for any chain of hinges."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,68 +9,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
 from hexmj.bodies.compiled import kinematics
-from hexmj.bodies.description import ROOT_QPOS, Body, Leg
+from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.loading import plain_model
 from hexmj.bodies.numeric import HingeChains, hinge_chains
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.legs import FIG1, LEGS, MIRROR, SIDE
+from hexmj.legs import FIG1, LEGS, MIRROR
+from other_bodies import any_hexapod
 
 ORIGIN = np.stack([FIG1.origin, FIG1.y, np.zeros(6)], axis=-1)  # (leg, axis)
-
-
-def numbers(values: np.ndarray | Sequence[float]) -> str:
-    """As MJCF writes them."""
-    return " ".join(repr(float(value)) for value in values)
-
-
-def any_hexapod(folder: Path, hinges: int, seed: int) -> Body:
-    """A body with so many hinges in each leg, about any axes, with offsets and turns of any kind between them.
-
-    Its MJCF has neither servos nor sensors nor pairs that touch; some hinges share a body, some bodies have none.
-    """
-    rng = np.random.default_rng(seed)
-    text, home, legs = "", [], []
-    for name, side, x in zip(LEGS, SIDE, (25, 0, -25, 25, 0, -25), strict=True):
-        joints, closing = [], ""
-        for j in range(hinges):
-            place = (x, 5 * side, 0) if j == 0 else rng.normal((14 if j % 2 else 3, 0, -2), 2)
-            turn = numbers(rng.normal(size=4) * 0.3 + (1 if side > 0 or j else 0.7, 0, 0, 0 if j else 0.7 * side))
-            axis, anchor = rng.normal(size=3), numbers(rng.normal(size=3))
-            low, zero, high = np.sort(rng.uniform(-1.2, 1.2, 3)) + np.array([-0.5, 0.0, 0.5])
-            joints.append(f"{name}_{j}")
-            home.append(rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high))
-            if j != hinges - 2:  # the last but one shares the body of the hinge before it
-                text += f'<body name="part_{name}_{j}" pos="{numbers(place)}" quat="{turn}">'
-                text += f'<geom type="sphere" size="0.5" pos="{anchor}" mass="0.01"/>'
-                closing += "</body>"
-            text += f'<joint name="{joints[-1]}" axis="{numbers(axis)}" pos="{anchor}" ref="{zero}" armature="1"'
-            text += f' range="{low} {high}"/>'
-            if j == 0:
-                text += f'<body name="bare_{name}" pos="1 2 3" euler="0.1 0.2 0.3">'
-                text += '<geom type="sphere" size="0.5" mass="0.001"/>'
-                closing += "</body>"
-        text += f'<body name="foot_{name}" pos="15 0 -3"><geom type="sphere" size="0.5" mass="0.01" name="{name}"/>'
-        text += f'<site name="{name}"/></body>{closing}'
-        parts = tuple(f"part_{name}_{j}" for j in range(hinges) if j != hinges - 2)
-        legs.append(Leg(tuple(joints), name, (*parts, f"bare_{name}", f"foot_{name}")))
-    file = folder / "hexapod.xml"
-    file.write_text(
-        f"""<mujoco><compiler angle="radian"/><option gravity="0 0 -9810" timestep="0.0005"/><worldbody>
-        <geom name="floor" type="plane" size="0 0 1"/>
-        <body name="hull"><freejoint/><geom name="hull" type="box" size="30 5 2" mass="1"/>{text}</body>
-        </worldbody><keyframe><key name="stand" qpos="0 0 40 1 0 0 0 {numbers(home)}"/></keyframe></mujoco>"""
-    )
-    mass = mujoco.MjModel.from_xml_path(str(file)).body_mass.sum()
-    names: dict[str, Any] = {
-        "name": f"made_{hinges}_{seed}",
-        "root": "hull",
-        "trunk": ("hull",),
-        "ground": "floor",
-        "home": "stand",
-    }
-    names["cameras"] = ()
-    return replace(STICK_INSECT, mjcf=file, legs=tuple(legs), mass=float(mass), **names)
 
 
 @pytest.fixture(scope="module")

@@ -167,6 +167,15 @@ def test_whoever_imports_the_kinematic_floors_has_not_imported_mujoco():
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_kinematic_side_never_imports_mujoco():
+    script = (
+        "import sys, numpy as np, hexmj\n"
+        "hexmj.flss(hexmj.LDVS, [0.5], n_starts=10); hexmj.walk(np.zeros((1, 6)), hexmj.LDVS, 0.5, 10.0)\n"
+        "assert 'mujoco' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 @pytest.mark.parametrize("library", MUJOCO)
 def test_few_modules_know_what_steps_the_bodies(library: str):
     """A second engine is one file more."""

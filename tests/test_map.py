@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 
 from hexmj import LDVS, Conditions, InputError, ReadsLegs, compare
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.intervals import paired_difference
 from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
 from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
@@ -111,20 +110,6 @@ def test_the_froude_number_is_one_where_weight_only_just_holds_the_arc():
     assert_allclose(froude(Conditions.of(vp=vp, standing_height=10.0), np.array([0.5])), 1.0)
     slow, fast = (froude(Conditions.of(vp=vp), np.array([0.3])) for vp in (80.0, 160.0))
     assert_allclose(fast, 4 * slow)
-
-
-def test_paired_differences():
-    rng = np.random.default_rng(0)
-    one, other = rng.random((2, 5, 4000)) < np.array([0.5, 0.3])[:, None, None]
-    middle, low, high = paired_difference(one, other)
-    assert_allclose(middle, one.mean(axis=1) - other.mean(axis=1))
-    back, back_low, back_high = paired_difference(other, one)
-    assert_allclose([back, back_low, back_high], [-middle, -high, -low])
-    spread = (one.astype(float) - other).std(axis=1) / np.sqrt(4000)  # of the mean, for many starts
-    assert_allclose(high - low, 2 * 1.96 * spread, rtol=0.01)
-    same, low, high = paired_difference(one, one)
-    assert_allclose(same, 0.0)
-    assert (low < 0).all() and (high > 0).all()
 
 
 def test_the_values_of_every_condition_make_sense():

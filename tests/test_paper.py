@@ -374,3 +374,14 @@ def test_a_rows_command_tells_starts_and_readings():
     quick = claims_markdown([beside], asdict(replace(QUICK, seed=7)))
     assert f"`{claim.command} --quick --seed 7 --beside lasting`" in quick
     assert f"`{claim.command}`" in claims_markdown([Row(claim, {})], asdict(FULL))
+
+
+def test_reproduce_judges_chosen_claims(run, tmp_path):
+    words = ["reproduce", "--quick", "--only", "ldvs-accelerated", "--json", "--out", tmp_path]
+    code, text, _ = run(*words)
+    assert code == 0
+    (claim,) = json.loads(text)["claims"]
+    assert claim["key"] == "ldvs-accelerated"
+    assert set(claim["ours"]) == {"walk", "start"}
+    assert claim["command"].endswith("--only ldvs-accelerated --quick")
+    assert (tmp_path / "claims.md").is_file()

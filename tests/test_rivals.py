@@ -1,5 +1,8 @@
 """What all rivals share: the protocol, the legs, and being found by name."""
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.rivals.lifted import Lifted
 from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.controllers.rivals.table import RIVALS
+from hexmj.errors import InputError
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, gait, wilson_phase
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Acceleration, Stride
@@ -48,3 +52,13 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
     assert np.allclose(circular_mean(found.phase[:, IPSILATERAL] - along + 0.5, axis=1), 0.5, atol=0.005)
     assert np.allclose(found.phase[:, CONTRALATERAL], 0.5, atol=0.005)
     assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.02)  # swings even out by a factor V a period
+
+
+@pytest.mark.parametrize("state", [np.zeros((2, 6)), None, (np.zeros((2, 6)),)])
+def test_a_rule_that_remembers_no_named_tuple_is_refused_as_it_begins(state) -> None:
+    own = {"name": "rule", "at_start": lambda self, legs: state}
+    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
+    with pytest.raises(
+        InputError, match=r"at_start gave .* expected a named tuple of arrays whose first axis is the start, 2"
+    ):
+        hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)

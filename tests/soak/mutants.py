@@ -81,7 +81,7 @@ GROUPS = {
         ),
         Module(
             "controllers/cruse1998/network.py",
-            ("tests/test_network.py", "tests/test_controllers.py"),
+            ("tests/test_network.py", "tests/test_first_losses.py", "tests/test_conformance.py"),
             "test_network and not (number_of_lanes or comes_back) or fast_losses or network_conforms",
         ),
     ),
@@ -90,8 +90,8 @@ GROUPS = {
         Module("measures/kinematic.py", ("tests/test_stability.py", "tests/test_loss_frequency.py"), ""),
         Module(
             "controllers/losses.py",
-            ("tests/test_controllers.py",),
-            "loss or lost or makes_no_sense or on_paper or held",
+            ("tests/test_first_losses.py", "tests/test_reading_legs.py", "tests/test_refused_plans.py"),
+            "first_losses or makes_no_sense or on_paper",
         ),
     ),
     "drive": (

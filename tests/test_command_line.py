@@ -1,0 +1,96 @@
+"""What all commands share: help, one JSON object, names that a terminal lacks, and the line that ends an answer."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import hexmj
+from hexmj.cli.main import COMMANDS
+
+
+def test_help_names_every_command_and_imports_nothing_slow():
+    script = "import sys; from hexmj.cli.main import main\ntry: main()\nfinally: print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script, "--help"], capture_output=True, text=True, check=True)
+    assert all(name in done.stdout for name in COMMANDS)
+    modules = set(done.stderr.split())
+    assert "hexmj.cli.main" in modules
+    assert not {"mujoco", "numba", "xarray", "matplotlib", "dm_control", "scipy"} & modules
+
+
+@pytest.mark.parametrize("command", ["compare", "flss", "walk", "render", "search", "disturb"])
+def test_every_command_has_help_with_units_and_defaults(run, command):
+    code, out, _ = run(command, "--help")
+    assert code == 0
+    assert "[mm/s]" in out
+    assert "(default: 80.0)" in out
+
+
+def test_version_is_one_line(run):
+    assert run("--version") == (0, f"hexmj {version('hexmj')}\n", "")
+
+
+def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):
+    words = ["flss", "--velocities", "0.1", "0.5", "--starts", "500", "--window", "start", "--json"]
+    done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, check=True)
+    answer = json.loads(done.stdout)
+    table = hexmj.flss(hexmj.LDVS, [0.1, 0.5], n_starts=500, window="start")
+    for key in ("velocity", "flss", "low", "high"):
+        assert answer[key] == table[key].values.tolist()
+    assert answer["settings"]["window"] == "start"
+    assert answer["settings"]["seed"] == 0
+    assert answer["sample_sd"] == [None, None]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_names_that_the_terminal_lacks_are_written_as_it_can(tmp_path, encoding):
+    (tmp_path / "snow.py").write_text(
+        "import hexmj, dataclasses\nSnow = dataclasses.replace(hexmj.LDVS, name='\u2603')"
+    )
+    words = ["walk", "--model", "snow.py:Snow", "--velocity", "0.5", "--window", "2"]
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-m", "hexmj", *words], capture_output=True, env=environment, cwd=tmp_path, check=True
+    )
+    assert ("\u2603" if encoding == "utf-8" else r"\u2603") in done.stdout.decode(encoding)
+
+
+SUMS = "from dataclasses import replace\nfrom hexmj import LDVS\nfrom hexmj.controllers.cruse1998 import Reading\n"
+SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--model", "lasting-0.1"], "; lasting-0.1: reading lasting"),
+        (["--model", "sums.py:X"], "; sums.py:X: order sequential, reading cap sum"),
+        (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
+        (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+    ],
+)
+def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    Path("sums.py").write_text(SUMS)
+    short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
+    assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")
+
+
+@pytest.mark.parametrize("words", [["--model", "ldvs"], ["--model", "own-0.1"], ["--model", "own", "--seed", 1998]])
+def test_the_last_line_is_silent_on_what_is_as_printed_and_fresh(run, words):
+    out = run("flss", *words, "--velocities", 0.4, "--starts", 2, "--window", 3)[1]
+    assert "found" not in out
+    assert "reading" not in out
+
+
+@pytest.mark.slow
+def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
+    words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]
+    out = run(*words, "--out", tmp_path)[1].replace("\n", " ").replace("  ", " ")
+    assert "a search found lasting-0.3, lasting-0.5 (others: --seed 1998)" in out
+    assert "; lasting-0.3: reading lasting; lasting-0.5: reading lasting" in out

@@ -1,0 +1,236 @@
+"""The check of controllers: those that keep the protocol pass, and what breaks a law is found in one sentence."""
+
+import itertools
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers import Sensed
+from hexmj.controllers.conformance import FIRST, check_controller, findings
+from hexmj.legs import CENTRED
+from hexmj.walks import PlannedWalk
+from stepwise_ldvs import Change, Own
+from waiting_legs import OWN
+
+LDVS = hexmj.LDVS
+
+
+@pytest.mark.parametrize("order", ["printed", "undelayed", "sequential"])
+@pytest.mark.parametrize("name", ["ldvs", "uncoordinated", "own-0.1", "own"])
+def test_the_network_conforms(name, order):
+    controller = replace(hexmj.PRESETS[name], order=order)
+    check_controller(controller)
+    assert controller.mirrored == (order != "sequential" and name != "own-0.1")
+
+
+def test_other_controllers_conform():
+    check_controller(hexmj.ReadsLegs(LDVS))
+    check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))
+    assert all(finding.well and finding.found for finding in findings(Own()))
+
+
+def steps_changed(**changed: Callable[[PlannedWalk], Any]) -> Own:
+    """A controller that changes every step of LDVS."""
+    return Own(lambda walk, _: {name: one(walk) for name, one in changed.items()})
+
+
+def spoilt(spoil: Callable[..., Any]) -> Any:
+    """LDVS with plans that are spoilt, or replaced, as they begin: by plan, starts, velocity and threads."""
+
+    @dataclass(frozen=True)
+    class Spoilt(Own):
+        def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+            plan = Own.begin(self, starts, velocity, stride, acceleration)
+            return spoil(plan, starts, velocity, threads) or plan
+
+    return Spoilt()
+
+
+def walks_changed(change: Callable[[PlannedWalk], dict[str, Any]]) -> Any:
+    """A controller whose plans give other walks than they should."""
+
+    def spoil(plan, *_):
+        inner = plan.advance
+        plan.advance = lambda steps: replace(walk := inner(steps), **change(walk))
+
+    return spoilt(spoil)
+
+
+COUNT = itertools.count()
+
+
+@dataclass
+class Melting:
+    """Not frozen."""
+
+    change: Change | None = None
+    name: str = "melting"
+    begin = Own.begin
+
+
+@dataclass(frozen=True)
+class Hiding(Own):
+    """With a setting that is no plain data."""
+
+    thing: Any = object()  # noqa: RUF009  # one for all
+
+
+@dataclass(frozen=True)
+class MirroredInVain(Own):
+    """Claims what it does not keep."""
+
+    mirrored = True
+
+
+@dataclass(frozen=True)
+class OfOneMind(Own):
+    """Its plans forget how far they are as soon as another one begins."""
+
+    mind: list[int] = field(default_factory=list, compare=False)
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        self.mind[:] = [0]
+
+        def forgetful(walk, _):
+            self.mind[0] += 1
+            return {"x": walk.x[0] + 1e-6 * self.mind[0]}
+
+        return Own(forgetful).begin(starts, velocity, stride, acceleration, threads)
+
+
+def moved_by_all(plan, *_):
+    """Whoever is told something, all move."""
+    inner, told = plan.advance, []
+    plan.advance = lambda steps: replace(walk := inner(steps), x=walk.x - 0.001 * len(told))
+    plan.sense = told.append
+
+
+def written_on(plan, *_):
+    def sense(sensed: Sensed) -> None:
+        sensed.tips[:] = 0.0
+
+    plan.sense = sense
+
+
+def one_step_on(plan, *_):
+    plan.advance(1)
+
+
+def one_step_on_with_two_threads(plan, starts, velocity, threads):
+    if threads == 2:
+        plan.advance(1)
+        plan.done = 0
+
+
+def losses_of_its_own(plan, *_):
+    """Its fast way finds other losses than the plan has."""
+    plan.first_losses = np.ones_like
+
+
+def starts_halved(plan, starts, *_):
+    starts *= 0.5
+
+
+def left_leg_ahead(walk: PlannedWalk, _: int) -> dict[str, Any]:
+    return {"x": walk.x[0] + np.array([1e-6, 0.0, 0.0, 0.0, 0.0, 0.0])}
+
+
+BROKEN: list[tuple[str, Any, str]] = [
+    ("settings", Melting(), "not frozen"),
+    ("settings", Hiding(), "object.*is no setting"),
+    ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),
+    ("begin", spoilt(one_step_on), "the plan is at step 1; expected one at time 0"),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "stride", hexmj.Stride(dt=0.2))), "the plan's stride is Stride"),
+    ("steps", spoilt(starts_halved), "starts are changed as it goes on; expected the plan to work on a copy"),
+    ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]}), r"x is float64 of the shape \(600, 1, 6\); expected"),
+    ("steps", walks_changed(lambda walk: {"stance": 1.0 * walk.stance}), "stance is float64 .* expected bool"),
+    ("steps", walks_changed(lambda walk: {"geometry": CENTRED}), "geometry = .*; expected that of the stride"),
+    ("steps", walks_changed(lambda walk: {"time": walk.time - 0.1}), "expected k dt"),
+    ("times", walks_changed(lambda walk: {"time": walk.time * (1 + 1e-12)}), "expected k dt"),
+    ("times", walks_changed(lambda walk: {"velocity": np.full_like(walk.velocity, 0.5)}), "expected V_r as commanded"),
+    ("steps", steps_changed(x=lambda walk: np.where(walk.stance[0], walk.x[0], np.nan)), "x is nan in step"),
+    ("steps", steps_changed(height=lambda walk: np.inf), "height is inf in step 0, start 0 .V = 0., leg L1"),
+    ("reach", steps_changed(x=lambda walk: walk.x[0] + 5.0), "x is .* mm in step .*; expected -21 to 11 mm"),
+    ("reach", steps_changed(y=lambda walk: 1.6 * walk.y[0]), "y is 28.8 mm in .*; expected 9 to 27 mm"),
+    ("reach", steps_changed(height=lambda walk: 30.0), "height is 30 mm in .*; expected -10 to 20 mm"),
+    ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT)), "begun alike differ: x is"),
+    ("begun again", spoilt(one_step_on_with_two_threads), "with 1 and 2 threads differ: x is"),
+    ("side by side", OfOneMind(), "a plan alone, and beside another of the same controller, differ: x is"),
+    ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean()), "or among others differ: x"),
+    ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)}), "in parts of .* differ: x is"),
+    ("first losses", spoilt(losses_of_its_own), r"first_losses gives the steps \[1 1 .* expected those of the plan"),
+    ("mirrored", MirroredInVain(left_leg_ahead), "mirrored starts, mirrored back, differ: x is"),
+    ("sense", spoilt(moved_by_all), "starts it is told nothing of differ: x is"),
+    ("sense", spoilt(written_on), "sense changes what it is told, tips"),
+    ("steps", steps_changed(x=lambda walk: np.zeros((2, 2))), "x of a step has the shape"),
+]
+
+
+@pytest.mark.parametrize(("law", "controller", "words"), BROKEN)
+def test_what_breaks_a_law_is_found_in_one_sentence(law, controller, words):
+    finding = next(one for one in findings(controller) if one.name == law)
+    assert not finding.well
+    assert re.search(words, finding.found), finding.found
+    assert "\n" not in finding.found
+
+
+@pytest.mark.parametrize("law", FIRST)
+def test_one_cause_is_found_once(law):
+    """What the laws after one rest on; they would say the same again."""
+    for broken, controller, _ in BROKEN:
+        if broken == law:
+            *kept, finding = findings(controller)
+            assert finding.name == law
+            assert finding.found.endswith("; the laws after this one were not tried")
+            assert all(one.well for one in kept if one.name != "settings")
+
+
+def test_feet_that_slide_are_told():
+    """No law forbids it; tips that stand still slide with V_r, at most."""
+    *_, last = findings(Own())
+    assert (last.name, last.found) == (
+        "sliding",
+        "feet that stand stay where they are on the ground: their tips recede at V_r",
+    )
+    *_, last = findings(steps_changed(x=lambda walk: np.zeros(6), stance=lambda walk: True))
+    assert last.well
+    assert last.found.startswith("feet that stand would slide: ")
+    assert "but one is off by 0.95 V_p, in step 1, start 3 (V = 0.95), leg L1" in last.found
+    *_, last = findings(steps_changed(y=lambda walk: walk.y[0] + 1e-3 * walk.time[0]))
+    assert "but one is off by 0.001 V_p" in last.found
+
+
+def test_the_first_law_that_is_broken_is_raised():
+    with pytest.raises(AssertionError, match=r"^settings: the dataclass is not frozen; expected"):
+        check_controller(Melting())
+
+
+def test_what_is_no_controller_is_refused():
+    for thing in (3, Own, hexmj.Symmetric()):
+        with pytest.raises(hexmj.InputError, match="expected a controller, a frozen dataclass"):
+            check_controller(thing)
+    with pytest.raises(hexmj.InputError, match="a controller's name = 3; expected a text"):
+        check_controller(Own(name=3))  # pyright: ignore[reportArgumentType]
+
+
+def test_check_controller_says_what_is_wrong(run, tmp_path):
+    code, out, _ = run("check-controller", "ldvs")
+    assert code == 0
+    *laws, last = out.splitlines()
+    assert all(line.startswith("well   ") for line in laws)
+    assert last.startswith("note   sliding: ")
+    wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
+    (tmp_path / "mine.py").write_text(wrong)
+    code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")
+    assert code == 1
+    answer = json.loads(out)
+    assert not answer["well"]
+    assert [one["found"] for one in answer["checks"] if not one["well"]]

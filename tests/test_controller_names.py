@@ -1,0 +1,130 @@
+"""Controllers by name: presets, rivals, files and objects of a user's own; and their settings."""
+
+import sys
+from dataclasses import replace
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import pytest
+
+import hexmj
+from hexmj.controllers import named
+from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.protocol import settings_of
+from stepwise_ldvs import Own
+
+LDVS = hexmj.LDVS
+
+MINE = '''
+from dataclasses import dataclass
+import numpy as np
+from hexmj.controllers import Step, stepwise
+
+@dataclass(frozen=True)
+class Still:
+    """Stands."""
+    name: str = "still"
+    height: float = 0.0
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        return stepwise(lambda v: Step(starts, True), starts, velocity, stride, acceleration)
+
+@dataclass(frozen=True)
+class Needy(Still):
+    legs: int = None
+
+    def __post_init__(self):
+        if self.legs is None:
+            raise ValueError("legs is missing")
+
+taller = Still("taller", 3.0)
+number = 6
+'''
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A file of a user's own, which is also a module."""
+    path = tmp_path / "mine_of_a_user.py"
+    path.write_text(MINE)
+    (tmp_path / "broken.py").write_text("import nothing_of_this_name\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield path
+    sys.modules.pop("mine_of_a_user", None)
+
+
+def test_controllers_by_name(mine, tmp_path, monkeypatch):
+    assert hexmj.load_controller("ldvs") is LDVS
+    (tmp_path / "set.toml").write_text(network_toml(hexmj.HWS))
+    assert hexmj.load_controller("set.toml") == replace(hexmj.HWS, name="set")
+    for where in (mine.name, str(mine), "mine_of_a_user"):
+        assert settings_of(hexmj.load_controller(f"{where}:Still")) == {"name": "still", "height": 0.0}
+        assert settings_of(hexmj.load_controller(f"{where}:taller")) == {"name": "taller", "height": 3.0}
+    point = EntryPoint("robot", "mine_of_a_user:taller", named.ENTRY_POINTS)
+    monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
+    assert hexmj.load_controller("robot").name == "taller"
+    assert "robot" in named.known_names()
+    (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "taller", "height": 4.0}
+
+
+def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
+    path = tmp_path / "tall.toml"
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4.0\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0}
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\n')
+    assert repr(settings_of(hexmj.load_controller("tall.toml"))["height"]) == "4.0", "the same setting"
+    path.write_text('controller = "mine_of_a_user.py:Still"\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 0.0}
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = "4.0"\n')
+    with pytest.raises(hexmj.InputError, match=r"\[fields\]: height = '4.0'; expected a number"):
+        hexmj.load_controller("tall.toml")
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nwidth = 4.0\n')
+    with pytest.raises(hexmj.InputError, match=r"width.*expected fields of mine_of_a_user.py:Still"):
+        hexmj.load_controller("tall.toml")
+
+
+@pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])
+def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(f'controller = "{name}"\n[fields]\nname = "found"\n')
+    usual: Any = hexmj.load_controller(name)
+    assert hexmj.load_controller(str(path)) == replace(usual, name="found")
+
+
+def test_toml_that_names_itself_is_refused(tmp_path):
+    path = tmp_path / "ring.toml"
+    path.write_text(f"controller = '{path}'\n[fields]\n")
+    with pytest.raises(hexmj.InputError, match=r"expected module:object, file.py:object, a rival or an entry point"):
+        hexmj.load_controller(str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("lvds", "controller 'lvds' is neither one of hws, ldvs, uncoordinated, .* nor a TOML file"),
+        ("", "controller '' is neither one of hws"),
+        ("x" * 5000, "is neither one of"),
+        ("nowhere.toml", "nor a TOML file that exists"),
+        ("nowhere.py:Still", "nowhere.py is no file; expected one that ends in .py"),
+        ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
+        ("broken.py:Still", "broken.py cannot be loaded"),
+        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy"),
+        ("mine_of_a_user.py:number", "controller = 6; expected a controller, a frozen dataclass"),
+        ("mine_of_a_user.py:np", "expected a controller, a frozen dataclass"),
+        ("mine_of_a_user.py:Needy", "Needy cannot be made: legs is missing; expected a class with defaults"),
+    ],
+)
+def test_wrong_names_get_one_sentence(mine, name, words):
+    with pytest.raises(hexmj.InputError, match=words) as wrong:
+        hexmj.load_controller(name)
+    assert "\n" not in str(wrong.value)
+
+
+def test_settings_are_plain_data():
+    settings = settings_of(hexmj.ReadsLegs(hexmj.PRESETS["own-0.1"]))
+    assert set(settings) == {"controller"}
+    assert isinstance(settings["controller"]["weights"]["p1"][0], list)
+    with pytest.raises(hexmj.InputError, match="expected a controller"):
+        settings_of(Own)  # pyright: ignore[reportArgumentType]

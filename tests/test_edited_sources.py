@@ -1,0 +1,127 @@
+"""Sources and data that are edited while a program uses them: they count as they ran, or are refused."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexmj.errors import InputError
+from hexmj.loaded import importable
+from hexmj.sweeps import Cell, KeptValues
+from hexmj.sweeps import code as sources
+from hexmj.sweeps.code import code
+from small_cells import ENVIRONMENT, MINE
+from toy_project import write_toy
+
+
+def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    name, file = "hexmj.errors", sources.PACKAGE / "errors.py"
+    monkeypatch.setitem(sources._AT_FIRST, file, 0)
+    with pytest.raises(InputError, match=r"errors\.py was edited since this program began; start it again"):
+        sources._read.__wrapped__(name, file)
+
+
+USED = """
+import sys
+from pathlib import Path
+import used, controller
+from hexmj.sweeps import Cell
+from toy.study import cell
+
+def record():
+    return Cell("toy", cell, {"controller": controller.Tripod()}).record()
+
+first = record() if sys.argv[1] != "edit" else ""
+Path("used.py").write_text("GAIN = 5.0")
+if sys.argv[1] == "again":
+    import importlib
+    importlib.reload(used)
+print(record())
+assert first in ("", record())
+"""
+
+
+def used_record(folder: Path, how: str) -> subprocess.CompletedProcess[str]:
+    (folder / "used.py").write_text("GAIN = 0.5")
+    (folder / "controller.py").write_text("import used\n" + MINE)
+    command = [sys.executable, "-c", USED, how]
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+
+
+def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(tmp_path: Path) -> None:
+    """Whether the file was edited before the first record or after; run again, no one knows which is meant."""
+    write_toy(tmp_path)
+    unedited, edited, again = (used_record(tmp_path, how) for how in ("record", "edit", "again"))
+    assert unedited.returncode == edited.returncode == 0, edited.stderr
+    assert json.loads(unedited.stdout) == json.loads(edited.stdout)
+    assert "used.py was edited while this program used it; start it again" in again.stderr
+
+
+LATE = """
+from pathlib import Path
+from hexmj.sweeps import Cell, run
+import late_cells
+late_cells.record()
+Path("helper.py").write_text("GAIN = 7.0")
+run([Cell("late", late_cells.cell, {})], Path("kept"))
+"""
+
+
+def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "helper.py").write_text("GAIN = 1.0")
+    (tmp_path / "late_cells.py").write_text(
+        "import xarray as xr\nfrom hexmj.sweeps import Cell\n"
+        "def cell():\n    import helper\n    return xr.Dataset({'a': helper.GAIN})\n"
+        "def record(): return Cell('late', cell, {}).record()"
+    )
+    command = [sys.executable, "-c", LATE]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert "helper.py was edited while this program used it; start it again" in done.stderr
+    assert not list(tmp_path.rglob("*.nc"))
+
+
+READ = """
+from pathlib import Path
+from hexmj.sweeps import Cell
+import reads
+if __name__ == "__main__":
+    Path("gains.toml").write_text("g = 9.0")
+    print(Cell("reads", reads.cell, {}).record())
+"""
+
+
+def test_a_data_file_counts_as_it_was_when_its_module_ran_too(tmp_path: Path) -> None:
+    """The module may have read it then, or may read it now; in a new program both are the same."""
+    (tmp_path / "reads.py").write_text("GAINS = open('gains.toml').read()\ndef cell(): ...")
+    sources_of = []
+    for text in ("g = 1.0", "g = 9.0"):
+        (tmp_path / "gains.toml").write_text(text)
+        command = [sys.executable, "-c", READ]
+        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=True)
+        sources_of.append(json.loads(done.stdout)["sources"])
+    assert sources_of[0]["reads, gains.toml"] != sources_of[1]["reads, gains.toml"]
+
+
+def test_data_files_count_as_they_are_now(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("DATA = 'gains.toml'")
+    name, found = importable(tmp_path / "mine.py").__name__, []
+    for text in ("a = 1", "a = 2", "a = 1"):
+        (tmp_path / "gains.toml").write_text(text)
+        found.append(code(frozenset({name})).sources)
+    assert found[0] == found[2] != found[1]
+
+
+def edited_rows(rows: np.ndarray, data: str) -> np.ndarray:
+    Path(data).write_text("after")
+    return rows.sum(axis=1)
+
+
+def test_evaluations_during_which_a_file_is_edited_are_not_kept(tmp_path: Path) -> None:
+    (data := tmp_path / "gains.toml").write_text("before")
+    values = KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept")
+    with pytest.raises(InputError, match="rows: data of settings was edited while it was in use; start again"):
+        values(np.eye(2))
+    assert KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept").known == 0

@@ -1,0 +1,103 @@
+"""Who takes part in the league: found by name, named shortly, and refused where they make no sense."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.rivals.evolved import Evolved
+from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
+from hexmj.errors import InputError
+from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.entrants import EVERYONE, entrants
+from hexmj.studies.league.study import League
+from hexmj.studies.league.trials import TRIALS
+from hexmj.studies.short_names import short_names
+from hexmj.timing import Stride
+from standing_still import Still
+
+
+def test_everyone_is_found_and_can_be_asked_everything() -> None:
+    takes_part = entrants(EVERYONE)
+    assert len(takes_part) == len(EVERYONE)
+    named = League(takes_part).named_cells()
+    for name, entrant in takes_part.items():
+        asked = {what for one, what in named if one == name}
+        assert "physics 0.5" in asked and "paper 0.5" in asked
+        assert entrant.ideal != ({*TRIALS} <= asked)
+    with pytest.raises(InputError, match="ideal start of ldvs"):
+        entrants(("ldvs-ideal",))
+
+
+OWN = """
+from dataclasses import dataclass
+from hexmj.controllers.rivals.metronomes import Metronome
+
+@dataclass(frozen=True)
+class One(Metronome):
+    name: str = "one"
+
+@dataclass(frozen=True)
+class Ldvs(One):
+    name: str = "ldvs"
+
+@dataclass(frozen=True)
+class Long(One):
+    name: str = "one that has a very long name"
+
+@dataclass(frozen=True)
+class Bar(One):
+    name: str = "a|b"
+"""
+
+
+def test_controllers_of_files_have_short_names_and_all_different_ones(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for folder in ("a/b", "c/b"):
+        Path(folder).mkdir(parents=True)
+        Path(folder, "own.py").write_text(OWN)
+        Path(folder, "found.toml").write_text(network_toml(hexmj.LDVS))
+    expected = {
+        "a/b/own.py:One": "a/b/own.py:One",
+        "c/b/own.py:One": "c/b/own.py:One",
+        "a/b/own.py:Ldvs": "own.py:Ldvs",
+        "a/b/own.py:Long": "own.py:Long",
+        "c/b/own.py:Bar": "own.py:Bar",
+        "a/b/found.toml": "found",
+        "ldvs-without-3": "ldvs-without-3",
+        "ldvs": "ldvs",
+    }
+    assert short_names({name: hexmj.load_controller(name) for name in expected}) == expected
+    takes_part = entrants(("a/b/own.py:One", "a/b/own.py:One-ideal", "graham-ideal"))
+    assert [*takes_part] == ["one", "one-ideal", "graham-ideal"]
+    assert [one.ideal for one in takes_part.values()] == [False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (lambda: League({"ldvs": hexmj.LDVS}), "entrants\\['ldvs'\\] = .* expected an Entrant"),  # pyright: ignore
+        (lambda: League(entrants(("ldvs",)), periods=0), "periods = 0; expected a whole number of at least 12"),
+        (lambda: Entrant(hexmj.load_controller("graham"), "no"), "ideal = 'no'; expected True or False"),  # pyright: ignore
+        (lambda: Metronome("tripod"), "wave = 'tripod'; valid names: wilson, graham"),  # pyright: ignore
+        (lambda: PhaseOscillators(coupling=np.nan), "cpg-tripod: coupling = nan; expected a finite number"),
+        (lambda: Evolved(theta=np.inf), "evolved: theta = inf; expected a finite number"),
+    ],
+)
+def test_entrants_and_rivals_that_make_no_sense_are_refused(given, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        given()
+
+
+def test_an_ideal_start_that_raises_is_one_sentence() -> None:
+    @dataclass(frozen=True)
+    class Gone(Still):
+        def ideal_start(self, velocity, stride):
+            raise ValueError("no gait at this velocity")
+
+    with pytest.raises(InputError, match=r"still, ideal_start: ValueError in .*: no gait at this velocity"):
+        Entrant(Gone(), ideal=True).starts(1, 0, 0.5, Stride())

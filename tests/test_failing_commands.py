@@ -1,0 +1,58 @@
+"""What fails on a command's way is one sentence: compiled code, memory, a simulation."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexmj.errors import SimulationError
+from hexmj.loaded import importable
+
+
+def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):
+    """As the module of numba raises it that keeps and finds code."""
+    (tmp_path / "caching.py").write_text("def load(*_, **__): raise EOFError('Ran out of input')")
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", importable(tmp_path / "caching.py").load)
+    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, text) == (2, "")
+    assert "hexmj: numba cannot find or keep compiled code; delete its files" in error
+    assert "(EOFError: Ran out of input)" in error
+
+
+def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):
+    def run_out(*_, **__):
+        raise MemoryError("Unable to allocate 9 TiB")
+
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", run_out)
+    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, text) == (2, "")
+    assert "hexmj: the memory does not suffice (Unable to allocate 9 TiB); expected fewer starts" in error
+
+
+def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):
+    code, _, error = run("walk", "--physical", "--settling-time", 1, "--out", tmp_path)
+    assert code == 1
+    assert "did not settle" in error
+    assert not Path(tmp_path / "recording.nc").exists()
+
+
+@pytest.mark.parametrize("out", [True, False])
+def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, tmp_path, monkeypatch, out):
+    def diverge(*_: object, **how: object) -> None:
+        raise SimulationError("start 3 diverged", {"qpos": np.arange(3.0)}, "diverged-start-3.npz")
+
+    monkeypatch.setattr("hexmj.measures.compare.physical_flss", diverge)
+    monkeypatch.chdir(tmp_path)
+    code, _, error = run("flss", "--physical", *(["--out", tmp_path / "results"] if out else []))
+    assert code == 1
+    path = tmp_path / "results" / "diverged-start-3.npz"
+    if out:
+        assert (
+            f"start 3 diverged; its last good state is in {path}; python -m hexmj.physics.divergence {path} replays it"
+            in error
+        )
+        assert np.load(path)["qpos"].tolist() == [0.0, 1.0, 2.0]
+        assert list(tmp_path.iterdir()) == [path.parent]
+    else:
+        assert "start 3 diverged; give --out to keep its last good state there" in error
+        assert not list(tmp_path.iterdir())

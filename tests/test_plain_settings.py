@@ -1,0 +1,107 @@
+"""Settings of a cell become plain data, files among them what they hold; what cannot is refused."""
+
+import json
+from dataclasses import InitVar, dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError
+from hexmj.sweeps.plain import plain
+from hexmj.timing import Stride
+from small_cells import Wave
+
+
+def test_settings_become_plain_json() -> None:
+    settings = {
+        "wave": Wave(2.0, np.array([[1.0, -0.0]])),
+        "pair": (1, None, True, "text"),
+        "number": np.float64(0.1),
+        "inner": {"folder": Path("/nowhere"), "counts": np.arange(2)},
+    }
+    assert plain(settings) == {
+        "wave": {"class": "small_cells.Wave", "slope": 2.0, "values": [[1.0, -0.0]]},
+        "pair": [1, None, True, "text"],
+        "number": 0.1,
+        "inner": {"folder": "/nowhere", "counts": [0, 1]},
+    }
+    assert json.loads(json.dumps(plain(settings))) == plain(settings)
+
+
+@pytest.mark.parametrize(
+    "value", [{1, 2}, object(), np.float32(1.0), np.array([object()]), {1: 2}, len, Wave, 1j, Path()]
+)
+def test_what_is_no_setting_is_refused_in_one_sentence(value: object) -> None:
+    with pytest.raises(InputError, match="is no setting; expected") as raised:
+        plain({"inner": (value,)})
+    assert "\n" not in str(raised.value)
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """With a setting that is no field, and something computed once."""
+
+    pull: InitVar[float] = 1.0
+    name: str = "hidden"
+
+    def __post_init__(self, pull: float) -> None:
+        assert self.doubled == 2
+        object.__setattr__(self, "kept", pull)
+
+    @cached_property
+    def doubled(self) -> int:
+        return 2
+
+
+def test_a_setting_that_no_field_tells_is_refused() -> None:
+    with pytest.raises(InputError, match=r"Hidden keeps 'kept' beside its fields; expected all settings as fields"):
+        plain(Hidden())
+
+
+def test_a_whole_number_and_the_same_float_are_one_setting() -> None:
+    for one, other in ((Conditions.of(vp=80, load=0), Conditions.of(load=-0.0)), (Stride(aep0=10), Stride())):
+        assert json.dumps(plain(one)) == json.dumps(plain(other))
+
+
+def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
+    for kind in (Path, str):
+        for folder in ("here", "there"):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            (tmp_path / folder / "body.xml").write_text("<mujoco/>")
+        here, there = (plain(kind(tmp_path / folder / "body.xml")) for folder in ("here", "there"))
+        assert here.partition("@")[2] == there.partition("@")[2] != ""
+        assert (here == there) == (kind is Path)
+        (tmp_path / "here" / "body.xml").write_text("<mujoco> </mujoco>")
+        assert plain(kind(tmp_path / "here" / "body.xml")) != here
+    assert plain(text := str(tmp_path)) == text
+    assert plain("0.5" * 2000) == "0.5" * 2000
+    assert plain("a.b\0") == "a.b\0"
+
+
+def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
+    body, parts, shape = tmp_path / "body.xml", tmp_path / "parts.mjcf", tmp_path / "shapes" / "leg.stl"
+    shape.parent.mkdir()
+    body.write_text('<mujoco><compiler meshdir="shapes"/><include file="parts.mjcf"/></mujoco>')
+    found = set()
+    for text in ("<parts/>", "<parts><asset><mesh file='leg.stl'/></asset></parts>"):
+        parts.write_text(text)
+        for content in (b"a", b"b"):
+            shape.write_bytes(content)
+            found.add(plain(body))
+    assert len(found) == 3
+
+
+def test_an_mjcf_in_folders_is_looked_for_beside_each_file(tmp_path: Path) -> None:
+    (tmp_path / "sub" / "m").mkdir(parents=True)
+    (tmp_path / "main.xml").write_text('<mujoco><include file="sub/legs.xml"/></mujoco>')
+    (tmp_path / "sub" / "legs.xml").write_text('<legs><include file="more.xml"/><model file="att.xml"/></legs>')
+    (tmp_path / "sub" / "att.xml").write_text('<mujoco><compiler meshdir="m"/><mesh file="b.obj"/></mujoco>')
+    found = {plain(tmp_path / "main.xml")}
+    for name in ("more.xml", "att.xml", "m/b.obj"):
+        with (tmp_path / "sub" / name).open("a") as file:
+            file.write(" ")
+        found.add(plain(tmp_path / "main.xml"))
+    assert len(found) == 4

@@ -1,0 +1,40 @@
+"""A controller that reads its legs, on paper, where there is nothing to be read."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers.losses import first_losses, planned_losses
+from stepwise_ldvs import Own, same
+
+STRIDE = hexmj.Stride()
+LDVS = hexmj.LDVS
+
+
+def test_feedback_needs_plans_that_can_be_steered():
+    reading = hexmj.ReadsLegs(Own())
+    with pytest.raises(hexmj.InputError, match="feedback around own; expected a controller whose plans can go on"):
+        reading.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+    with pytest.raises(
+        hexmj.InputError, match=r"feedback around .*; expected another: this one reads the legs already"
+    ):
+        hexmj.ReadsLegs(hexmj.ReadsLegs(LDVS)).begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+
+
+@pytest.mark.parametrize("acceleration", [None, hexmj.Acceleration(rate=0.01)])
+@pytest.mark.parametrize("name", ["hws", "ldvs", "own"])
+def test_on_paper_reading_the_legs_changes_nothing(name, acceleration):
+    """Neither the plan nor its losses, by either way to them."""
+    controller, starts = hexmj.PRESETS[name], hexmj.draw_starts(20, 5)
+    velocity, steps = np.linspace(0.1, 0.9, 20), np.full(20, 300)
+    reading = hexmj.ReadsLegs(controller)
+    inner, outer = (one.begin(starts, velocity, STRIDE, acceleration) for one in (controller, reading))
+    one, other = inner.advance(300), outer.advance(300)
+    assert same(one, replace(other, aep=one.aep))
+    begin = partial(reading.begin, starts, velocity, STRIDE, acceleration)
+    fast, general = first_losses(begin(), steps), planned_losses(begin(), steps)
+    assert np.array_equal(fast, general)
+    assert np.array_equal(fast, first_losses(controller.begin(starts, velocity, STRIDE, acceleration), steps))

@@ -1,0 +1,131 @@
+"""Plans that do not fit, that say what makes no sense, or that raise: refused, and never an outcome."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.controllers import Step, stepwise
+from hexmj.controllers.asking import advanced
+from hexmj.measures.physical import physical_walk_of_plan
+from hexmj.physics.drive import drive
+from hexmj.physics.settling import settle
+from hexmj.walks import part_of
+from stepwise_ldvs import Own, plan_of
+
+STRIDE = hexmj.Stride()
+LDVS = hexmj.LDVS
+
+
+@pytest.fixture(scope="module")
+def settled():
+    return settle(hexmj.draw_starts(2, 0))
+
+
+def advanced_plan(settled):
+    plan = plan_of(settled.starts)
+    plan.advance(3)
+    return plan
+
+
+class Short:
+    """A plan that stops short of what it is asked for."""
+
+    def __init__(self, starts):
+        self._plan, self.starts, self.stride, self.done = plan_of(starts), starts, STRIDE, 0
+
+    def advance(self, steps):
+        self.done += steps
+        return self._plan.advance(max(1, steps - 1))
+
+
+REFUSED = {
+    "other starts": (lambda s: plan_of(s.starts[::-1]), r"the plan is of other starts, \(2, 6\); expected the 2"),
+    "too few starts": (lambda s: plan_of(s.starts[:1]), r"the plan is of other starts, \(1, 6\); expected the 2"),
+    "another stride": (lambda s: plan_of(s.starts, hexmj.Stride(dt=0.2)), "the plan's stride is Stride"),
+    "not at time 0": (advanced_plan, "the plan is at step 3; expected one at time 0"),
+    "too few steps": (
+        lambda s: Short(s.starts),
+        r"asked for 4 steps, and gave \(3, 2, 6\); expected \(4, 2, 6\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_plan_that_does_not_fit_is_refused(settled, case):
+    make, words = REFUSED[case]
+    with pytest.raises(hexmj.InputError, match=words) as refused:
+        list(drive(settled, make(settled), 0.4))
+    assert "\n" not in str(refused.value)
+    planned = hexmj.walk(settled.starts, LDVS, 0.5, 0.4)
+    with pytest.raises(hexmj.InputError, match=words):
+        physical_walk_of_plan(settled, make(settled), planned)
+
+
+LIES = {
+    "a tip that is NaN": lambda walk: replace(walk, x=np.full_like(walk.x, np.nan)),
+    "a tip beside that is inf": lambda walk: replace(walk, y=np.full(walk.x.shape, np.inf)),
+    "a height that is inf": lambda walk: replace(walk, height=np.full(walk.x.shape, np.inf)),
+    "too few steps": lambda walk: part_of(walk, slice(1, None)),
+    "states as numbers": lambda walk: replace(walk, stance=walk.stance.astype(float)),
+    "no walk": lambda walk: [walk],
+}
+
+
+@dataclass(frozen=True)
+class Liar:
+    """LDVS by way of `stepwise`, whose plans say something else."""
+
+    lie: str
+    name: str = "liar"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        plan = Own().begin(starts, velocity, stride, acceleration, threads)
+        true = plan.advance
+        plan.advance = lambda steps: LIES[self.lie](true(steps))
+        return plan
+
+
+def test_a_plan_that_goes_on_by_other_steps_is_refused():
+    plan = LDVS.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+    true, plan.advance = plan.advance, lambda steps: true(steps + 1)
+    with pytest.raises(hexmj.InputError, match="a plan is at step 4 after it was asked for 3 more; expected 3"):
+        advanced(plan, 3)
+
+
+@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize("physical", [False, True])
+def test_a_plan_that_makes_no_sense_is_never_an_outcome(lie, physical):
+    starts = hexmj.draw_starts(2, 0)
+    with pytest.raises(hexmj.InputError, match=r"a plan|a walk's"):
+        if physical:
+            hexmj.physical_walk(starts, Liar(lie), 0.3, 5.0)
+        else:
+            hexmj.first_loss(starts, Liar(lie), 0.3, 5.0)
+
+
+@dataclass(frozen=True)
+class Raises:
+    """Raises something in its third step."""
+
+    what: type[BaseException]
+    name: str = "raises"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        done = 0
+
+        def step(v):
+            nonlocal done
+            done += 1
+            if done == 3:
+                raise self.what("no more")
+            return Step(starts, True)
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+@pytest.mark.parametrize("what", [ZeroDivisionError, SystemExit])
+def test_what_a_controller_raises_is_said_in_one_sentence(what):
+    with pytest.raises(hexmj.InputError, match=rf"{what.__name__} in .*test_refused_plans.py, line \d+: no more"):
+        hexmj.first_loss(hexmj.draw_starts(2, 0), Raises(what), 0.3, 5.0)

@@ -1,0 +1,72 @@
+"""Cells and sweeps that make no sense, and data that no file can hold, are refused in one sentence."""
+
+import re
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from hexmj.errors import InputError
+from hexmj.sweeps import Cell, over_axes, run
+from small_cells import odd_cells
+
+LEVELS = pd.MultiIndex.from_tuples([(1, 2)], names=["b", "c"])
+
+
+def odd(what: str) -> object:
+    return {
+        "dict": {},
+        "nothing": None,
+        "times": xr.Dataset({"a": ("x", np.arange(3).astype("m8[ns]"))}),
+        "holes": xr.Dataset({"a": ("x", np.array(["a", None], dtype=object))}),
+        "scaled": xr.Dataset({"a": ("x", [1.0], {"scale_factor": 0.5})}),
+        "filled": xr.Dataset({"a": ("x", [1.0], {"_FillValue": 1.0})}),
+        "levels": xr.Dataset(coords=xr.Coordinates.from_pandas_multiindex(LEVELS, "x")),
+    }[what]
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("dict", "what odd gives = {}; expected a Dataset"),
+        ("nothing", "what odd gives = None; expected a Dataset"),
+        ("times", "NetCDF cannot hold this: a is timedelta64[ns]; expected arrays, numbers and texts"),
+        ("holes", "NetCDF cannot hold this: a is object; expected arrays, numbers and texts"),
+        ("scaled", "NetCDF would give other numbers: a has the attribute scale_factor; expected none"),
+        ("filled", "NetCDF would give other numbers: a has the attribute _FillValue; expected none"),
+        ("levels", "NetCDF cannot hold this: "),
+    ],
+)
+def test_what_is_no_data_is_refused_in_one_sentence(tmp_path: Path, what: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        run([Cell("odd", odd, {"what": what})], tmp_path)
+    assert not list(tmp_path.glob("*.nc"))
+
+
+def shut() -> Executor:
+    (executor := ThreadPoolExecutor(1)).shutdown()
+    return executor
+
+
+@pytest.mark.parametrize(
+    ("ask", "sentence"),
+    [
+        (lambda: run([1]), "a cell = 1; expected a Cell"),  # pyright: ignore
+        (lambda: run(None), "cells = None; expected a Sequence"),  # pyright: ignore
+        (lambda: run(odd_cells(2), executor=shut()), "cannot schedule new futures after shutdown"),
+        (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
+        (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a Mapping"),  # pyright: ignore
+        (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
+        (lambda: Cell("odd", odd, {}, work=-1), "work = -1.0 of odd; expected a finite number above 0"),
+        (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore
+        (lambda: over_axes({"a": 2}, 3 * [xr.Dataset()]), "the data of 3 cells along {'a': 2}; expected 2"),
+        (lambda: over_axes({}, []), "the data of 0 cells along {}; expected 1"),
+    ],
+)
+def test_sweeps_of_what_is_none_are_refused_in_one_sentence(ask: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        ask()

@@ -1,0 +1,177 @@
+"""The command search: what it writes and tells, and that it goes on however it was stopped."""
+
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import hexmj
+from hexmj.cli.main import options_of
+from hexmj.controllers.cruse1998 import READINGS, Cruse1998
+from waiting_legs import OWN
+
+PNG = b"\x89PNG"
+
+SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "start", "--starts", 40, "--budget", 40,
+          "--refine-starts", 100, "--refine-budget", 20, "--verdict-starts", 500]  # fmt: skip
+
+
+@pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
+def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, tmp_path, algorithm):
+    words = [*SEARCH, "--algorithm", algorithm, "--out", tmp_path]
+    code, text, _ = run(*words, "--json")
+    assert code == 0
+    answer = json.loads(text)
+    assert answer["replayed"] == 0
+    found = hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert found == hexmj.Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
+    history = xr.load_dataset(tmp_path / "history.nc")
+    assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
+    assert history.best.values[-1] == answer["cost"]
+    assert json.loads(history.attrs["settings"])["effort"]["algorithm"] == algorithm
+    for name, one in (("found", found), ("hws", hexmj.HWS), ("ldvs", hexmj.LDVS)):
+        flss, interval = hexmj.flss_over_range(one, 0.3, 0.6, n_starts=500, window="start", seed=1998)
+        assert answer["verdict"][name]["start"] == {"flss": flss, "flss_low": interval[0], "flss_high": interval[1]}
+        assert "walk" in answer["verdict"][name]
+    assert (tmp_path / "convergence.png").read_bytes().startswith(PNG)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["settings"]["effort"]["algorithm"] == algorithm
+    files = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+    code, text, _ = run(*words)
+    assert code == 0
+    different = len(np.unique(history.candidate.values[history.stage == 0], axis=0))
+    different += len(np.unique(history.candidate.values[history.stage == 1], axis=0))
+    assert f"{answer['evaluations']} evaluations, {different} candidates known from an earlier run" in text
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == files
+
+
+def test_the_order_of_updates_reaches_the_network(run, tmp_path):
+    words = ["search", "--form", "hws", "--begin", "hws", "--velocity", 0.4, "--window", "start", "--starts", 300,
+             "--budget", 10, "--refine-budget", 0, "--verdict-starts", 200, "--json"]  # fmt: skip
+    starts = hexmj.draw_starts(300, 0)
+    for order in ("printed", "sequential"):
+        code, text, _ = run(*words, "--order", order, "--out", tmp_path / order)
+        assert code == 0
+        assert json.loads(text)["settings"]["problem"]["form"]["order"] == order
+        lost = hexmj.first_loss(starts, hexmj.Cruse1998(hexmj.HWS.weights, order), 0.4, 40.0)
+        history = xr.load_dataset(tmp_path / order / "history.nc")
+        assert history.cost.values[0] == np.isfinite(lost).mean()
+    code, _, error = run(*words, "--order", "sideways", "--out", tmp_path)
+    assert code == 2
+    assert "valid names: printed, undelayed, sequential" in error
+
+
+def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
+    changed = {"100": "20000", "20": "40"}  # refined for longer
+    words = [*(changed.get(str(word), str(word)) for word in SEARCH), "--json", "--out"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    kept = tmp_path / "killed" / "evaluations"
+    while sum(len(path.read_text().splitlines()) - 1 for path in kept.glob("*.jsonl")) < 20:
+        assert running.poll() is None
+        time.sleep(0.01)
+    running.kill()
+    assert running.wait() == -9
+    assert [path.name for path in (tmp_path / "killed").iterdir()] == ["evaluations"]
+    answers = [json.loads(run(*words, tmp_path / name)[1]) for name in ("killed", "unbroken")]
+    assert 0 < answers[0]["replayed"] < answers[0]["evaluations"]
+    for key in ("found", "cost", "verdict", "evaluations", "settings"):
+        assert answers[0][key] == answers[1][key]
+    datasets = [xr.load_dataset(tmp_path / name / "history.nc") for name in ("killed", "unbroken")]
+    assert datasets[0].identical(datasets[1])
+
+
+def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, monkeypatch):
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hexmj.search.stages.refine", stop)
+    code, out, error = run(*SEARCH, "--out", tmp_path)
+    assert (code, out) == (130, "")
+    assert error.endswith("hexmj: stopped; what is finished is kept. Repeat the command to go on\n")
+    (kept,) = (tmp_path / "evaluations").glob("population-*.jsonl")
+    assert len(kept.read_text().splitlines()) == 1 + 37
+
+
+def test_physical_search(run, tmp_path):
+    words = ["search", "--physical", "--velocity", 0.6, "--window", "start", "--vp", 200, "--starts", 3, "--budget", 10]
+    words += ["--refine-budget", 0, "--verdict-starts", 4, "--json", "--out", tmp_path]
+    code, text, _ = run(*words)
+    assert code == 0
+    answer = json.loads(text)
+    fell = hexmj.physical_flss(
+        hexmj.load_controller(str(tmp_path / "found.toml")), [0.6], n_starts=4, window="start", seed=1998,
+        conditions=hexmj.Conditions.of(vp=200.0),
+    )  # fmt: skip
+    assert answer["verdict"]["found"]["start"]["flss"] == fell.flss.item()
+    assert answer["settings"]["problem"]["conditions"]["vp"] == 200.0
+
+
+def test_a_controller_of_ones_own_is_searched(run, tmp_path):
+    """Its float fields, from their usual values; the found one can be named like any other."""
+    (tmp_path / "mine.py").write_text(OWN)
+    form = f"{tmp_path / 'mine.py'}:Waits"
+    words = ["search", "--form", form, "--velocity", 0.4, "--window", "start", "--starts", 40, "--budget", 28]
+    words += ["--refine-starts", 60, "--refine-budget", 8, "--verdict-starts", 50, "--json", "--out", tmp_path]
+    code, text, error = run(*words)
+    assert code == 0, error
+    answer = json.loads(text)
+    assert set(answer["found"]) == {"share", "shift"}
+    usual, found = hexmj.load_controller(form), hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert {name: getattr(found, name) for name in ("share", "shift")} == answer["found"]
+    assert found.name == usual.name == "waits"
+    for name, one in (("usual", usual), ("found", found)):
+        flss = hexmj.flss(one, [0.4], n_starts=50, window="start", seed=1998).flss.item()
+        assert answer["verdict"][name]["start"]["flss"] == flss
+    history = xr.load_dataset(tmp_path / "history.nc")
+    assert history.candidate.values[0].tolist() == [0.5, 0.1]
+    refused = history.candidate.values[:, 0] > 5
+    assert refused.any() and (history.cost.values[refused] == 1.0).all()
+    code, text, _ = run(*[word for word in words if word != "--json"])
+    assert code == 0
+    assert "share" in text and "usual" in text
+
+
+def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"
+    words = ["search", "--velocity", 0.4, "--window", "start", "--starts", 20, "--budget", 10, "--refine-budget", 0]
+    words += ["--verdict-starts", 20]
+    assert run(*words, "--form", form, "--out", first)[0] == 0
+    found = first / "found.toml"
+    found.write_text(found.read_text() + 'name = "gewählt"\n')
+    for option in (["--form", found], ["--form", form, "--begin", found]):
+        code, _, error = run(*words, *option, "--out", first)
+        assert code == 2
+        assert "the search begins with found.toml there; expected another folder" in error
+    assert run(*words, "--form", found, "--out", again)[0] == 0
+    one = hexmj.load_controller(str(again / "found.toml"))
+    assert type(one).__name__ == "Waits"
+    assert one.name == "gewählt"
+
+
+def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
+    words = ["--form", "hws", "--ties", "later", "--window", "10", "--starts", 10, "--budget", 10, "--refine-budget", 0]
+    code, shown, _ = run("search", *words, "--verdict-starts", 20, "--out", tmp_path)
+    told = " ".join(shown.split())
+    assert code == 0 and "later losses first among equals" in told
+    assert "((starts lost + mean part of the time lost) / (starts + 1), at which " in told
+    assert " of 10 starts were lost)" in told
+
+
+def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
+    """Unless others are given; what it finds walks by them."""
+    sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--window", "start"]
+    words = ["search", "--form", "mirrored", "--begin", "lasting-0.3", *sizes]
+    for added, expected in ([], "lasting"), (["--reading", "printed"], "printed"):
+        options_of([*words, *added, "--out", str(tmp_path / expected)]).run()
+        found = hexmj.load_controller(str(tmp_path / expected / "found.toml"))
+        assert isinstance(found, Cruse1998)
+        assert found.reading == READINGS[expected]

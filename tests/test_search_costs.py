@@ -1,0 +1,121 @@
+"""What a candidate costs: FLSS on the same starts, on paper or in physics, with ties or without."""
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj import FieldsForm, NetworkForm, Problem
+from hexmj.controllers import Step, stepwise
+from hexmj.search.convergence import convergence_figure
+from hexmj.search.network_forms import FORMS
+from hexmj.search.problems import Sample
+from hexmj.search.stages import Effort, search
+from pace import Pace
+
+HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
+
+
+@pytest.mark.parametrize("window", ["walk", "start", 30.0])
+@pytest.mark.parametrize("order", ["printed", "sequential"])
+def test_the_cost_is_the_flss_of_the_same_starts(window, order):
+    for name in FORMS:
+        preset = hexmj.HWS if name == "hws" else hexmj.LDVS
+        form, controller = NetworkForm(name, order), hexmj.Cruse1998(preset.weights, order)
+        vector = form.vector(controller)
+        one = Sample(Problem(form, 0.4, 0.4, window), 300, 5)
+        expected = hexmj.flss(controller, [0.4], n_starts=300, window=window, seed=5).flss.item()
+        assert one.costs(vector[None]) == [expected]
+        some = Sample(Problem(form, 0.2, 0.6, window), 300, 5)
+        expected, _ = hexmj.flss_over_range(controller, 0.2, 0.6, n_starts=300, window=window, seed=5)
+        assert some.costs(vector[None]) == [expected]
+        verdict = some.verdict({"one": controller})
+        assert verdict.flss.sel(controller="one", window=str(window)) == expected
+
+
+def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
+    domain = Problem(LDVS, 0.3, 0.6).domain(10.0)
+    vectors = domain.read(domain.draw(5, np.random.default_rng(0)))
+    sample = Sample(Problem(LDVS, 0.3, 0.6, "start"), 200, 0)
+    costs = sample.costs(vectors, threads=2)
+    assert sample.costs(vectors, threads=1).tolist() == costs.tolist()
+    assert [sample.costs(vector[None])[0] for vector in vectors] == costs.tolist()
+
+
+@pytest.mark.parametrize("feedback", [False, True])
+def test_the_physical_cost_is_the_physical_flss(feedback):
+    conditions = hexmj.Conditions.of(vp=200.0)
+    sample = Sample(Problem(LDVS, 0.6, 0.6, "start", conditions=conditions, feedback=feedback), 12, 0)
+    walked = hexmj.ReadsLegs(hexmj.LDVS) if feedback else hexmj.LDVS
+    how: Any = {"n_starts": 12, "conditions": conditions}
+    expected = hexmj.physical_flss(walked, [0.6], window="start", **how).flss.item()
+    assert sample.costs(LDVS.vector(hexmj.LDVS)[None]) == [expected]
+    assert 0 < expected < 1
+    if not feedback:
+        verdict = sample.verdict({"ldvs": walked}).flss.sel(controller="ldvs")
+        assert verdict.sel(window="start") == expected
+        assert verdict.sel(window="walk") == hexmj.physical_flss(walked, [0.6], window="walk", **how).flss.item()
+
+
+SCRATCH = np.zeros(1)
+"""What careless controllers share."""
+
+
+@dataclass(frozen=True)
+class Careless(Pace):
+    """Its plans go through an array of this module."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        def step(v: np.ndarray) -> Step:
+            SCRATCH[0] = self.good
+            time.sleep(1e-3)  # for other threads
+            return Step(starts, starts < 10.0 * SCRATCH[0])
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+def test_candidates_that_share_an_array_of_their_module_are_walked_one_after_the_other():
+    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, window=1.0), 50, 0)
+    vectors = np.array([[good, 0.0] for good in (0.5, 1.0, 0.0, 2.0)])
+    alone = [sample.costs(vector[None])[0] for vector in vectors]
+    assert len(set(alone)) > 2
+    assert sample.costs(vectors, threads=4).tolist() == alone
+
+
+def test_ties_are_broken_by_later_losses_and_nothing_else_is():
+    """Of equal counts the one with later losses costs less; a count more costs more, whenever it is lost."""
+    form, n = FieldsForm(Pace()), 30
+    plain, later = (Sample(Problem(form, 0.4, 0.4, 20.0, ties=ties), n, 0) for ties in ("equal", "later"))
+    vectors = np.array([[good, 0.0] for good in np.linspace(0.0, 6.0, 13)])
+    times = [hexmj.first_loss(plain.starts, Pace(*one), 0.4, 20.0) for one in vectors.tolist()]
+    part = np.array([np.mean(1 - np.minimum(one, 20.0) / 20.0) for one in times])
+    flss, costs = plain.costs(vectors), later.costs(vectors)
+    np.testing.assert_allclose(costs, (n * flss + part) / (n + 1), rtol=1e-6)
+    assert len(set(flss)) > 3
+    assert ((costs >= 0) & (costs <= 1)).all()
+    assert (costs[np.lexsort((part, flss))] == np.sort(costs)).all()
+    for sample, known in ((plain, flss), (later, costs)):
+        assert [sample.lost(cost) for cost in known] == np.rint(n * flss).tolist()
+
+
+@pytest.mark.parametrize(
+    ("ties", "over", "said"),
+    [
+        ("equal", "usual", "FLSS"),
+        ("equal", "worst", "greatest FLSS of all variants"),
+        ("later", "usual", "(starts lost + mean part of the time lost) / (starts + 1)"),
+        ("later", "mean", "mean over variants of (starts lost + mean part of the time lost) / (starts + 1)"),
+    ],
+)
+def test_a_cost_is_called_what_it_is(ties: Any, over: Any, said: str):
+    problem = Problem(NetworkForm("hws"), 0.4, 0.4, 10.0, ties=ties, over=over)
+    found = search(problem, Effort(starts=4, budget=10, refine_starts=6, refine_budget=2))
+    assert found.history.cost.attrs["long_name"] == said
+    assert found.starts == 6 and (found.lost is None) == (over == "mean")
+    figure = convergence_figure(found.history.assign_attrs(title="title"))
+    label, below = figure.axes[0].get_ylabel(), figure.legends[0].get_title().get_text()
+    assert label.startswith("FLSS on") == (said == "FLSS")
+    assert below.endswith(f"cost: {said}") == (said != "FLSS")

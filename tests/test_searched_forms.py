@@ -1,0 +1,129 @@
+"""What can be searched: forms of the network, fields of a controller, and what is refused of either."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj import FieldsForm, NetworkForm, Problem
+from hexmj.controllers import Step, stepwise
+from hexmj.errors import InputError
+from hexmj.legs import MIRROR
+from hexmj.search.network_forms import FORMS
+from hexmj.search.problems import Sample
+from hexmj.search.stages import Effort, search
+from pace import Pace
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_forms_are_what_their_names_say(name):
+    """Vectors and controllers turn into each other, and both sides are alike in every form but the general one."""
+    form = NetworkForm(name)
+    domain = Problem(form, 0.4, 0.4).domain(10.0)
+    vector = domain.read(domain.draw(1, np.random.default_rng(3)))[0]
+    controller = form.controller(vector)
+    assert len(form.names) == len(vector) == {"hws": 9, "ldvs": 10, "mirrored": 29, "general": 58}[name]
+    assert np.array_equal(form.vector(controller), vector)
+    starts = hexmj.draw_starts(20, 5)
+    walked, mirrored = (hexmj.walk(one, controller, 0.4, 60.0).x for one in (starts, starts[:, MIRROR]))
+    assert np.array_equal(walked[:, :, MIRROR], mirrored) == (name != "general")
+
+
+def test_the_fields_of_a_controller_are_searched():
+    """Those that are floats, from their usual values, over 0 to a multiple of them; what it refuses costs all."""
+    form = FieldsForm(Pace())
+    problem = Problem(form, 0.4, 0.4, window=5.0)
+    domain = problem.domain(4.0)
+    assert form.names == ("good", "idle")
+    assert not domain.binary.any()
+    assert (domain.low.tolist(), domain.high.tolist()) == ([0.0, -2.0], [8.0, 0.0])
+    assert domain.begin is not None and domain.begin.tolist() == [2.0, -0.5]
+    assert np.broadcast_to(domain.unit, 2).tolist() == [2.0, 0.5]
+    assert problem.domain(4.0, Pace(good=1.0)).begin.tolist() == [1.0, -0.5]  # pyright: ignore[reportOptionalMemberAccess]
+    assert form.controller(np.array([1.5, 0.25])) == Pace(good=1.5, idle=0.25)
+    sample = Sample(problem, 50, 0)
+    assert sample.costs(np.array([[-1.0, 0.0]])) == [1.0]
+    expected = [hexmj.flss(Pace(good=good), [0.4], n_starts=50, window=5.0).flss.item() for good in (2.0, 0.1)]
+    assert sample.costs(np.array([[2.0, 0.0], [0.1, 7.0]])).tolist() == expected
+    for algorithm in ("evolution", "cmaes"):
+        found = search(problem, Effort(algorithm, domain=2.0, starts=40, budget=60, refine_starts=60, refine_budget=30))
+        assert found.history.parameter.values.tolist() == ["good", "idle"]
+        assert found.cost == 0.0 < expected[0]
+        assert abs(found.vector[0] - 3.0) < 2.0
+
+
+@dataclass(frozen=True)
+class Picky(Pace):
+    """Refuses nearly all that is not usual."""
+
+    least: int = 2
+
+    def __post_init__(self):
+        if not self.least <= self.good < 2.01:
+            raise ValueError(f"good = {self.good} is out of the range that I allow")
+
+
+def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
+    problem = Problem(FieldsForm(Picky()), 0.4, 0.4, window=5.0)
+    found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
+    good = found.history.candidate.sel(parameter="good")
+    refused = (good < 2) | (good >= 2.01)
+    assert len(found.refused) == found.history.attrs["refused"] == refused.sum() > 0
+    assert found.refused[0].startswith("ValueError: good = ")
+    with pytest.raises(InputError, match="4 of 4 candidates were refused, the best one by: ValueError: good = "):
+        search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
+
+
+@dataclass(frozen=True)
+class Far(Pace):
+    """Stands still, far beside its lines."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        y = (4.0 + abs(self.good)) * np.array(stride.geometry.y)
+        return stepwise(lambda v: Step(starts, np.ones(6, dtype=bool), y=y), starts, velocity, stride, acceleration)
+
+
+def test_what_no_leg_reaches_is_never_found():
+    problem = Problem(FieldsForm(Far()), 0.3, 0.3, window=5.0, conditions=hexmj.Conditions())
+    with pytest.raises(InputError, match="out of reach"):
+        search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
+
+
+@pytest.mark.parametrize(
+    ("form", "sentence"),
+    [
+        (lambda: FieldsForm(Pace(good=math.nan)), "the form's box is"),
+        (lambda: FieldsForm(Pace(good=math.inf)), "the form's box is"),
+        (lambda: FieldsForm(Pace(good=1e308)), "the form's box is"),
+        (lambda: Askew(box_is=([0.0, 0.0], [1.0])), "box of the form = .*; expected numbers"),
+        (lambda: Askew(box_is=([1.0, 1.0], [0.0, 1.0])), "the form's box is"),
+        (lambda: Askew(begin=np.zeros(3)), "a search begins at .*; expected 2 finite numbers"),
+        (lambda: Askew(binary=np.zeros(3, dtype=bool)), "the form's binary = .*; expected True or False for 2"),
+        (lambda: Askew(binary=[False, False]), "binary of the form = .*; expected a ndarray"),
+    ],
+)
+def test_forms_that_make_no_sense_are_refused(form, sentence):
+    with pytest.raises(InputError, match=sentence):
+        search(Problem(form(), 0.4, 0.4, window=5.0), Effort(starts=2, budget=10))
+
+
+@dataclass(frozen=True)
+class Askew:
+    """A form of a user's own in which something does not fit."""
+
+    names: tuple[str, ...] = ("good", "idle")
+    binary: Any = field(default_factory=lambda: np.zeros(2, dtype=bool))
+    begin: Any = None
+    box_is: Any = ([0.0, 0.0], [1.0, 1.0])
+
+    def box(self, reach):
+        return self.box_is
+
+    def controller(self, vector):
+        return Pace(*vector.tolist())
+
+    def vector(self, controller):
+        return np.array([controller.good, controller.idle])

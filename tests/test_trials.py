@@ -1,0 +1,74 @@
+"""What makes walking harder in the league's trials: a lost leg, poor senses, a load, a step."""
+
+import numpy as np
+import pytest
+
+import hexmj
+from hexmj.conditions import Conditions
+from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
+from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.errors import InputError
+from hexmj.measures.kinematic import walk
+from hexmj.measures.physical import physical_walk
+from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.trials import DISTURBED, TRIALS, walking
+from hexmj.timing import Stride
+
+
+def test_trials_are_what_they_say() -> None:
+    entrant, usual = Entrant(hexmj.LDVS), Conditions()
+    walked = [name for name in TRIALS if name not in DISTURBED]
+    found = {name: one for name in walked if (one := walking(name, entrant, usual, Stride()))}
+    assert list(found) == walked
+    assert found["load"].conditions.masses.load == 1.0
+    assert found["step"].conditions.ground.ground_height == 3.0
+    assert found["lost 2"].controller == LegLost(hexmj.LDVS, 1)
+    assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
+
+
+@pytest.mark.parametrize("leg", [0, 4])
+def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
+    starts, lame = hexmj.draw_starts(3, 1), LegLost(hexmj.LDVS, leg)
+    planned = walk(starts, lame, 0.3, 30.0)
+    assert not planned.stance[..., leg].any()
+    whole = walk(starts, hexmj.LDVS, 0.3, 30.0)
+    others = np.arange(6) != leg
+    assert np.array_equal(planned.stance[..., others], whole.stance[..., others])
+    assert np.array_equal(planned.x, whole.x)
+    walked = physical_walk(starts, lame, 0.3, 30.0)
+    held = walked.measured.time > 2 * RAISED
+    upright = np.isfinite(walked.height[held][..., leg])
+    assert not walked.measured.stance[held][..., leg].any()
+    assert (walked.height[held][..., leg][upright] > HELD / 3).mean() > 0.9
+
+
+def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:
+    check_controller(LegLost(hexmj.LDVS, 2))
+    check_controller(LegLost(ReadsLegs(hexmj.LDVS), 2))
+    check_controller(PoorSenses(ReadsLegs(hexmj.HWS), 0.1, 1.6))
+    with pytest.raises(InputError, match="poor senses of ldvs"):
+        hexmj.flss(PoorSenses(hexmj.LDVS, 0.1), [0.5], n_starts=2)
+    with pytest.raises(InputError, match="noise = -1"):
+        PoorSenses(hexmj.LDVS, -1.0)
+
+
+def test_poor_senses_that_are_perfect_change_nothing_and_errors_are_a_starts_own() -> None:
+    starts, reading = hexmj.draw_starts(3, 2), ReadsLegs(hexmj.LDVS)
+    plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (reading, PoorSenses(reading)))
+    assert np.array_equal(plain, perfect, equal_nan=True)
+    noisy = PoorSenses(reading, noise=0.1)
+    together, alone = (physical_walk(some, noisy, 0.5, 40.0).qpos for some in (starts, starts[2:]))
+    assert np.array_equal(together[:, 2:], alone, equal_nan=True)
+    assert not np.array_equal(together, plain, equal_nan=True)
+    late = physical_walk(starts, PoorSenses(reading, delay=2.0), 0.5, 40.0).qpos
+    assert not np.array_equal(late, plain, equal_nan=True)
+
+
+def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
+    late = PoorSenses(ReadsLegs(hexmj.LDVS), delay=0.04)
+    with pytest.raises(InputError, match=r"delay = 0.04 with steps of 0.1 time units; expected at least one step"):
+        late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
+    assert walking("late", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride()) is None
+    assert walking("noise", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride())

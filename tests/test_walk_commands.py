@@ -1,0 +1,139 @@
+"""The commands compare, flss, walk and render: their files, and the same bits whatever the threads."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import hexmj
+from film_reader import read_film
+
+PNG = b"\x89PNG"
+
+
+def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
+    words = ["compare", "--velocities", 0.4, 0.6, "--starts", 12, "--window", "start", "--json", "--no-video"]
+    answers, datasets = [], []
+    for threads in (1, 2):
+        out = tmp_path / str(threads)
+        code, text, _ = run(*words, "--threads", threads, "--out", out)
+        assert code == 0
+        answers.append({key: value for key, value in json.loads(text).items() if key != "files"})
+        datasets.append(xr.load_dataset(out / "comparison.nc"))
+        assert (out / "comparison.png").read_bytes().startswith(PNG)
+    assert answers[0] == answers[1]
+    assert datasets[0].identical(datasets[1])
+    assert answers[0]["velocity"] == [0.4, 0.6]
+    for model in ("ldvs", "uncoordinated"):
+        assert {"kinematic", "measured", "physical", "agreement"} <= set(answers[0][model])
+    data = datasets[0]
+    assert data.fall.attrs["units"] == "time unit"
+    assert data.sizes == {"controller": 2, "velocity": 2, "start": 12, "leg": 6}
+    manifest = json.loads((tmp_path / "1" / "manifest.json").read_text())
+    assert manifest["settings"]["seed"] == 0
+    assert manifest["settings"]["conditions"]["vp"] == 80.0
+    assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
+
+
+def test_compare_makes_a_video_of_a_gait(run, tmp_path):
+    code, out, _ = run(
+        "compare", "--models", "ldvs", "--velocities", 0.5, "--starts", 4, "--window", 30, "--out", tmp_path
+    )
+    assert code == 0
+    assert "only kin." in out
+    video, fps = read_film(tmp_path / "gait.mp4")
+    assert fps == 30
+    assert len(video) == round(30 / 80 * 30 * 2)
+
+
+@pytest.mark.slow
+def test_without_rendering_compare_still_delivers(tmp_path):
+    """MuJoCo is told to use a screen that is not there: numbers and figure come, and a sentence on what is missing."""
+    words = [
+        "compare",
+        "--models",
+        "ldvs",
+        "--velocities",
+        "0.5",
+        "--starts",
+        "4",
+        "--window",
+        "20",
+        "--out",
+        str(tmp_path),
+    ]
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "MUJOCO_GL": "glfw"}
+    done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0
+    assert "libegl1" in done.stderr
+    assert (tmp_path / "comparison.png").exists()
+    assert not (tmp_path / "gait.mp4").exists()
+
+
+def test_physical_flss(run, tmp_path):
+    words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--window", "start"]
+    code, text, _ = run(*words, "--json", "--out", tmp_path)
+    answer = json.loads(text)
+    assert code == 0
+    conditions = hexmj.Conditions.of(vp=200.0)
+    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=10, window="start", conditions=conditions)
+    assert answer["flss"] == expected.flss.values.tolist()
+    assert answer["settings"]["conditions"]["vp"] == 200.0
+    assert xr.load_dataset(tmp_path / "flss.nc").flss.values.tolist() == answer["flss"]
+    code, text, _ = run(*words)
+    assert "vp 200" in text
+    assert "step_height 12" in text
+
+
+def test_accelerated_flss(run):
+    code, text, _ = run(
+        "flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--window", "start", "--json"
+    )
+    assert code == 0
+    assert json.loads(text)["duration"] == [pytest.approx(240.0)]
+
+
+@pytest.mark.parametrize("physical", [False, True])
+def test_walk(run, tmp_path, physical):
+    words = ["walk", "--velocity", 0.5, "--window", 40, "--start", 3, "--json", "--out", tmp_path]
+    code, text, _ = run(*words, *(["--physical"] if physical else []))
+    assert code == 0
+    answer = json.loads(text)
+    lost = hexmj.first_loss(hexmj.draw_starts(4, 0)[3:], hexmj.LDVS, 0.5, 40.0)[0]
+    assert answer["planned loss"] == (lost if np.isfinite(lost) else None)
+    assert ("fall" in answer) == physical
+    assert (tmp_path / "walk.png").read_bytes().startswith(PNG)
+    assert hexmj.load_recording(tmp_path / "recording.nc").sizes["step"] == 400
+
+
+def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
+    words = ["walk", "--velocity", 0.5, "--window", 16, "--step-height", 6, "--vp", 40, "--out", tmp_path]
+    assert run(*words)[0] == 0
+    recording = xr.load_dataset(tmp_path / "recording.nc")
+    lift = np.ptp(recording.planned_tip.sel(coordinate="z").values)
+    assert lift == pytest.approx(6.0, abs=0.5)
+    assert recording.seconds.values[-1] == pytest.approx(16 / 40)
+
+
+def test_render_from_a_recording_and_side_by_side(run, tmp_path):
+    walk = ["--velocity", 0.5, "--window", 16]
+    run("walk", *walk, "--physical", "--out", tmp_path / "walk")
+    for name, words, width in (
+        ("ldvs-V-0.5", [tmp_path / "walk" / "recording.nc"], 320),
+        ("ldvs-V-0.5-beside-planned", [*walk, "--beside", "planned"], 640),
+        ("ldvs-V-0.5-beside-uncoordinated", [*walk, "--beside", "uncoordinated"], 640),
+    ):
+        film = ["--width", 320, "--height", 240, "--fps", 20, "--slow-motion", 4]
+        code, text, _ = run("render", *words, *film, "--json", "--out", tmp_path / "films")
+        assert code == 0
+        video, fps = read_film(tmp_path / "films" / f"{name}.mp4")
+        assert fps == 20
+        assert json.loads(text)["frames"] == len(video) == round(16 / 80 * 4 * 20)
+        assert video.shape[1:] == (240, width, 3)
+    assert len([*(tmp_path / "films").glob("*.mp4")]) == len([*(tmp_path / "films").glob("*-manifest.json")]) == 3
+    code, _, error = run("render", tmp_path / "walk" / "recording.nc", *film, "--out", tmp_path / "films")
+    assert code == 0
+    assert "ldvs-V-0.5.mp4 was there; the new film takes its place" in error
