@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import hexmj
+from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.loaded import importable
@@ -68,6 +71,20 @@ class Hidden:
 def test_a_setting_that_no_field_tells_is_refused() -> None:
     with pytest.raises(InputError, match=r"Hidden keeps 'kept' beside its fields; expected all settings as fields"):
         plain(Hidden())
+
+
+def test_naming_a_cell_reads_no_docstring_nor_does_reading_one_rename_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Docstrings of public classes parse sources, which Python 3.11 does not bear in several threads at once."""
+    parsed, asked = field_docs.parsed, list[bytes]()
+    monkeypatch.setattr(field_docs, "parsed", lambda source: asked.append(source) or parsed(source))
+    field_docs.told.cache_clear()
+    cell = Cell("a", odd_bits, {"seed": 0, "size": hexmj.Conditions()})
+    with ThreadPoolExecutor(8) as pool:
+        names = {one.result() for one in [pool.submit(cell.record) for _ in range(16)]}
+    assert not asked
+    assert "vp: " in (hexmj.Conditions.__doc__ or "")
+    assert asked
+    assert names == {cell.record()}
 
 
 def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
