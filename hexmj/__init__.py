@@ -103,6 +103,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__dir__())}")
     value = getattr(import_module(f"hexmj.{_HOME[name]}"), name)
+    if hasattr(value, "__dataclass_fields__") and isinstance(value, type):
+        import_module("hexmj.field_docs").tell_fields(value)
     globals()[name] = value
     return value
 

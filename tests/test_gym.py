@@ -348,3 +348,18 @@ walking.render()
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("face", ["gym", "vector"])
+def test_without_gymnasium_it_is_said_what_brings_it(face):
+    program = f"""
+import sys
+sys.modules["gymnasium"] = None
+from hexmj.errors import InputError
+try:
+    from hexmj.environments import {face}
+except InputError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == 'gymnasium is not installed; in a checkout of hexmj: pip install ".[gym]"\n'

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = (
     ("as_run", "attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
-    ("pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
+    ("field_docs", "parsing", "pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("diagrams", "timing"),
     ("stability", "walks"),

@@ -1,9 +1,11 @@
 """What people expect of a package beside its code: one version everywhere, a citation, files that are where they are
 said to be."""
 
+import pydoc
 import re
 import subprocess
 import tomllib
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
@@ -67,3 +69,15 @@ def test_pages_link_to_pages_that_are_there():
     for name in ("README.md", "CONTRIBUTING.md"):
         for link in re.findall(r"\]\((?!https?:)([^)#]+)", read(name)):
             assert (ROOT / link).exists(), link
+
+
+def test_help_tells_what_fields_are():
+    text = pydoc.render_doc(hexmj.Conditions)
+    assert "vp: Velocity V_p of a protracting tip relative to the body [mm/s]; links the plan's time unit" in text
+    assert "load: Weight carried at O" in pydoc.render_doc(type(hexmj.Conditions().masses))
+    assert "foot: The site at its tip" in pydoc.render_doc(type(hexmj.STICK_INSECT.legs[0]))
+    public = [one for name in hexmj.__all__ if isinstance(one := getattr(hexmj, name), type) and is_dataclass(one)]
+    assert len(public) > 10
+    for one in public:
+        for field in fields(one):
+            assert re.search(rf"^    {field.name}: (?!<class)", one.__doc__ or "", re.MULTILINE), (one, field.name)

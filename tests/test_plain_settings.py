@@ -1,6 +1,7 @@
 """Settings of a cell become plain data, files among them what they hold; what cannot is refused."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,11 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hexmj
+from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Stride
-from small_cells import Wave
+from small_cells import Wave, odd_bits
 
 
 def test_settings_become_plain_json() -> None:
@@ -64,6 +68,20 @@ def test_a_setting_that_no_field_tells_is_refused() -> None:
 def test_a_whole_number_and_the_same_float_are_one_setting() -> None:
     for one, other in ((Conditions.of(vp=80, load=0), Conditions.of(load=-0.0)), (Stride(aep0=10), Stride())):
         assert json.dumps(plain(one)) == json.dumps(plain(other))
+
+
+def test_naming_a_cell_reads_no_docstring_nor_does_reading_one_rename_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Docstrings of public classes parse sources, which Python 3.11 does not bear in several threads at once."""
+    parsed, asked = field_docs.parsed, list[bytes]()
+    monkeypatch.setattr(field_docs, "parsed", lambda source: asked.append(source) or parsed(source))
+    field_docs.told.cache_clear()
+    cell = Cell("a", odd_bits, {"seed": 0, "size": hexmj.Conditions()})
+    with ThreadPoolExecutor(8) as pool:
+        names = {one.result() for one in [pool.submit(cell.record) for _ in range(16)]}
+    assert not asked
+    assert "vp: " in (hexmj.Conditions.__doc__ or "")
+    assert asked
+    assert names == {cell.record()}
 
 
 def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:

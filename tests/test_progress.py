@@ -117,6 +117,14 @@ main()
     assert done.stdout.startswith("{")
 
 
+@pytest.mark.parametrize("words", [("view", "--browser", "--port", -1), ("walk", "--window", 2)])
+def test_commands_without_lines_of_their_own_say_that_a_first_run_compiles(run, monkeypatch, tmp_path, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(progress, "EVERY", 0.001)
+    _, _, error = run(*words)
+    assert error.count(progress.FIRST) == 1
+
+
 def test_a_notebook_shows_the_browsers_own_bar(monkeypatch):
     from IPython.core import interactiveshell
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from chromium import tab
+from hexmj import progress
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Symmetric
 from hexmj.controllers.named import load_controller
@@ -209,6 +210,7 @@ def test_weights_of_other_controllers_have_no_sliders():
 def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr(progress, "EVERY", 600.0)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         code, _, error = run("view", "--browser", "--port", taken.getsockname()[1])
         assert (code, error.count("\n")) == (2, 1)

@@ -38,9 +38,9 @@ def recorded(
     time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
     check_memory(f"recordings of {time:g} time units", KEPT * int(steps_within(time, stride)))
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-    if not physical:
-        return record_plan(walk(starts, controller, velocity, time, **how), command.conditions, stride, title=title)
     with progress_bar("walking") as progress:
+        if not physical:
+            return record_plan(walk(starts, controller, velocity, time, **how), command.conditions, stride, title=title)
         how |= {"conditions": command.conditions, "progress": progress}
         return record(physical_walk(starts, controller, velocity, time, **how), title=title)
 

@@ -9,6 +9,7 @@ from hexmj.cli.options import Controlled, ControllerName, changed
 from hexmj.cli.tables import show
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.progress import progress_bar
 
 END = "Ctrl-C ends it."
 
@@ -57,7 +58,8 @@ class View:
             return draw_start(number, self.seed, Stride())[0]
 
         controller = self.controlled.controller(self.model)
-        walk = LiveWalk(controller, self.velocity, starts(self.start), self.conditions)
+        with progress_bar("settling"):
+            walk = LiveWalk(controller, self.velocity, starts(self.start), self.conditions)
         session = LiveSession(walk, self.start, starts)
         if on_screen:
             from hexmj.view.desktop import KEYS, view_live

@@ -6,10 +6,16 @@ are the ends of the joints' ranges or the largest offsets.
 
 from typing import Any
 
-import gymnasium
 import mujoco
 import numpy as np
-from gymnasium import spaces
+
+from hexmj.errors import InputError, without_extra
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+except ModuleNotFoundError:
+    raise without_extra("gym", "gymnasium") from None
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
@@ -18,7 +24,6 @@ from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
 from hexmj.environments.task import Task, action_names, drawn, observation_bounds
 from hexmj.environments.walkers import Walkers
-from hexmj.errors import InputError
 
 RENDER_MODES = [None, "rgb_array"]
 """How it can be drawn."""

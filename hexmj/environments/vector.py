@@ -8,16 +8,21 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+
+from hexmj.errors import InputError, without_extra
+
+try:
+    from gymnasium.utils import seeding
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+except ModuleNotFoundError:
+    raise without_extra("gym", "gymnasium") from None
 
 from hexmj.checks import typed, whole
 from hexmj.environments.frames import Frames
 from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, metadata_of, spaces_of
 from hexmj.environments.task import Task, action_names, drawn
 from hexmj.environments.walkers import Walkers
-from hexmj.errors import InputError
 from hexmj.physics.backend import MujocoBatch
 from hexmj.physics.fine_steps import FineSteps
 

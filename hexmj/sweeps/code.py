@@ -16,23 +16,20 @@ from functools import cache
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
-from threading import Lock
 
 from hexmj import as_run
 from hexmj.errors import InputError
 from hexmj.files import digest
+from hexmj.parsing import parsed
 from hexmj.sweeps.plain import module_label
 
 PACKAGE = Path(__file__).parents[1]
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
-    *("hexmj.as_run", "hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
+    *("hexmj.as_run", "hexmj.field_docs", "hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
-
-_PARSING = Lock()
-"""Python 3.11 counts the depth of all trees that threads make at once as that of one."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -172,8 +169,7 @@ def _read(name: str, file: Path) -> _Module:
     python = b"" if file.name.endswith(as_run.COMPILED) else content  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
-        with _PARSING:
-            nodes = list(ast.walk(ast.parse(python)))
+        nodes = list(ast.walk(parsed(python)))
     except (SyntaxError, ValueError) as error:
         raise InputError(f"{file} cannot be read as Python: {error}") from None
     guarded = [

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from functools import cached_property
+from inspect import getattr_static
 from os.path import isfile
 from pathlib import Path
 from typing import Any
@@ -108,8 +109,8 @@ def _is_file(text: str) -> bool:
 def _check_fields(value: Any) -> None:
     """Refuse a dataclass that keeps anything, but what it computes once, where no name and no file would tell it."""
     kind, known = type(value), {one.name for one in fields(value)}
-    cached = {name for name in dir(kind) if isinstance(getattr(kind, name, None), cached_property)}
-    if hidden := set(getattr(value, "__dict__", ())) - known - cached:
+    beside = set(getattr(value, "__dict__", ())) - known
+    if hidden := {name for name in beside if not isinstance(getattr_static(kind, name, None), cached_property)}:
         raise InputError(f"{label(kind)} keeps {min(hidden)!r} beside its fields; expected all settings as fields")
 
 
