@@ -4,8 +4,8 @@ import itertools
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ class MirroredInVain(Own):
 class OfOneMind(Own):
     """Its plans forget how far they are as soon as another one begins."""
 
-    mind: list[int] = field(default_factory=list, compare=False)
+    mind: ClassVar[list[int]] = []
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
         """See `protocol.Controller`."""
@@ -103,6 +103,29 @@ class OfOneMind(Own):
             return {"x": walk.x[0] + 1e-6 * self.mind[0]}
 
         return Own(forgetful).begin(starts, velocity, stride, acceleration, threads)
+
+
+@dataclass(frozen=True)
+class Counting(Own):
+    """With a field that changes whenever a plan begins."""
+
+    begun: int = 0
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        object.__setattr__(self, "begun", self.begun + 1)
+        return Own.begin(self, starts, velocity, stride, acceleration)
+
+
+@dataclass(frozen=True)
+class Hurrying(Own):
+    """Changes the stride that it is told."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        plan = Own.begin(self, starts, velocity, replace(stride), acceleration)
+        object.__setattr__(stride, "dt", 0.2)
+        return plan
 
 
 def moved_by_all(plan, *_):
@@ -150,6 +173,8 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),
     ("begin", spoilt(lambda plan, *_: setattr(plan, "stride", hexmj.Stride(dt=0.2))), "the plan's stride is Stride"),
     ("steps", spoilt(starts_halved), "starts are changed as it goes on; expected the plan to work on a copy"),
+    ("steps", Counting(), "begin changes begun of the controller; expected it left alone"),
+    ("steps", Hurrying(), "begin changes dt of the stride; expected it left alone"),
     ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]}), r"x is float64 of the shape \(600, 1, 6\); expected"),
     ("steps", walks_changed(lambda walk: {"stance": 1.0 * walk.stance}), "stance is float64 .* expected bool"),
     ("steps", walks_changed(lambda walk: {"geometry": CENTRED}), "geometry = .*; expected that of the stride"),

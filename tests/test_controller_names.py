@@ -37,6 +37,11 @@ class Needy(Still):
         if self.legs is None:
             raise ValueError("legs is missing")
 
+@dataclass(frozen=True)
+class Switched(Still):
+    def without(self, part):
+        return {2: self, 3: None}[part]
+
 taller = Still("taller", 3.0)
 number = 6
 '''
@@ -110,10 +115,12 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("nowhere.py:Still", "nowhere.py is no file; expected one that ends in .py"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
         ("broken.py:Still", "broken.py cannot be loaded"),
-        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy"),
+        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Switched"),
+        ("mine_of_a_user.py:Switched-without-1", "Switched-without-1' cannot be made: KeyError: 1; expected a"),
+        ("mine_of_a_user.py:Switched-without-3", "Switched-without-3: controller = None; expected a controller"),
         ("mine_of_a_user.py:number", "controller = 6; expected a controller, a frozen dataclass"),
         ("mine_of_a_user.py:np", "expected a controller, a frozen dataclass"),
-        ("mine_of_a_user.py:Needy", "Needy cannot be made: legs is missing; expected a class with defaults"),
+        ("mine_of_a_user.py:Needy", "Needy' cannot be made: ValueError: legs is missing; expected a class"),
     ],
 )
 def test_wrong_names_get_one_sentence(mine, name, words):

@@ -129,6 +129,17 @@ def test_a_study_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(study(name), tmp_path)
 
 
+@pytest.mark.parametrize("name", ["terrain", "league"])
+def test_a_part_of_a_result_is_drawn_or_refused_in_a_sentence(name: str):
+    result, refused = study(name), 0
+    for axis in result.dims:
+        try:
+            hexmj.plot(result.isel({axis: 0}))
+        except InputError:
+            refused += 1
+    assert refused
+
+
 def test_one_velocity_is_a_list_of_one():
     alone, listed = (hexmj.flss(hexmj.LDVS, v, n_starts=5) for v in (0.3, [0.3]))
     assert alone.identical(listed)

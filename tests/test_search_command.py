@@ -139,6 +139,34 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     assert "share" in text and "usual" in text
 
 
+ODD = """
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import hexmj
+
+@dataclass(frozen=True)
+class Odd:
+    λ: float = 1.0
+    gains: Mapping[str, float] = field(default_factory=dict)
+    cap: float | None = None
+    name: str = "odd"
+
+    def begin(self, *how):
+        return hexmj.LDVS.begin(*how)
+"""
+
+
+def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run, tmp_path):
+    (tmp_path / "odd.py").write_text(ODD, encoding="utf-8")
+    begun = tmp_path / "begun.toml"
+    begun.write_text(f'controller = "{tmp_path}/odd.py:Odd"\n[fields]\ncap = inf\n[fields.gains]\nfront = 2.0\n')
+    words = ["search", "--form", begun, "--velocity", 0.5, "--window", 1, "--starts", 2, "--budget", 2]
+    words += ["--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]
+    assert run(*words)[0] == 0
+    found = hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert found == hexmj.load_controller(str(begun))
+
+
 def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
     first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"

@@ -7,6 +7,7 @@ import os
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,7 +50,7 @@ def begin(
             " expected V and a step together below 1"
         )
     with said(f"{controller.name}, begin"):
-        plan = controller.begin(x.copy(), v, stride, acceleration, threads)
+        plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
     check_plan(plan, x, stride)
     return plan
 

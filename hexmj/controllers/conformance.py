@@ -6,6 +6,7 @@ stride: tips within `REACH` of its range.
 """
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -162,9 +163,10 @@ def _begin(trial: Trial) -> None:
 
 
 def _steps(trial: Trial) -> None:
-    starts, velocity = trial.starts.copy(), trial.velocity.copy()
+    starts, velocity, controller = trial.starts.copy(), trial.velocity.copy(), copy(trial.controller)
+    stride, acceleration = copy(trial.stride), copy(trial.acceleration)
     with said("begin, without threads"):
-        plan = trial.controller.begin(starts, velocity, trial.stride, trial.acceleration)
+        plan = trial.controller.begin(starts, velocity, stride, acceleration)
     walk = advanced(plan, STEPS)
     if walk.geometry != trial.stride.geometry:
         raise InputError(f"geometry = {walk.geometry}; expected that of the stride, {trial.stride.geometry}")
@@ -175,6 +177,15 @@ def _steps(trial: Trial) -> None:
     ):
         if not np.array_equal(now, before):
             raise InputError(f"{name} are changed as it goes on; expected the plan to work on a copy")
+    told: dict[str, Any] = {
+        "stride": (stride, trial.stride),
+        "acceleration": (acceleration, trial.acceleration),
+        "controller": (trial.controller, controller),
+    }
+    for name, (now, was) in told.items():
+        for one in fields(now) if now else ():
+            if getattr(now, one.name) is not getattr(was, one.name):
+                raise InputError(f"begin changes {one.name} of the {name}; expected it left alone")
 
 
 def _times(trial: Trial) -> None:
@@ -263,7 +274,10 @@ def _reading(trial: Trial) -> None:
 LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "settings": (_settings, "a frozen dataclass with a name, its settings plain data"),
     "begin": (_begin, "plans begin at time 0 of the starts and stride asked for"),
-    "steps": (_steps, "finite tips, and stance, aep and height of every step, start and leg; arguments are left alone"),
+    "steps": (
+        _steps,
+        "finite tips, and stance, aep and height of every step, start and leg; arguments are left alone",
+    ),
     "times": (_times, "time is k dt, and velocity is V_r as commanded"),
     "reach": (_reach, "tips lie where legs can reach"),
     "begun again": (_again, "plans begun alike are the same walk, with any threads"),

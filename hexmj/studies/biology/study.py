@@ -80,7 +80,9 @@ class Biology(SameStarts):
             "built_in": [row.built_in for row in ANIMALS],
             "source": [row.source for row in ANIMALS],
         }
-        told = {name: ("row", values, {"units": "mm/s" if name == "at" else "1"}) for name, values in columns.items()}
+        measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
+        units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
+        told = {name: ("row", values, {"units": units[name]}) for name, values in columns.items()}
         return table.assign(told).assign_attrs(self.attributes("biology", periods=self.periods, speeds=list(SPEEDS)))
 
 
