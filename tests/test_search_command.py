@@ -132,7 +132,7 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
         assert answer["verdict"][name]["start"]["flss"] == flss
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.candidate.values[0].tolist() == [0.5, 0.1]
-    refused = history.candidate.values[:, 0] > 5
+    refused = history.candidate.values[:, 0] > 2
     assert refused.any() and (history.cost.values[refused] == 1.0).all()
     code, text, _ = run(*[word for word in words if word != "--json"])
     assert code == 0

@@ -18,7 +18,7 @@ class Waits:
     legs: int = 6
 
     def __post_init__(self):
-        if self.share > 5:
+        if self.share > 2:
             raise ValueError("share")
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
