@@ -6,18 +6,34 @@ import subprocess
 
 import pytest
 
+from hexmj.cli.main import COMMANDS
+
 
 def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
     code, script, _ = run("--completion", "bash")
     assert code == 0
     (tmp_path / "hexmj.bash").write_text(script)
-    for words, known in (("ren", {"render"}), ("flss --st", {"--starts", "--step-height", "--standing-height"})):
-        typed = ["hexmj", *words.split()]
+    for words, known in (
+        ("ren", {"render"}),
+        ("flss --st", {"--starts", "--step-height", "--standing-height"}),
+        ("flss --window ", {"walk", "start"}),
+        ("walk --order un", {"undelayed"}),
+        ("view --host ", set()),
+        ("flss --out hexmj.", {"hexmj.bash"}),
+    ):
+        typed = ["hexmj", *re.sub(" $", " ''", words).split()]
         ask = f"source hexmj.bash; COMP_WORDS=({' '.join(typed)}); COMP_CWORD={len(typed) - 1}; _tyro_hexmj"
         told = subprocess.run(
             ["bash", "-c", ask + '; echo "${COMPREPLY[@]}"'], cwd=tmp_path, capture_output=True, text=True, check=True
         )
         assert set(told.stdout.split()) == known
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_every_shell_is_told_what_each_command_does(run, shell):
+    _, script, _ = run("--completion", shell)
+    assert "'view': {'description': 'Look at an insect while it walks, or at a recording: in MuJoCo’s viewer" in script
+    assert not [name for name in COMMANDS if f"'{name}': {{'description': '{name}'" in script]
 
 
 def test_fish_completes_by_a_pipe_since_no_argument_may_be_so_long(run, tmp_path):

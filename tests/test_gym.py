@@ -21,6 +21,7 @@ from hexmj.environments import IDS, dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError, SimulationError
+from hexmj.physics import settling
 from hexmj.replay.film import gl
 from hexmj.timing import Stride
 from tests.plain_observations import plain_observations, plain_rewards
@@ -348,6 +349,19 @@ walking.render()
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stderr == ""
+
+
+def test_who_begins_again_settles_to_the_same_bits_and_builds_nothing(monkeypatch):
+    again = settling.Settling(Conditions(), Stride(), None)
+    for starts in (hexmj.draw_starts(3, 1), hexmj.draw_starts(3, 0), hexmj.draw_starts(1, 0)):
+        reused, fresh = again.at(starts), settling.settle(starts)
+        for name in ("state", "ctrl", "load", "torques"):
+            np.testing.assert_array_equal(getattr(reused, name), getattr(fresh, name))
+    walking = made("hexmj/StickInsect-v0")
+    walking.reset(seed=0)
+    for name in ("compile_body", "MujocoBatch"):
+        monkeypatch.setattr(settling, name, None)
+    walking.reset()
 
 
 @pytest.mark.parametrize("face", ["gym", "vector"])

@@ -1,6 +1,7 @@
 """The commands compare, flss, walk and render: their files, and the same bits whatever the threads."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -38,12 +39,14 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
     assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
 
 
-def test_compare_makes_a_video_of_a_gait(run, tmp_path):
+def test_compare_makes_a_video_of_a_gait_and_its_tables_break_no_name(run, monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = run(
-        "compare", "--models", "ldvs", "--velocities", 0.5, "--starts", 4, "--window", 30, "--out", tmp_path
+        *("compare", "--models", "ldvs", "uncoordinated", "--velocities", 0.5, "--starts", 4, "--window", 30),
+        *("--out", tmp_path),
     )
     assert code == 0
-    assert "only kin." in out
+    assert len(re.findall(r"^ ?uncoordinated  0\.5 ", out, re.MULTILINE)) == 2
     video, fps = read_film(tmp_path / "gait.mp4")
     assert fps == 30
     assert len(video) == round(30 / 80 * 30 * 2)

@@ -90,7 +90,7 @@ class Compare(StudyCommand):
         frequencies, answers = _tables(result)
         yield "Frequency of the loss of static stability, with 95 % intervals"
         yield frequencies
-        yield "Starts: lost on paper (kin.), fell (phys.); frequency of those that toppled; speed over command"
+        yield "Starts: lost on paper and fell, either alone (kin., phys.), none; share that toppled; speed over command"
         yield answers
         yield self.conditions_line()
         yield report_line(physical_report(result))
@@ -119,7 +119,7 @@ class Compare(StudyCommand):
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
     """A row for each controller and velocity: the frequencies, and what the starts did."""
     frequencies = new_table("controller", "V", "t", *MEASURES)
-    answers = new_table("controller", "V", "agree", "both", "only kin.", "only phys.", "none", *BESIDE, "speed")
+    answers = new_table("controller", "V", "agree", "both", "kin.", "phys.", "none", *BESIDE, "speed")
     for name in result.controller.values:
         for v in result.velocity.values:
             one = result.sel(controller=name, velocity=v)

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import re
 import shlex
 import sys
 from contextlib import nullcontext, redirect_stdout, suppress
@@ -19,6 +18,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
 from hexmj.cli import answers
+from hexmj.cli.completion import completed
 from hexmj.cli.surroundings import settle
 from hexmj.cli.words import checked, shell, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
@@ -37,9 +37,6 @@ ABOUT = (
 
 SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
 """What the system has too little of, where no file is named."""
-
-PIPED = ('$python_cmd -c "$pycode"', 'printf "%s\\n" "$pycode" | $python_cmd -')
-"""How fish asks Python for words, and how it has to: an argument may not be as long as what our options say."""
 
 GOES_ON = "Repeat the command to go on"
 AGAIN = f"\n\n{GOES_ON} with a {{}} that was stopped."
@@ -108,9 +105,7 @@ class _Completion:
     def run(self) -> None:
         with redirect_stdout(StringIO()) as script, suppress(SystemExit):
             options_of(["--tyro-write-completion", self.shell, "-"])
-        for line in script.getvalue().replace(*PIPED).splitlines():
-            # a shell would take a description's second line for a word
-            print(re.sub(r"\\+n", " ", line) if line.startswith("COMPLETION_SPEC") else line)
+        print(completed(script.getvalue(), COMMANDS))
 
 
 def main() -> None:

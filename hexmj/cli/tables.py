@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+GAP = 2
+"""Columns of the screen between those of a table."""
+
+
 def physical_report(result: "xr.Dataset") -> dict[str, float]:
     """How far the bodies did what they were told, over all walks of a comparison or a physical FLSS."""
     return {
@@ -51,7 +55,7 @@ def new_table(*columns: str) -> "Table":
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
     for column in columns:
         table.add_column(column.replace("_", " "), overflow="fold")
     return table
@@ -67,14 +71,14 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
     from rich.console import Console
 
     wide = Console().width
-    widths = [max(map(len, column)) + 2 for column in zip(head, *rows, strict=True)]
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     parts, used = [[0]], widths[0]
     for column, width in enumerate(widths[1:], 1):
-        if used + width > wide and len(parts[-1]) > 1:
+        if used + GAP + width > wide and len(parts[-1]) > 1:
             parts.append([0])
             used = widths[0]
         parts[-1].append(column)
-        used += width
+        used += GAP + width
     for part in parts:
         table = new_table(*(head[column] for column in part))
         for row in rows:
@@ -84,10 +88,11 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
 
 def show(*parts: Any) -> None:
     from rich.console import Console
+    from rich.padding import Padding
 
     console = Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
-        console.print(literal(part) if isinstance(part, str) else part)
+        console.print(literal(part) if isinstance(part, str) else Padding(part, (1, 0), expand=False))
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -23,7 +23,7 @@ from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import Shown
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.sensing import Senses
-from hexmj.physics.settling import settle
+from hexmj.physics.settling import Settling
 
 AHEAD = 128
 """Steps for which a plan that reads nothing is asked at once."""
@@ -106,7 +106,7 @@ class Walkers:
             threads: settle them, one per core unless given.
         """
         self._task, self._compiled, self._threads = task, compiled, threads
-        self._take = take
+        self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
         self._grasps = task.conditions.contact.grasp > 0
         self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
@@ -137,7 +137,7 @@ class Walkers:
             SimulationError: a start that does not settle.
         """
         task = self._task
-        settled = settle(starts, task.conditions, task.stride, self._threads)
+        settled = self._settling.at(starts)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)

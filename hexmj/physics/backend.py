@@ -97,6 +97,11 @@ class MujocoBatch:
         self.sensors, self._foot = self._batch.bind("sensordata"), compiled.columns.foot
         self.force = self._batch.bind("actuator_force")
 
+    def reset(self) -> None:
+        """All bodies as they were at first; nothing remains of those that diverged."""
+        self._batch.warning[:] = 0
+        self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+
     def states(self, ids: np.ndarray) -> np.ndarray:
         """What some bodies go on from, (n, state)."""
         return np.concatenate([values[ids] for values in self._state], axis=1)

@@ -70,6 +70,72 @@ class Settled:
         }
 
 
+class Settling:
+    """A body that comes to rest at some starts after others; to the same bits, whatever it did before."""
+
+    def __init__(self, conditions: Conditions, stride: Stride, threads: int | None) -> None:
+        """Under some conditions of the walk; `threads` step it, one per core unless given.
+
+        Raises:
+            InputError: a home that is not as described.
+        """
+        self._conditions, self._stride, self._threads = conditions, stride, threads
+        self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
+        check_home(self._compiled)
+        self._batch: MujocoBatch | None = None
+
+    def at(self, starts: ArrayLike) -> Settled:
+        """At every start, (start, leg) [mm].
+
+        Raises:
+            InputError, SimulationError: see `settle`.
+        """
+        conditions, stride, compiled = self._conditions, self._stride, self._compiled
+        height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
+        x = checked_starts(starts, stride)
+        check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
+        model, columns = compiled.model, compiled.columns
+        tips = standing_tips(x, height, stride)
+        joints, reachable = compiled.inverse(tips)
+        if not reachable.all():
+            start, leg = np.argwhere(~reachable)[0]
+            raise InputError(
+                f"start {start}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
+                f" at a standing height of {height:g} mm"
+            )
+        batch = self._begun(len(x))
+        batch.qpos[:, :ROOT_QPOS] = (0.0, 0.0, height + compiled.foot_radius, 1.0, 0.0, 0.0, 0.0)
+        batch.qpos[:, columns.qpos] = joints.reshape(len(x), -1)
+        ctrl = np.ones((len(x), model.nu))
+        ctrl[:, columns.ctrl] = joints.reshape(len(x), -1)
+        try:
+            batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
+        except Diverged as error:
+            raise walk_error(error, "settling", 0.0, conditions) from None
+        if conditions.contact.grasp:
+            _check_grasp(batch.sensors[:, columns.foot], compiled)
+        touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
+        for name, failed in {
+            "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
+            "a foot is off the ground": (touch <= 0).any(axis=1),
+            "its feet carry less than half of its weight": touch.sum(axis=1) < 0.5 * compiled.weight,
+            "the trunk is on the ground": (trunk > 0).any(axis=1),
+        }.items():
+            if failed.any():
+                raise SimulationError(f"start {np.argmax(failed)} did not settle in {settling_time:g} ms: {name}")
+        torques = batch.force[:, columns.ctrl].copy()
+        return Settled(x, batch.states(np.arange(len(x))), ctrl, touch, torques, compiled, conditions, stride)
+
+    def _begun(self, count: int) -> MujocoBatch:
+        """As many bodies that have not moved yet; those of last time, where they were as many."""
+        batch = self._batch
+        if batch and len(batch.qpos) == count:
+            batch.reset()
+        else:
+            batch = self._batch = MujocoBatch(self._compiled, count, self._threads)
+        return batch
+
+
 def settle(
     starts: ArrayLike,
     conditions: Conditions | None = None,
@@ -90,42 +156,7 @@ def settle(
         SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
     """
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
-    height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
-    x = checked_starts(starts, stride)
-    check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
-    compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
-    check_home(compiled)
-    model, columns = compiled.model, compiled.columns
-    tips = standing_tips(x, height, stride)
-    joints, reachable = compiled.inverse(tips)
-    if not reachable.all():
-        start, leg = np.argwhere(~reachable)[0]
-        raise InputError(
-            f"start {start}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
-            f" at a standing height of {height:g} mm"
-        )
-    batch, everyone = MujocoBatch(compiled, len(x), threads), np.arange(len(x))
-    batch.qpos[:, :ROOT_QPOS] = (0.0, 0.0, height + compiled.foot_radius, 1.0, 0.0, 0.0, 0.0)
-    batch.qpos[:, columns.qpos] = joints.reshape(len(x), -1)
-    ctrl = np.ones((len(x), model.nu))
-    ctrl[:, columns.ctrl] = joints.reshape(len(x), -1)
-    try:
-        batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
-    except Diverged as error:
-        raise walk_error(error, "settling", 0.0, conditions) from None
-    if conditions.contact.grasp:
-        _check_grasp(batch.sensors[:, columns.foot], compiled)
-    touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
-    for name, failed in {
-        "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
-        "a foot is off the ground": (touch <= 0).any(axis=1),
-        "its feet carry less than half of its weight": touch.sum(axis=1) < 0.5 * compiled.weight,
-        "the trunk is on the ground": (trunk > 0).any(axis=1),
-    }.items():
-        if failed.any():
-            raise SimulationError(f"start {np.argmax(failed)} did not settle in {settling_time:g} ms: {name}")
-    torques = batch.force[:, columns.ctrl].copy()
-    return Settled(x, batch.states(everyone), ctrl, touch, torques, compiled, conditions, stride)
+    return Settling(conditions, stride, threads).at(starts)
 
 
 def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
