@@ -32,7 +32,7 @@ def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_every_shell_is_told_what_each_command_does(run, shell):
     _, script, _ = run("--completion", shell)
-    assert "'view': {'description': 'Look at an insect while it walks, or at a recording: in MuJoCo’s viewer" in script
+    assert "'view': {'description': 'Look at an insect while it walks, or at a recording: in MuJoCo" in script
     assert not [name for name in COMMANDS if f"'{name}': {{'description': '{name}'" in script]
 
 
