@@ -93,6 +93,16 @@ def test_entrants_and_rivals_that_make_no_sense_are_refused(given, said: str) ->
         given()
 
 
+def test_an_ideal_start_is_one_start() -> None:
+    @dataclass(frozen=True)
+    class Many(Still):
+        def ideal_start(self, velocity, stride):
+            return np.zeros((3, 6))
+
+    with pytest.raises(InputError, match=r"still, ideal_start gave .* expected the tips of one start, of the shape"):
+        Entrant(Many(), ideal=True).starts(1, 0, 0.5, Stride())
+
+
 def test_an_ideal_start_that_raises_is_one_sentence() -> None:
     @dataclass(frozen=True)
     class Gone(Still):

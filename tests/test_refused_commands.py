@@ -26,6 +26,8 @@ NONSENSE = [
     (["flss", "--out", ""], "'' stands alone; expected options, each with its values"),
     (["terrain", "--processes", "1" + 23 * "0"], "expected at least 1 and at most 1000"),
     (["reproduce", "--only"], "--only without keys; expected at least one"),
+    (["league", "--controllers", "--starts", "2"], "controllers = []; expected at least one, and none of them twice"),
+    (["league", "--velocities", "--starts", "2"], "velocities = (); expected a list of at least one"),
     (["walk", "--window", "1e7"], "expected at least one step, 0.1, and at most 1e+06 time units"),
     (["walk", "--physical", "--ground", "hurdle", "--ground-length", "1e-300"], "cannot be built: "),
     (["walk", "--physical", "--ground", "rough", "--ground-seed", "9" * 30], "expected a whole number of at least 0"),

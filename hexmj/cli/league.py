@@ -42,10 +42,10 @@ class League(StudyCommand):
     """Options of `hexmj league`, which `main.COMMANDS` describes."""
 
     controllers: Annotated[
-        tuple[str, ...],
+        tuple[str, ...] | None,
         arg(help=f"Who takes part, each {CONTROLLER}; wilson-ideal begins at its ideal start.  All unless given."),
-    ] = ()
-    velocities: Sequence[float] = ()
+    ] = None
+    velocities: Sequence[float] | None = None
     """Velocities V_r as fractions of V_p, 0 < V < 1; 0.1, 0.2 ... 0.9 unless given, 0.1, 0.5, 0.9 if quick."""
     starts: int | None = None
     """Number of random starts on paper, the same for all; 1000 unless given, 200 if quick."""
@@ -71,13 +71,13 @@ class League(StudyCommand):
     @property
     def names(self) -> tuple[str, ...]:
         """Who takes part."""
-        return self.controllers or (FOUR if self.quick else EVERYONE)
+        return (FOUR if self.quick else EVERYONE) if self.controllers is None else self.controllers
 
     def study(self) -> study.League:
         """See `StudyCommand.study`."""
         check_distinct("controllers", self.names)
         asked = {
-            "velocities": self.velocities or None,
+            "velocities": self.velocities,
             "n_starts": self.starts,
             "n_physical": self.physical_starts,
             "n_tried": self.trial_starts,

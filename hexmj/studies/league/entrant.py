@@ -10,6 +10,7 @@ from hexmj.controllers.asking import begin, said
 from hexmj.controllers.protocol import Controller, ReadingPlan, SteerableController, check_controller_type
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
+from hexmj.legs import LEGS
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 
@@ -39,11 +40,18 @@ class Entrant:
             raise InputError(f"an ideal start of {self.controller.name}; expected a controller with ideal_start")
 
     def starts(self, n_starts: int, seed: int, velocity: float, stride: Stride) -> np.ndarray:
-        """Random starts, (start, leg) [mm], or the ideal one alone."""
-        if self.ideal and isinstance(self.controller, HasIdealStart):
-            with said(f"{self.controller.name}, ideal_start"):
-                return self.controller.ideal_start(velocity, stride)
-        return draw_starts(n_starts, seed, stride)
+        """Random starts, (start, leg) [mm], or the ideal one alone.
+
+        Raises:
+            InputError: an ideal start that is something else.
+        """
+        if not (self.ideal and isinstance(self.controller, HasIdealStart)):
+            return draw_starts(n_starts, seed, stride)
+        with said(name := f"{self.controller.name}, ideal_start"):
+            start = self.controller.ideal_start(velocity, stride)
+        if np.shape(start) != (1, len(LEGS)):
+            raise InputError(f"{name} gave {start!r:.80}; expected the tips of one start, of the shape (1, 6)")
+        return start
 
     @property
     def reading(self) -> Controller | None:
