@@ -99,7 +99,7 @@ def test_an_ideal_start_is_one_start() -> None:
         def ideal_start(self, velocity, stride):
             return np.zeros((3, 6))
 
-    with pytest.raises(InputError, match=r"still, ideal_start gave .* expected the tips of one start, of the shape"):
+    with pytest.raises(InputError, match=r"still, ideal_start gave .* \(3, 6\); expected the tips of one start"):
         Entrant(Many(), ideal=True).starts(1, 0, 0.5, Stride())
 
 

@@ -118,6 +118,13 @@ def test_what_is_drawn_at_one_velocity_is_seen():
         hexmj.plot(recording.isel(step=slice(0)))
 
 
+def test_a_recordings_legs_stand_in_their_order_however_they_are_sorted():
+    recording = recorded()
+    assert pixels(recording.isel(leg=slice(None, None, -1)), "walk") == pixels(recording, "walk")
+    with pytest.raises(InputError, match=r"cannot be drawn of this part of a result, .*leg 3"):
+        hexmj.plot(recording.isel(leg=slice(3)))
+
+
 @pytest.mark.parametrize("name", MADE)
 def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(MADE[name](), tmp_path)

@@ -25,6 +25,7 @@ def walk_figure(recording: "xr.Dataset") -> "Picture":
 
     if not recording.sizes["step"]:
         raise InputError(f"the recording {recording.attrs['title']!r} holds no steps; expected at least one")
+    recording = recording.sel(leg=list(LEGS))
     figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time = recording.time.values

@@ -50,7 +50,9 @@ class Entrant:
         with said(name := f"{self.controller.name}, ideal_start"):
             start = self.controller.ideal_start(velocity, stride)
         if np.shape(start) != (1, len(LEGS)):
-            raise InputError(f"{name} gave {start!r:.80}; expected the tips of one start, of the shape (1, 6)")
+            raise InputError(
+                f"{name} gave something of the shape {np.shape(start)}; expected the tips of one start, (1, 6)"
+            )
         return start
 
     @property
