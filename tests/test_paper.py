@@ -216,10 +216,11 @@ def test_a_stopped_run_goes_on_and_ends_the_same(tmp_path):
     keys = ("ldvs-below-hws", "hws-late", "p2")
     protocol = replace(TINY, velocities=(0.1, 0.3, 0.5, 0.6))
     whole, _ = reproduce(tmp_path / "whole", protocol, only=keys)
+    (tmp_path / "stopped").mkdir()
+    (table := tmp_path / "stopped" / "claims.json").write_text("of an earlier run")
     with pytest.raises(Stop):
         reproduce(tmp_path / "stopped", protocol, only=keys, progress=until(9))
-    table = json.loads((tmp_path / "stopped" / "claims.json").read_text())
-    assert [row["key"] for row in table["claims"]] == ["p2", "ldvs-below-hws"]
+    assert table.read_text() == "of an earlier run"
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "stopped" / "measurements").iterdir()}
     assert len(kept) == 10
     rows, _ = reproduce(tmp_path / "stopped", protocol, only=keys)

@@ -1,6 +1,6 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
@@ -28,8 +28,8 @@ def reproduce(
 ) -> tuple[list[Row], list[Path]]:
     """Measure what the claims need, judge them, draw the figures.
 
-    A stopped run goes on where it was: every measured velocity is kept in ``out/measurements``, and the tables are
-    written anew after each measurement, with the rows that can be judged by then.
+    A stopped run goes on where it was: every measured velocity is kept in ``out/measurements``.  What lies in ``out``
+    stays until all is measured.
 
     Args:
         out: folder for ``claims.md``, ``claims.json``, figures (PDF, PNG and their data as NetCDF) and measurements.
@@ -51,22 +51,17 @@ def reproduce(
     readings = {name: named_reading(name) for name in beside}
     results_folder(out, TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
-    measured: dict[str, xr.Dataset] = {}
-    judged: dict[str, Row] = {}
-    files = _judge_ready(out, claims, measured, judged, protocol)
-    for name, data in _measurements(_needed(claims, figures=not only), protocol, out / KEPT, how):
-        measured[name] = data
-        files = _judge_ready(out, claims, measured, judged, protocol)
+    measured = dict(_measurements(_needed(claims, figures=not only), protocol, out / KEPT, how))
+    rows = [judge(claim, measured) for claim in claims]
+    for name, reading in readings.items():
+        other = dict(_measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, how))
+        rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
+    texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
+    files = [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
     if not only:
         for name, (_, draw) in FIGURES.items():
             files += save_figure(*draw(measured), out / "figures" / name)
-    for name, reading in readings.items():
-        other = replace(protocol, reading=reading)
-        measured = dict(_measurements(_needed(claims, figures=False), other, out / KEPT, how))
-        for key, row in judged.items():
-            judged[key] = replace(row, beside=row.beside | {name: judge(row.claim.under(reading), measured)})
-        files[:2] = _judge_ready(out, claims, measured, judged, protocol)
-    return _rows(claims, judged), files
+    return rows, files
 
 
 def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
@@ -107,24 +102,3 @@ def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:
     options = {".pdf": {"metadata": {"CreationDate": None}}, ".png": {"dpi": 200}}
     files = [results.save_figure(figure, path.with_name(path.name + end), **how) for end, how in options.items()]
     return [*files, save_dataset(data, path.with_name(path.name + ".nc"))]
-
-
-def _judge_ready(
-    out: Path,
-    claims: Sequence[Claim],
-    measured: Mapping[str, "xr.Dataset"],
-    judged: dict[str, Row],
-    protocol: Protocol,
-) -> list[Path]:
-    """Judge the claims whose measurements are there, and write all that are judged into both tables."""
-    for claim in claims:
-        if claim.key not in judged and set(claim.rule.quantity.needs) <= set(measured):
-            judged[claim.key] = judge(claim, measured)
-    rows, settings = _rows(claims, judged), asdict(protocol)
-    texts = claims_markdown(rows, settings), json_text(claims_json(rows, settings)) + "\n"
-    return [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
-
-
-def _rows(claims: Sequence[Claim], judged: Mapping[str, Row]) -> list[Row]:
-    """What has been judged, in the paper's order."""
-    return [judged[claim.key] for claim in claims if claim.key in judged]
