@@ -102,8 +102,8 @@ _OWN = {
 
 PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in _PAPER.items()} | _OWN
 """The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once;
-`robust-0.1` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ... `lasting-0.9` and `lasting`, which
-were searched under that reading and walk by it."""
+`robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ... `lasting-0.9` and
+`lasting`, which were searched under that reading and walk by it."""
 
 SEARCHED_ON = {
     name: int(found[1]) for name, entry in _ENTRIES.items() if (found := re.search(r"--seed (\d+)", entry["command"]))
