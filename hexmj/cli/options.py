@@ -30,8 +30,8 @@ from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
     "a preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9, robust-0.1, robust-0.3, robust-0.7, lasting,"
-    " lasting-0.1 ... lasting-0.9), a rival (wilson, graham, ...; `hexmj league` lists all), a file of weights (TOML), module:object,"
-    " file.py:object or an entry point"
+    " lasting-0.1 ... lasting-0.9), a rival (wilson, graham, ...; `hexmj league` lists all), a file of weights (TOML),"
+    " module:object, file.py:object or an entry point"
 )
 """How controllers are named."""
 
