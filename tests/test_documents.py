@@ -138,6 +138,6 @@ def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):
 
 
 def test_a_package_index_is_told_nothing_by_relative_paths():
-    told = str(metadata("hexmj").get_payload())
+    told = str(metadata("hexmj").json["description"])
     assert told.count("# hexmj") == 1 and "## A dozen lines" in told
     assert not re.findall(r"\]\((?!https://)", told)
