@@ -11,6 +11,9 @@ from hexmj.errors import InputError
 MASS_TOLERANCE = 1e-3
 """Share by which the MJCF's mass may differ from the description's."""
 
+LEAST_GRAVITY = 100.0
+"""A sixteenth of the moon's [mm/s^2]; less was told in metres."""
+
 
 def check_described(model: mujoco.MjModel, body: Body) -> None:
     """Refuse an MJCF, compiled as it is, that the description does not fit.
@@ -86,10 +89,20 @@ def _in_legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
 
 
 def _in_the_rest(model: mujoco.MjModel, body: Body) -> Iterator[str]:
-    if model.geom(body.ground).type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
+    ground = model.geom(body.ground)
+    if ground.type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
         yield f"the ground {body.ground!r} is no plane; expected a geom of type plane"
+    if ground.bodyid[0] or ground.pos[2] or ground.quat[1:3].any():
+        where = f"at z = {ground.pos[2]:g} mm, quat = {ground.quat.round(4).tolist()}"
+        yield f"the ground {body.ground!r} lies {where}; expected it level at z = 0, in the world"
+    for pair in np.flatnonzero((model.pair_geom1 == ground.id) | (model.pair_geom2 == ground.id)):
+        if model.pair_dim[pair] < 3:
+            name, condim = model.pair(pair).name, model.pair_dim[pair]
+            yield f"the pair {name!r} has condim = {condim}; expected 3 or more: friction"
     if model.opt.gravity[:2].any() or not model.opt.gravity[2] < 0:
         yield f"gravity = {model.opt.gravity.tolist()}; expected it to point down"
+    if -model.opt.gravity[2] < LEAST_GRAVITY:
+        yield f"gravity = {-model.opt.gravity[2]:g} mm/s^2; expected at least {LEAST_GRAVITY:g}, as 9810 on Earth"
     if model.neq:
         yield f"its MJCF has {model.neq} equality constraints; expected none, which might hold it up"
     if model.opt.density or model.opt.viscosity:
