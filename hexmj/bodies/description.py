@@ -176,6 +176,9 @@ class Body:
     marks: Marks
     """Sizes of a film's marks."""
 
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}, {self.mjcf.name})"
+
     def __post_init__(self) -> None:
         check_types(self)
         _check_positive(
