@@ -56,10 +56,12 @@ def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray
 
 
 def main() -> None:
+    import torch  # pyright: ignore[reportMissingImports]
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
     from hexmj.environments.stable_baselines import FeltInsects, HeldInsects
 
+    torch.set_num_threads(1)  # on more it adds in another order, and finds other gains
     began, cpu = time.monotonic(), time.process_time()
     insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=STRIDE)
     size, net = INSECTS * ACTIONS, {"net_arch": [], "log_std_init": float(np.log(SPREAD))}
