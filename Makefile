@@ -24,7 +24,7 @@ test slow: export MUJOCO_GL ?= egl
 test: .venv/dev system
 	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
 
-slow: .venv/dev system browser
+slow: .venv/dev system browser .venv/rl
 	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
 
 soak: export MUJOCO_GL ?= egl
@@ -95,3 +95,9 @@ browser:
 	$(PIP) install "pip>=25.1"  # the first with dependency groups
 	$(PIP) install --constraint constraints.txt --editable ".[gym,dask,view,docs]" --group dev
 	touch $@
+
+# stable-baselines3 and torch, for tests of learning, which are skipped without them.
+.venv/rl: .venv/dev
+	@echo "Installing stable-baselines3, for the tests of learning; its torch may be gigabytes."
+	@$(PIP) install --constraint constraints.txt --editable ".[rl]" && touch $@ || \
+	echo "Tests of learning are skipped: stable-baselines3 could not be installed here: pip install '.[rl]'."

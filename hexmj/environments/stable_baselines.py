@@ -41,8 +41,9 @@ class FeltInsects(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Begin all episodes, by the seeds of `seed` if there are some."""
-        seeds, self._seeds = self._seeds, [None] * self.num_envs
-        return _seen(self._insects.reset(seed=seeds)[0])
+        observed = self._insects.reset(seed=self._seeds)[0]
+        self._reset_seeds()
+        return _seen(observed)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions that `step_wait` will carry out."""
