@@ -319,6 +319,20 @@ def test_after_a_divergence_a_reset_is_a_new_beginning(mode):
         assert_same(walking.step(action)[0], other.step(action)[0])
 
 
+def test_after_a_step_that_failed_all_begin_anew():
+    """The others may have taken it or not."""
+    walking = StickInsects(2, **TIPS)
+    walking.reset(seed=0)
+    walking._walkers.bodies.qvel[1, 0] = 1e30
+    with pytest.raises(SimulationError):
+        walking.step(np.zeros((2, 18)))
+    with pytest.raises(InputError, match="whose last step failed; expected a reset of all"):
+        walking.reset(options={"reset_mask": np.array([False, True])})
+    with pytest.raises(InputError, match="after a step that failed; expected a reset of all"):
+        walking.step(np.zeros((2, 18)))
+    assert_same(walking.reset(seed=4)[0], StickInsects(2, **TIPS).reset(seed=4)[0])
+
+
 @pytest.mark.parametrize("walking", [StickInsect(), StickInsects(2)], ids=["one", "many"])
 def test_a_step_needs_a_reset_and_a_copy_another_make(walking: Any):
     with pytest.raises(InputError, match="before the first reset"):

@@ -85,8 +85,11 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             InputError: seeds or a mask that make no sense.
         """
         which = _mask((typed("options", options, dict | None) or {}).get("reset_mask"), self.num_envs)
-        if not (self._rngs or which.all()):
-            raise InputError("a reset_mask leaves out insects that have never begun; expected a reset of all first")
+        if not (self._walkers.begun or which.all()):
+            raise InputError(
+                "a reset_mask leaves out insects that have never begun, or whose last step failed;"
+                " expected a reset of all"
+            )
         self._seed(_seeds(seed, self.num_envs), which)
         self._begin(which)
         return self._observations(), {}

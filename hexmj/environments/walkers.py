@@ -112,7 +112,8 @@ class Walkers:
         self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
-        self._begun = False
+        self.begun = False
+        """Whether steps may follow: all have begun, and no step has failed since."""
         self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
@@ -154,7 +155,7 @@ class Walkers:
         for shown, now in zip(self._planned, (1.0, standing, 0.0), strict=True):
             shown[ids] = now
         self._done[ids], self._walking[ids] = 0, True
-        self._ids, self._begun = np.flatnonzero(self._walking), True
+        self._ids, self.begun = np.flatnonzero(self._walking), True
 
     def act(self, actions: np.ndarray) -> Acted:
         """One step of all insects that walk, with an action of every insect, (insect, number): 0 is the usual action,
@@ -164,15 +165,20 @@ class Walkers:
             InputError: actions out of bounds, no episode has begun, or a plan that makes no sense.
             SimulationError: an insect that diverged.
         """
-        if not self._begun:
-            raise InputError("a step before the first reset; expected a reset")
+        if not self.begun:
+            raise InputError("a step before the first reset, or after a step that failed; expected a reset of all")
         ids = self._ids
         if len(ids) == 0:
             return self._nothing()
         wanted, within = scaled(actions, ids, self._usual, self._span)
         if not within:
             raise self._beyond(actions, ids)
-        return self.judge(self._carry_out(ids, self.control(wanted)))
+        try:
+            return self.judge(self._carry_out(ids, self.control(wanted)))
+        except BaseException:  # how much of the step the others have done is not known
+            self._leave(ids)
+            self.begun = False
+            raise
 
     def control(self, wanted: np.ndarray) -> np.ndarray:
         """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,
