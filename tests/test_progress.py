@@ -117,7 +117,7 @@ main()
     assert done.stdout.startswith("{")
 
 
-@pytest.mark.parametrize("words", [("view", "--browser", "--port", -1), ("walk", "--window", 2)])
+@pytest.mark.parametrize("words", [("view", "--browser", "--port", -1), ("walk", "--window", 1000)])
 def test_commands_without_lines_of_their_own_say_that_a_first_run_compiles(run, monkeypatch, tmp_path, words):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(progress, "EVERY", 0.001)
