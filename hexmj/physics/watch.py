@@ -50,16 +50,14 @@ def explosion(
     row, t = _first_odd((qpos, centre), valid, impulse != 0.0, (most, tumbling), (top, timestep, twice_g))
     if row < 0:
         return None
+    if not impulse[row] and (upright := _upright(qpos[row, t])) < 0.0:
+        return Explosion(row, t, f"it tilts by {np.arccos(upright):.3g} rad, past a right angle, and was not pushed")
     name, place = ("centre of mass", centre[row]) if impulse[row] else ("root", qpos[row, :, :3])
     height, speed = place[t, 2] - top, np.linalg.norm(place[t] - place[t - 1]) / timestep
-    if height + speed**2 / twice_g > most[row]:
-        what = (
-            f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; expected height and"
-            f" v^2 / 2g of at most {most[row]:.3g} mm together"
-        )
-    else:
-        tilt = np.arccos(_upright(qpos[row, t]))
-        what = f"it tilts by {tilt:.3g} rad, past a right angle, and was not pushed"
+    what = (
+        f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; expected height and"
+        f" v^2 / 2g of at most {most[row]:.3g} mm together"
+    )
     return Explosion(row, t, what)
 
 
