@@ -4,11 +4,12 @@ Another engine is another module with an `Engine` in it.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.callbacks import stopped_clock, unlogged
@@ -104,7 +105,7 @@ class MujocoBatch:
 
     def states(self, ids: np.ndarray) -> np.ndarray:
         """What some bodies go on from, (n, state)."""
-        return np.concatenate([values[ids] for values in self._state], axis=1)
+        return _side_by_side(ids, tuple(self._state))
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """See `Engine.put`."""
@@ -177,11 +178,40 @@ class MujocoBatch:
 
     def _check(self, ids: np.ndarray, before: Replayed, control: np.ndarray) -> None:
         """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""
-        warned = self._batch.warning[ids, :, 1] > 0
-        broken = ~np.isfinite(self.qpos[ids]).all(axis=1)
-        failed = np.flatnonzero(warned.any(axis=1) | broken)
-        if len(failed) == 0:
+        warned = self._batch.warning
+        i = _first_broken(ids, warned, self.qpos)
+        if i == len(ids):
             return
-        i = int(failed[0])
-        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[i])] or ["a state that is not finite"]
-        raise Diverged(int(ids[i]), ", ".join(kinds), self.saved(before, i, int(ids[i]), control[i]))
+        start = int(ids[i])
+        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[start, :, 1])]
+        state = self.saved(before, i, start, control[i])
+        raise Diverged(start, ", ".join(kinds) or "a state that is not finite", state)
+
+
+@njit(cache=True, nogil=True)
+def _side_by_side(ids: Any, values: Any) -> Any:
+    """Rows of some arrays, each (start, number), one after the other, (n, number)."""
+    columns = 0
+    for of_one in values:
+        columns += of_one.shape[1]
+    rows, at = np.empty((len(ids), columns)), 0
+    for of_one in values:
+        for i, n in enumerate(ids):
+            for j in range(of_one.shape[1]):
+                rows[i, at + j] = of_one[n, j]
+        at += of_one.shape[1]
+    return rows
+
+
+@njit(cache=True, nogil=True)
+def _first_broken(ids: Any, warned: Any, qpos: Any) -> int:
+    """Index of the first of some bodies of which MuJoCo has warned, (start, kind, [last, count]), or whose state is not
+    finite; `len(ids)` if none."""
+    for i, n in enumerate(ids):
+        for kind in range(warned.shape[1]):
+            if warned[n, kind, 1] > 0:
+                return i
+        for value in qpos[n]:
+            if not np.isfinite(value):
+                return i
+    return len(ids)
