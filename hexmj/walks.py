@@ -123,6 +123,11 @@ def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
     return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(type(walk))})
 
 
+def copied(walk: AnyWalk) -> AnyWalk:
+    """The same walk in arrays of its own."""
+    return replace(walk, **{name: getattr(walk, name).copy(order="K") for name in _arrays(type(walk))})
+
+
 @cache
 def _arrays(kind: type[Walk]) -> list[str]:
     """Names of what a walk holds of every step."""

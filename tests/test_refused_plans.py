@@ -11,7 +11,7 @@ from hexmj.controllers.asking import advanced
 from hexmj.measures.physical import physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
-from hexmj.walks import part_of
+from hexmj.walks import PLANNED, part_of
 from stepwise_ldvs import Own, plan_of
 
 STRIDE = hexmj.Stride()
@@ -40,7 +40,30 @@ class Short:
         return self._plan.advance(max(1, steps - 1))
 
 
+class Fractional(Short):
+    """A plan that counts its steps in floats."""
+
+    def __init__(self, starts):
+        super().__init__(starts)
+        self.done = 0.0
+
+
+class Rewritten(Short):
+    """A plan that writes every part of its walk into the same arrays."""
+
+    shown = None
+
+    def advance(self, steps):
+        self.done += steps
+        walk = self._plan.advance(steps)
+        self.shown = self.shown or walk
+        for name in ("time", "velocity", *PLANNED):
+            getattr(self.shown, name)[:] = getattr(walk, name)
+        return self.shown
+
+
 REFUSED = {
+    "steps in floats": (lambda s: Fractional(s.starts), "a plan's done = 0.0; expected a whole number of at least 0"),
     "other starts": (lambda s: plan_of(s.starts[::-1]), r"the plan is of other starts, \(2, 6\); expected the 2"),
     "too few starts": (lambda s: plan_of(s.starts[:1]), r"the plan is of other starts, \(1, 6\); expected the 2"),
     "another stride": (lambda s: plan_of(s.starts, hexmj.Stride(dt=0.2)), "the plan's stride is Stride"),
@@ -85,6 +108,14 @@ class Liar:
         true = plan.advance
         plan.advance = lambda steps: LIES[self.lie](true(steps))
         return plan
+
+
+def test_a_plan_may_write_into_its_own_arrays_again(settled):
+    plan = Rewritten(settled.starts)
+    parts, whole = [advanced(plan, 9) for _ in range(3)], plan_of(settled.starts).advance(27)
+    for name in ("time", "velocity", *PLANNED):
+        joined = np.concatenate([getattr(part, name) for part in parts])
+        assert np.array_equal(joined, getattr(whole, name), equal_nan=True)
 
 
 def test_a_plan_that_goes_on_by_other_steps_is_refused():

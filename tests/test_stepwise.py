@@ -64,6 +64,7 @@ def test_a_stepwise_plan_hears_what_it_is_told():
         (Step(None, True), "x of a step is of type object; expected numbers"),  # pyright: ignore[reportArgumentType]
         (Step(0.0, True, height="high"), "height of a step is of type"),  # pyright: ignore[reportArgumentType]
         (Step([[0.0], [0.0, 1.0]], True), "x of a step is .* expected one array"),  # pyright: ignore[reportArgumentType]
+        (Step(np.ma.masked_array(np.zeros(6), [True] + 5 * [False]), True), "x of a step is masked in part; expected"),
         ((0.0, True), r"a step gave \(0.0, True\); expected a Step"),
     ],
 )

@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import typed
+from hexmj.checks import typed, whole
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
 from hexmj.errors import InputError, is_of_numbas_cache
 from hexmj.legs import LEGS
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PLANNED, PlannedWalk
+from hexmj.walks import PLANNED, PlannedWalk, copied
 
 KEPT = 400
 """Memory that a step of a start takes while it is planned [bytes]."""
@@ -63,7 +63,7 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
     """
     if not isinstance(plan, Plan):
         raise InputError(f"begin gave {plan!r:.80}; expected a plan, with starts, stride, done and advance")
-    if plan.done:
+    if whole("a plan's done", plan.done, 0):
         raise InputError(f"the plan is at step {plan.done}; expected one at time 0, as `begin` gives it")
     if plan.stride != stride:
         raise InputError(f"the plan's stride is {plan.stride}; expected {stride}")
@@ -73,6 +73,8 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
 
 def advanced(plan: Plan, steps: int) -> PlannedWalk:
     """The plan's next steps, if it gives as many, for all of its starts, with numbers that are finite.
+
+    They are the caller's: a plan may write into its own arrays again.
 
     Raises:
         InputError: it does not, or it raised something.
@@ -84,7 +86,8 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
         walk = plan.advance(steps)
     if not isinstance(walk, PlannedWalk):
         raise InputError(f"a plan gave {walk!r:.80}; expected a PlannedWalk")
-    if plan.done != end:
+    walk = copied(walk)
+    if whole("a plan's done", plan.done, 0) != end:
         raise InputError(f"a plan is at step {plan.done} after it was asked for {steps} more; expected {end}")
     if walk.stance.shape != (expected := (steps, *np.shape(plan.starts))):
         raise InputError(f"a plan was asked for {steps} steps, and gave {walk.stance.shape}; expected {expected}")

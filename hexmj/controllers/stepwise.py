@@ -110,6 +110,8 @@ def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     kinds, expected = ("b", "booleans") if name == "stance" else ("fiu", "numbers")
     if values.dtype.kind not in kinds:
         raise InputError(f"{name} of a step is of type {values.dtype}; expected {expected}")
+    if np.ma.is_masked(value):
+        raise InputError(f"{name} of a step is masked in part; expected {expected} throughout")
     try:
         return np.broadcast_to(values, shape)
     except ValueError:
