@@ -29,6 +29,7 @@ from hexmj.sweeps import conduct
 PHYSICAL: dict[str, Any] = {"n_starts": 3, "window": 20.0}
 ON_PAPER: dict[str, Any] = {"n_starts": 20, "window": 20.0, "physical": False, "strategies": ["reorganise"]}
 FEW: dict[str, Any] = {"n_starts": 3, "n_physical": 2, "periods": 12}
+SHORT: dict[str, Any] = FEW | {"n_tried": 1, "window": 10.0}
 TWO = {"ldvs": [hexmj.LDVS] * 2, "hws": [hexmj.HWS] * 2}
 
 
@@ -48,7 +49,7 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "disturb": lambda: conduct(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **ON_PAPER)),
     "variants": lambda: conduct(Variants(TWO, [0.5, 0.7], n_starts=20, window="start")),
     "biology": lambda: conduct(Biology(hexmj.LDVS, 4, n_starts=2)),
-    "league": lambda: conduct(League(entrants(("ldvs", "hws")), (0.5, 0.7), n_tried=1, **(FEW | {"window": 10.0}))),
+    "league": lambda: conduct(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
     "ablate": lambda: conduct(Ablation({"ldvs": {"ldvs": hexmj.LDVS, "b": hexmj.HWS}}, [0.5, 0.7], **FEW)),
     "search": searched,
 }
@@ -99,7 +100,9 @@ def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
         columns, rows = ([text.get_text() for text in one] for one in labels)
         for text in axes.texts:
             x, y = map(int, text.get_position())
-            found.append((axes.get_title(), rows[y], columns[x], text.get_text(), str(image.get_array()[y, x])))
+            found.append(
+                (axes.get_title(), rows[y], columns[x], text.get_text(), str(np.asarray(image.get_array())[y, x]))
+            )
     return sorted(found)
 
 
@@ -146,13 +149,15 @@ def test_the_mean_of_variants_is_that_of_those_shown():
     result = made("variants").isel(network=[0], velocity=[0])
     for one in (result, result.isel(variant=[0, 1])):
         *_, mean = (line for line in hexmj.plot(one).axes[0].lines if line.get_marker() == "|")
-        assert mean.get_xdata()[0] == pytest.approx(one.flss.mean().item())
+        assert np.asarray(mean.get_xdata())[0] == pytest.approx(one.flss.mean().item())
     assert result.flss.mean().item() == pytest.approx(result["mean"].item())
 
 
 def test_candidates_stand_at_their_evaluation():
     def drawn(history: xr.Dataset) -> list[list[tuple[float, float]]]:
-        return [[*zip(*line.get_data(), strict=True)] for line in hexmj.plot(history).axes[0].lines]
+        return [
+            [*zip(*np.asarray(line.get_data()).tolist(), strict=True)] for line in hexmj.plot(history).axes[0].lines
+        ]
 
     history = made("search")
     assert drawn(history)[:2] == [[(1, 0.9), (2, 0.5), (3, 0.7)], [(1, 0.9), (2, 0.5), (3, 0.5)]]
@@ -165,4 +170,4 @@ def test_each_group_of_an_ablation_is_set_off_however_its_rows_are_sorted():
     model, other = {"ldvs": hexmj.LDVS, "a": hexmj.HWS, "b": hexmj.HWS}, {"hws": hexmj.HWS}
     result = conduct(Ablation({"ldvs": model, "hws": other}, [0.5], **FEW))
     for one, row in ((result, 2.5), (result.isel(controller=slice(None, None, -1)), 0.5)):
-        assert [line.get_ydata()[0] for line in hexmj.plot(one).axes[0].lines] == [row]
+        assert [np.asarray(line.get_ydata())[0] for line in hexmj.plot(one).axes[0].lines] == [row]

@@ -20,7 +20,7 @@ def check_starts(result: "xr.Dataset", told: int | None = None) -> None:
         InputError: it holds fewer, or more.
     """
     given = settings(result)
-    check_whole(result, "start", told or given.get("starts", given.get("n_starts")))
+    check_whole(result, "start", told or given.get("starts") or given["n_starts"])
 
 
 def check_whole(result: "xr.Dataset", axis: str, size: int) -> None:
