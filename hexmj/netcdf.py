@@ -3,18 +3,27 @@
 import io
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hexmj.errors import InputError
+from hexmj.literal import literal
 
 if TYPE_CHECKING:
     import xarray as xr
 
-READ_OTHERWISE = {"scale_factor", "add_offset", "missing_value", "_FillValue"}
-"""Attributes by which readers of NetCDF change numbers."""
+TAKEN = {"coordinates"}
+"""Attributes of the whole that readers of NetCDF take for orders, and away."""
+
+TAKEN_OF_VARIABLES = TAKEN | {
+    *("scale_factor", "add_offset", "missing_value", "_FillValue"),
+    *("_Unsigned", "_Encoding", "dtype"),
+}
+"""The same of a variable; by most of them other numbers are read."""
 
 _ENCODING = Lock()
 """Held while Dask's settings are other ones."""
@@ -27,18 +36,61 @@ def encode(data: "xr.Dataset") -> bytes:
         InputError: something that NetCDF cannot hold.
     """
     plain = data.drop_encoding()
+    _check_attributes("the dataset", plain.attrs, TAKEN)
     for name, variable in plain.variables.items():
         texts = variable.dtype != object or all(isinstance(one, str) for one in variable.values.flat)
         if variable.dtype.kind in "mM" or not texts:
             raise InputError(f"NetCDF cannot hold this: {name} is {variable.dtype}; expected arrays, numbers and texts")
-        if odd := READ_OTHERWISE & {*variable.attrs}:
-            raise InputError(f"NetCDF would give other numbers: {name} has the attribute {min(odd)}; expected none")
+        if name in plain.coords and name not in plain.dims and " " in str(name):
+            raise InputError(
+                f"NetCDF cannot hold this: the coordinate {name!r:.80} has a space in its name; expected none"
+            )
+        _check_attributes(str(name), variable.attrs, TAKEN_OF_VARIABLES)
         variable.encoding["_FillValue"] = None
     try:
         with _no_lock_of_dask():
             return bytes(plain.to_netcdf(engine="h5netcdf"))
-    except (TypeError, ValueError, OverflowError, NotImplementedError) as error:
-        raise InputError(f"NetCDF cannot hold this: {error}; expected arrays, numbers and texts") from None
+    except (TypeError, ValueError, OverflowError, NotImplementedError, AttributeError) as error:
+        raise InputError(
+            f"NetCDF cannot hold this: {literal(str(error))}; expected arrays, numbers and texts"
+        ) from None
+
+
+def _check_attributes(of: str, attributes: Mapping[Any, Any], taken: set[str]) -> None:
+    """Refuse attributes that would not be read as they are.
+
+    Args:
+        of: whose they are.
+        attributes: by name.
+        taken: names that are not read as attributes.
+
+    Raises:
+        InputError: with the name of the first one.
+    """
+    for name, value in attributes.items():
+        if name in taken:
+            raise InputError(f"NetCDF would be read otherwise: {of} has the attribute {name}; expected none")
+        if not (_is_text(name) and (_is_text(value) or _are_texts(value) or _are_numbers(value))):
+            told = f"{of} has the attribute {literal(f'{name} = {value!r}'):.80}"
+            raise InputError(f"NetCDF cannot hold this: {told}; expected a text, a number, or a row of several")
+
+
+def _is_text(value: Any) -> bool:
+    return type(value) is str and "\0" not in value and value == value.encode(errors="replace").decode()
+
+
+def _are_texts(value: Any) -> bool:
+    """Whether it is a row of texts; of one alone the text would be read."""
+    return isinstance(value, list | tuple) and len(value) != 1 and all(map(_is_text, value))
+
+
+def _are_numbers(value: Any) -> bool:
+    """Whether it is a number or a row of numbers; of one alone the number would be read."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return False
+    return array.dtype.kind in "iufc" and (array.ndim == 0 or (array.ndim == 1 and array.size != 1))
 
 
 @contextmanager

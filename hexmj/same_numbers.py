@@ -14,7 +14,10 @@ from hexmj.errors import InputError
 from hexmj.files import opened, read_text, read_toml, unsealed
 
 ATTRIBUTES = "(attributes)"
-"""Stands for all attributes of a NetCDF file."""
+"""Stands for all attributes of a NetCDF file and of its variables."""
+
+STRUCTURE = "(structure)"
+"""Stands for the keys and lists of a JSON or TOML file, whatever they hold."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +91,12 @@ def _distance(a: Any, b: Any) -> float:
 
 
 def _of_netcdf(path: Path) -> dict[str, np.ndarray]:
-    """Variables, and the attributes as one; with the seal or without it, since a number may have been changed."""
+    """Variables, and all attributes as one; with the seal or without it, since a number may have been changed."""
     with opened(path) as file:
         content = file.read()
     data = netcdf.decode(unsealed(content) or content, f"{path} cannot be read as NetCDF")
-    attributes = [f"{key} = {value!r}" for key, value in sorted(data.attrs.items())]
+    owners = {"": data} | {f"{name}: ": one for name, one in sorted(data.variables.items())}
+    attributes = [f"{of}{key} = {value!r}" for of, one in owners.items() for key, value in sorted(one.attrs.items())]
     found = {str(name): one.values for name, one in data.variables.items()}
     texts = {name: one.astype(object) for name, one in found.items() if one.dtype.kind not in "biuf"}
     return found | texts | {ATTRIBUTES: np.array(attributes, dtype=object)}
@@ -110,11 +114,19 @@ def _of_toml(path: Path) -> dict[str, np.ndarray]:
 
 
 def _gathered(table: Any) -> dict[str, np.ndarray]:
-    """Values of nested dictionaries and lists by the keys that lead to them."""
+    """Values of nested dictionaries and lists by the keys that lead to them, and how they are nested as one text."""
     found: dict[str, list[Any]] = {}
     for keys, value in _leaves(table):
         found.setdefault(".".join(keys), []).append(value)
+    found[STRUCTURE] = [json.dumps(_structure(table), sort_keys=True)]
     return {name: np.array(values, dtype=object) for name, values in found.items()}
+
+
+def _structure(value: Any) -> Any:
+    """The same without what dictionaries and lists hold in the end."""
+    if isinstance(value, dict):
+        return {key: _structure(one) for key, one in value.items()}
+    return [_structure(one) for one in value] if isinstance(value, list) else None
 
 
 def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:

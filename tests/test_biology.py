@@ -97,6 +97,13 @@ def test_quantities_agree_with_each_other_and_with_the_plan(walking):
         assert heights == sorted(heights, reverse=True)
 
 
+def test_heights_do_not_hang_on_the_order_in_which_a_legs_parts_are_named(walking):
+    strides, told = walking
+    legs = tuple(replace(leg, parts=leg.parts[::-1]) for leg in STICK_INSECT.legs)
+    other = settle(draw_starts(1, 0), Conditions(body=replace(STICK_INSECT, legs=legs))).compiled
+    assert quantities(strides[0], other) == told[0]
+
+
 def test_a_hop_is_no_swing():
     standing = np.ones(100, dtype=bool)
     standing[10:12] = standing[40:60] = standing[90:] = False

@@ -36,8 +36,8 @@ def odd(what: str) -> object:
         ("nothing", "what odd gives = None; expected a Dataset"),
         ("times", "NetCDF cannot hold this: a is timedelta64[ns]; expected arrays, numbers and texts"),
         ("holes", "NetCDF cannot hold this: a is object; expected arrays, numbers and texts"),
-        ("scaled", "NetCDF would give other numbers: a has the attribute scale_factor; expected none"),
-        ("filled", "NetCDF would give other numbers: a has the attribute _FillValue; expected none"),
+        ("scaled", "NetCDF would be read otherwise: a has the attribute scale_factor; expected none"),
+        ("filled", "NetCDF would be read otherwise: a has the attribute _FillValue; expected none"),
         ("levels", "NetCDF cannot hold this: "),
     ],
 )

@@ -104,7 +104,7 @@ def test_a_number_that_was_changed_is_found_and_named(run, flss):
     assert code == 1
     assert "high 1 1 differ, by at most 1e-09" in told
     assert "low 1 equal" in told
-    assert "1 of 15 values differ; what else differs, and may be why: changed since they were written (flss.nc)" in told
+    assert "1 of 27 values differ; what else differs, and may be why: changed since they were written (flss.nc)" in told
     code, text, _ = run("rerun", flss / "manifest.json", "--json")
     answer = json.loads(text)
     (result,) = answer["results"]
@@ -289,9 +289,42 @@ def test_json_and_toml_are_compared_by_their_keys(tmp_path):
         Compared("claims.key", 2, 0, None),
         Compared("claims.value", 2, 2, np.inf),
         Compared("n", 1, 1, 0.0),
+        Compared("(structure)", 1, 0, None),
     ]
     (tmp_path / "old.toml").write_text("[weights]\na = 0.1\nb = [1, 2]\n")
     (tmp_path / "new.toml").write_text("[weights]\na = 0.10000000000000002\nb = [1]\n")
-    a, b = compared(tmp_path / "old.toml", tmp_path / "new.toml")
+    a, b, structure = compared(tmp_path / "old.toml", tmp_path / "new.toml")
     assert (a.differ, a.most) == (1, pytest.approx(1.4e-17, rel=0.1))
     assert (b.differ, b.misfit) == (2, "shape (2,) then, (1,) now")
+    assert structure == Compared("(structure)", 1, 1, None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('{"a": []}', "{}"),
+        ("[[1, 2], [3]]", "[[1], [2, 3]]"),
+        ('{"a.b": 1}', '{"a": {"b": 1}}'),
+        ('[{"a": 1}, {}]', '[{}, {"a": 1}]'),
+    ],
+)
+def test_what_is_nested_otherwise_is_not_equal(tmp_path, old, new):
+    paths = tmp_path / "old.json", tmp_path / "new.json"
+    for path, text in zip(paths, (old, new), strict=True):
+        path.write_text(text)
+    assert [one.name for one in compared(*paths) if one.differ] == ["(structure)"]
+
+
+def test_the_order_of_keys_counts_for_nothing(tmp_path):
+    (tmp_path / "old.json").write_text('{"a": 1, "b": {"c": 2, "d": 3}}')
+    (tmp_path / "new.json").write_text('{"b": {"d": 3, "c": 2}, "a": 1}')
+    assert not any(one.differ for one in compared(tmp_path / "old.json", tmp_path / "new.json"))
+
+
+def test_a_variable_in_another_unit_is_not_equal(tmp_path):
+    for name, units in (("old", "1"), ("new", "%")):
+        save_dataset(xr.Dataset({"x": ("i", [1.0], {"units": units})}), tmp_path / f"{name}.nc")
+    assert compared(tmp_path / "old.nc", tmp_path / "new.nc") == [
+        Compared("x", 1, 0, None),
+        Compared("(attributes)", 1, 1, None),
+    ]

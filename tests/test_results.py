@@ -4,9 +4,11 @@ import io
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.text import Text
@@ -218,6 +220,55 @@ def test_what_belongs_to_no_figure_is_refused_in_a_sentence(tmp_path: Path):
     saved.write_bytes(saved.read_bytes()[:-200])
     with pytest.raises(InputError, match=r"cut\.nc is damaged"):
         hexmj.load(saved)
+
+
+def small(**attributes: Any) -> xr.Dataset:
+    """A variable with these attributes, beside a coordinate."""
+    return xr.Dataset({"x": ("i", np.array([-1, 2], dtype=np.int8), attributes)}, {"c": ("i", [1.0, 2.0])})
+
+
+@pytest.mark.parametrize(
+    "value", ["", "ß\n", 1, -(2**63), 1.5, np.nan, np.int8(3), [1, 2], (1.5, 2), np.arange(3), ["a", "b"], []]
+)
+def test_what_netcdf_can_hold_comes_back(value: Any, tmp_path: Path):
+    for data in (small(told=value), small().assign_attrs(told=value)):
+        read = hexmj.load(hexmj.save(data, tmp_path / "a.nc"))
+        assert read.identical(data)
+        np.testing.assert_array_equal({**read.attrs, **read.x.attrs}["told"], value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *(True, np.True_, [True, False], None, {"a": 1}, {1}, b"a", "a\0", "\ud800", np.str_("a"), 2**70, object()),
+        *([1], ["a"], [1, "a"], [None], ["a\0", "b"], [[1], [2, 3]], np.eye(2)),
+        *(datetime(2000, 1, 1), np.datetime64("2000"), np.timedelta64(1, "s")),
+    ],
+)
+def test_an_attribute_that_would_not_come_back_is_named(value: Any, tmp_path: Path):
+    for data, of in ((small(told=value), "x"), (small().assign_attrs(told=value), "the dataset")):
+        with pytest.raises(
+            InputError, match=f"^NetCDF cannot hold this: {of} has the attribute told = .*; expected a text"
+        ):
+            hexmj.save(data, tmp_path / "a.nc")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_orders_to_readers_of_netcdf_are_no_attributes(tmp_path: Path):
+    orders = {"_Unsigned": "true", "dtype": "bool", "coordinates": "c", "_Encoding": "utf-8", "scale_factor": 2.0}
+    for name, value in orders.items():
+        with pytest.raises(
+            InputError, match=f"^NetCDF would be read otherwise: x has the attribute {name}; expected none"
+        ):
+            hexmj.save(small(**{name: value}), tmp_path / "a.nc")
+    with pytest.raises(InputError, match="the dataset has the attribute coordinates; expected none"):
+        hexmj.save(small().assign_attrs(coordinates="c"), tmp_path / "a.nc")
+    with pytest.raises(InputError, match="cannot write attribute with reserved name 'CLASS'"):
+        hexmj.save(small(CLASS="c"), tmp_path / "a.nc")
+    with pytest.raises(InputError, match=r"^[ -~]+$"):
+        hexmj.save(small(told=xr.DataArray(1)), tmp_path / "a.nc")
+    with pytest.raises(InputError, match="the coordinate 'my c' has a space in its name; expected none"):
+        hexmj.save(small().rename(c="my c"), tmp_path / "a.nc")
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import numpy as np
 from hexmj.attributes import settings
 from hexmj.literal import in_figure
 from hexmj.measures.captions import caption, conditions
+from hexmj.measures.parts import check_starts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +38,7 @@ def comparison_figure(result: "xr.Dataset") -> "Picture":
     """FLSS against velocity with 95 % intervals, a panel for each controller, from `compare.compare`."""
     from hexmj.pictures import head, picture
 
+    check_starts(result)
     names = result.controller.values
     columns = min(IN_A_ROW, len(names))
     rows = -(-len(names) // columns)
@@ -68,6 +70,7 @@ def flss_figure(table: "xr.Dataset") -> "Picture":
     """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.flss` or `compare.physical_flss`."""
     from hexmj.pictures import head, picture
 
+    check_starts(table)
     figure, told = picture(6.4, 4.2), settings(table)
     kind = "physical" if conditions(told) else "kinematic"
     axes = figure.subplots()

@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hexmj.literal import in_figure
 
 if TYPE_CHECKING:
@@ -23,7 +21,8 @@ def convergence_figure(history: "xr.Dataset") -> "Picture":
 
     figure = picture(6.8, 4.2)
     axes = figure.subplots()
-    evaluation = np.arange(1, history.sizes["evaluation"] + 1)
+    history = history.sortby("evaluation")
+    evaluation = history.evaluation.values + 1
     for number, (stage, colour) in enumerate(STAGE_COLOURS.items()):
         here = history.stage.values == number
         if here.any():

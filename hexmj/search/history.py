@@ -22,7 +22,7 @@ class History:
         self._asked.append((stage, candidates.copy(), costs.copy()))
 
     def dataset(self, names: Sequence[str], minimised: str) -> "xr.Dataset":
-        """Over `evaluation`: stage, candidate, cost, and the best cost so far, which begins anew with each stage.
+        """Over `evaluation`, counted from 0: stage, candidate, cost, the best so far, begun anew with each stage.
 
         Args:
             names: of the parameters.
@@ -44,6 +44,6 @@ class History:
                 "cost": ("evaluation", cost, {"units": "1", "long_name": minimised}),
                 "best": ("evaluation", best, {"units": "1", "long_name": f"least so far of the stage: {minimised}"}),
             },
-            coords={"parameter": list(names)},
+            coords={"evaluation": np.arange(len(cost)), "parameter": list(names)},
             attrs={"study": "search", "title": minimised},
         )

@@ -29,7 +29,7 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
     panels, used = figure.subplots(1, len(MEASURES), sharey=True), set[str]()
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
-        one = result.sel(measure=measure)
+        one = result.sel(measure=measure).transpose("controller", "velocity", ...)
         shown = np.where(wholes[:, None], np.nan, one.more.values)
         panel.imshow(shown, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
         for row, column in np.ndindex(shown.shape):
@@ -43,8 +43,8 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
         panel.set_xlabel("velocity $V_r / V_p$", fontsize=9)
         panel.tick_params(length=0)
         panel.spines[:].set_visible(False)
-        for row in np.flatnonzero(wholes)[1:]:
-            panel.axhline(row - 0.5, color="0.3", linewidth=0.8)
+        for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
+            panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
     counts = f"{result.attrs['n_starts']} starts, {result.attrs['n_physical']} in physics, {REGIMES} for the limit"
     heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.measures.captions import caption
+from hexmj.measures.parts import check_starts
 from hexmj.studies.biology.animals import ANIMALS
 from hexmj.studies.biology.names import JOINTS, SEGMENTS
 from hexmj.studies.drawing import tidy
@@ -38,6 +39,7 @@ def biology_figure(result: "xr.Dataset") -> "Picture":
     """Two panels over the pairs of legs, means of a stride and of its stance; four over speed; from `Biology`."""
     from hexmj.pictures import head, picture
 
+    check_starts(result)
     figure = picture(11.0, 6.4)
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):

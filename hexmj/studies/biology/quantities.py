@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.reading import posed
+from hexmj.bodies.reading import joint_numbers, posed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
@@ -170,9 +170,9 @@ def _ahead(strides: Strides) -> np.ndarray:
 
 
 def _coxae(compiled: CompiledBody) -> np.ndarray:
-    """Where the legs' first parts begin in the root frame, (leg, 3) [mm]."""
-    data = posed(compiled.model, compiled.home)
-    return np.array([data.body(leg.parts[0]).xpos for leg in compiled.body.legs])
+    """Where the parts that the legs' first joints move begin in the root frame, (leg, 3) [mm]."""
+    first = joint_numbers(compiled.model, compiled.body)[:, 0]
+    return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]
 
 
 def _seen(values: np.ndarray, window: float) -> np.ndarray:

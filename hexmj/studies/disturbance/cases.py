@@ -16,6 +16,9 @@ the velocity; feet that hold on to the ground, throughout the walk."""
 
 Strategy = Literal["none"] | Answer
 
+NO_DISTURBANCE = "undisturbed"
+"""Name of the case in which nothing happens."""
+
 PHYSICAL = ("push", "grasp")
 """Disturbances and strategies of which a plan knows nothing."""
 
@@ -35,7 +38,7 @@ class Case:
     @property
     def disturbance(self) -> str:
         """Its name: undisturbed, halt, leg, push 20."""
-        return self.kind if self.kind != "push" else f"push {self.impulse:.15g}" if self.impulse else "undisturbed"
+        return self.kind if self.kind != "push" else f"push {self.impulse:.15g}" if self.impulse else NO_DISTURBANCE
 
 
 def every_case(

@@ -6,6 +6,8 @@ import numpy as np
 
 from hexmj.measures.captions import caption
 from hexmj.measures.figures import velocity_ticks
+from hexmj.measures.parts import check_starts
+from hexmj.studies.disturbance.cases import NO_DISTURBANCE
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
@@ -34,8 +36,9 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
 
     from hexmj.pictures import head, picture
 
+    check_starts(result)
     names, strategies = result.disturbance.values, result.strategy.values
-    kinds = list(dict.fromkeys(names[1:]))
+    kinds, undisturbed = list(dict.fromkeys(names[names != NO_DISTURBANCE])), names == NO_DISTURBANCE
     measures = [measure for measure in ROWS if measure in result]
     figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
@@ -48,7 +51,8 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
             axes.axis("off")
             axes.text(0.5, 0.5, "a plan knows nothing\nof a push", transform=axes.transAxes, ha="center", color="0.4")
             continue
-        axes.plot(one.velocity, one[measure].isel(case=0), **UNDISTURBED, zorder=5)
+        for case in np.flatnonzero(undisturbed):
+            axes.plot(one.velocity, one[measure].isel(case=case), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
             strategy = strategies[case]
             x = one.velocity + shifts[strategy]
@@ -63,7 +67,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
     for row, measure in enumerate(measures):
         panels[row, 0].set_ylabel(f"FLSS {ROWS[measure]}")
     entries = [Line2D([], [], markersize=4, label=one.replace("_", " "), **STYLES[one]) for one in used]
-    entries.append(Line2D([], [], **UNDISTURBED, label="undisturbed"))
+    entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
     head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption(result))
     return figure

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexmj.attributes import settings
 from hexmj.measures.captions import rules
+from hexmj.measures.parts import check_whole
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:
@@ -54,10 +55,15 @@ def league_markdown(result: "xr.Dataset") -> str:
 
 
 def by_rank(result: "xr.Dataset") -> "xr.Dataset":
-    """The entrants from best to worst in physics, then on paper; those from ideal starts last."""
+    """The entrants from best to worst in physics, then on paper; those from ideal starts last.
+
+    Raises:
+        InputError: a part of the velocities, over which the ranks are.
+    """
+    check_whole(result, "velocity", len(settings(result)["velocities"]))
     falls, losses = (result[measure].mean("velocity").values for measure in ("physical", "kinematic"))
     unranked = result.best.sel(measure="physical").values == 0
-    return result.isel(entrant=np.lexsort((losses, falls, unranked)))
+    return result.isel(entrant=np.lexsort((losses, falls, unranked))).transpose("entrant", ...)
 
 
 def frequency(one: "xr.Dataset", name: str) -> str:

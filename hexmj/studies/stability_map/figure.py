@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption
+from hexmj.measures.parts import check_starts
 from hexmj.studies.stability_map.mechanisms import SAVED
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def map_figure(result: "xr.Dataset") -> "Picture":
     """Physical FLSS above the kinematic one, and how many static losses dynamics saves, from `StabilityMap`."""
     from hexmj.pictures import head, picture
 
+    result = _drawn(result)
     rows, columns = result.sizes["value"], result.sizes["velocity"]
     figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
     physical, saved = figure.subplots(1, 2, sharey=True)
@@ -52,13 +54,13 @@ def map_figure(result: "xr.Dataset") -> "Picture":
         for row, numbers_of_row in zip(words[1:], result.froude.values, strict=True):
             row[:] = [f"{word}\nFr {number:.2g}" for word, number in zip(row, numbers_of_row, strict=True)]
     _heat(physical, numbers, words, "YlOrRd")
-    lost = np.isfinite(result.static_loss.transpose("value", "velocity", "start").values).sum(axis=-1)
+    lost = np.isfinite(result.static_loss.values).sum(axis=-1)
     counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
     words = [
         [f"{a} of {b}" if b else "none lost" for a, b in zip(*row, strict=True)]
         for row in zip(counts, lost, strict=True)
     ]
-    lost_on_paper = np.isfinite(result.planned_loss.isel(value=0).transpose("velocity", "start").values).sum(axis=-1)
+    lost_on_paper = np.isfinite(result.planned_loss.isel(value=0).values).sum(axis=-1)
     words = [[f"{n} lost" for n in lost_on_paper], *words]
     _heat(saved, np.concatenate([np.full((1, columns), np.nan), result.saved.values]), words, "YlGn")
     physical.set_yticks(range(rows + 1), ["on paper", *(f"{value:g}" for value in result.value.values)])
@@ -77,6 +79,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Picture":
     """What happened to every start, a panel for each velocity, from `StabilityMap`."""
     from hexmj.pictures import head, picture
 
+    result = _drawn(result)
     columns, total = result.sizes["velocity"], result.sizes["start"]
     figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
     panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
@@ -98,6 +101,13 @@ def mechanisms_figure(result: "xr.Dataset") -> "Picture":
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
     head(figure, "What happened to every start", caption(result))
     return figure
+
+
+def _drawn(result: "xr.Dataset") -> "xr.Dataset":
+    """The axes in their order, if all starts are there that were counted."""
+    counted = result["count"].sel(mechanism_name=list(MECHANISM_COLOURS)).sum("mechanism_name")
+    check_starts(result, counted.max().item())
+    return result.transpose("value", "velocity", "start", ...)
 
 
 def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:

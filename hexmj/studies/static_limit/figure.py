@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from hexmj.measures.captions import caption
 from hexmj.measures.figures import MEASURE_COLOURS
+from hexmj.measures.parts import check_starts
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
 
     from hexmj.pictures import head, picture
 
+    check_starts(result)
     figure = picture(9.6, 7.0)
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
     lines: dict[float, Any] = dict(zip(result.leg_mass.values, LINES * len(result.leg_mass), strict=False))
@@ -62,7 +64,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
         _frequencies(axes["flss"], one, line, first)
         for panel, (_, curves) in PANELS.items():
             for name, (colour, label) in curves.items():
-                values = one[name].mean("start") if "start" in one[name].dims else one[name]
+                values = one[name] if panel == "agreement" else one[name].mean("start")
                 style = {"color": colour, "marker": MARKERS.get(label, "o"), "markersize": 4.5, "linewidth": 1.6}
                 axes[panel].plot(one.vp, values, linestyle=line, label=label if first and label else None, **style)
     axes["flss"].set(ylabel="FLSS", ylim=(-0.02, 1.02))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption
+from hexmj.measures.parts import check_starts
 from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ SIZES = {
 }
 """Kind of ground -> label of its axis."""
 
+FLAT = "flat"
+"""Ground that stands in every column."""
+
 STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
     {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
@@ -35,13 +39,14 @@ def terrain_figure(result: "xr.Dataset") -> "Picture":
     """A column for each kind of ground, a row for each grasp, a colour for each velocity; flat ground is at 0 mm."""
     from hexmj.pictures import head, picture
 
-    kinds, grasps = list(dict.fromkeys(result.ground.values[1:])), result.grasp.values
+    check_starts(result)
+    kinds, grasps = list(dict.fromkeys(result.ground.values[result.ground.values != FLAT])), result.grasp.values
     size = (max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
     figure = picture(*size)
     panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
     for row, grasp in zip(panels, grasps, strict=True):
         for axes, kind in zip(row, kinds, strict=True):
-            chosen = np.isin(result.ground.values, ("flat", kind))
+            chosen = np.isin(result.ground.values, (FLAT, kind))
             _curves(axes, result.sel(grasp=grasp).isel(obstacle=np.flatnonzero(chosen)).sortby("size"))
         row[0].set_ylabel(f"FLSS, grasp {grasp:g}")
     for axes, kind in zip(panels[-1], kinds, strict=True):

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.literal import in_figure
 from hexmj.measures.captions import caption
+from hexmj.measures.parts import check_starts
 from hexmj.studies.drawing import tidy
 from hexmj.studies.variants.study import notes
 
@@ -32,6 +33,7 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
 
     from hexmj.pictures import head, picture
 
+    check_starts(result)
     columns = min(2, result.sizes["velocity"])
     rows = -(-result.sizes["velocity"] // columns)
     size = 1.4 + 4.6 * columns, 1.5 + rows * (0.9 + 0.36 * result.sizes["network"])
@@ -47,9 +49,8 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
     marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
     handles = [Line2D([], [], color="0.1", label=name, **dots | mark) for name, mark in marks.items()] + handles
     figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
-    head(
-        figure, "FLSS with one constant or rule changed at a time", f"{result.sizes['start']} starts; {caption(result)}"
-    )
+    told = f"{result.attrs['n_starts']} starts; {caption(result)}"
+    head(figure, "FLSS with one constant or rule changed at a time", told)
     figure.supxlabel("\n".join(map(in_figure, notes(result))), fontsize=9)
     return figure
 
@@ -66,9 +67,9 @@ def _panel(axes: "Axes", one: "xr.Dataset") -> None:
             if variant != "usual":
                 style = {"marker": "o", "color": colour, "markeredgecolor": "white", "markersize": 7, "alpha": 0.9}
             axes.plot(here.flss.sel(variant=variant), row, **style)
-        axes.plot(here["mean"], row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
+        axes.plot(here.flss.mean(), row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
     tidy(axes)
     axes.grid(visible=False, axis="y")
-    axes.set(xlim=(0.0, min(1.02, 1.05 * one.worst.max().item() + 1e-3)), xlabel="FLSS")
+    axes.set(xlim=(0.0, min(1.02, 1.05 * one.flss.max().item() + 1e-3)), xlabel="FLSS")
     axes.set_yticks(range(len(names)), [in_figure(name) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)

@@ -1,0 +1,173 @@
+"""A part of a result, or one in another order, is drawn with the same numbers in the right places, or refused."""
+
+import io
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.lines import Line2D
+
+import hexmj
+from hexmj.errors import InputError
+from hexmj.plots import FIGURES
+from hexmj.search.history import History
+from hexmj.studies.ablation.study import Ablation
+from hexmj.studies.biology.study import Biology
+from hexmj.studies.disturbance.cases import NO_DISTURBANCE
+from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.league.entrants import entrants
+from hexmj.studies.league.study import League
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.studies.terrain.study import Terrain
+from hexmj.studies.variants.study import Variants
+from hexmj.sweeps import conduct
+
+PHYSICAL: dict[str, Any] = {"n_starts": 3, "window": 20.0}
+ON_PAPER: dict[str, Any] = {"n_starts": 20, "window": 20.0, "physical": False, "strategies": ["reorganise"]}
+FEW: dict[str, Any] = {"n_starts": 3, "n_physical": 2, "periods": 12}
+SHORT: dict[str, Any] = FEW | {"n_tried": 1, "window": 10.0}
+TWO = {"ldvs": [hexmj.LDVS] * 2, "hws": [hexmj.HWS] * 2}
+
+
+def searched() -> xr.Dataset:
+    history = History()
+    for stage, costs in (("population", [0.9, 0.5, 0.7]), ("simplex", [0.6, 0.4, 0.5])):
+        history.add(stage, np.zeros((3, 1)), np.array(costs))
+    return history.dataset(["a"], "FLSS")
+
+
+MADE: dict[str, Callable[[], xr.Dataset]] = {
+    "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], n_starts=3, window=20.0),
+    "compare": lambda: hexmj.compare({"a": hexmj.LDVS, "b": hexmj.HWS}, [0.5, 0.7], n_starts=3, window=20.0),
+    "map": lambda: conduct(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
+    "converge": lambda: conduct(StaticLimit(hexmj.LDVS, vps=[320.0, 160.0], **PHYSICAL)),
+    "terrain": lambda: conduct(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
+    "disturb": lambda: conduct(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **ON_PAPER)),
+    "variants": lambda: conduct(Variants(TWO, [0.5, 0.7], n_starts=20, window="start")),
+    "biology": lambda: conduct(Biology(hexmj.LDVS, 4, n_starts=2)),
+    "league": lambda: conduct(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
+    "ablate": lambda: conduct(Ablation({"ldvs": {"ldvs": hexmj.LDVS, "b": hexmj.HWS}}, [0.5, 0.7], **FEW)),
+    "search": searched,
+}
+
+
+@cache
+def made(name: str) -> xr.Dataset:
+    return MADE[name]()
+
+
+def pixels(result: xr.Dataset, which: str) -> bytes:
+    drawn = io.BytesIO()
+    hexmj.plot(result, which).savefig(drawn, format="rgba", dpi=50)
+    return drawn.getvalue()
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_the_order_of_the_axes_changes_nothing(name: str):
+    result = made(name)
+    for which in FIGURES[name]:
+        whole = pixels(result, which)
+        assert pixels(result.transpose(*[*result.sizes][::-1]), which) == whole
+        if "start" in result.dims:
+            assert pixels(result.isel(start=slice(None, None, -1)), which) == whole
+
+
+@pytest.mark.parametrize("name", ["flss", "compare", "map", "converge", "terrain", "disturb", "variants", "biology"])
+def test_numbers_of_all_starts_are_not_drawn_of_a_part_of_them(name: str):
+    result = made(name)
+    part = result.isel(start=[0])
+    for which in FIGURES[name]:
+        with pytest.raises(InputError, match=rf"^1 of {result.sizes['start']} along the axis start; expected all"):
+            hexmj.plot(part, which)
+
+
+def test_ranks_over_all_velocities_are_not_drawn_of_a_part_of_them():
+    for which in FIGURES["league"]:
+        with pytest.raises(InputError, match=r"^1 of 2 along the axis velocity; expected all"):
+            hexmj.plot(made("league").isel(velocity=[1]), which)
+
+
+def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
+    """Title, row and column of each cell of a map's panels, and what it says in words and as a colour."""
+    found, figure = [], hexmj.plot(result)
+    for axes in figure.axes:
+        (image,) = axes.images
+        labels = axes.get_xticklabels(), figure.axes[0].get_yticklabels()
+        columns, rows = ([text.get_text() for text in one] for one in labels)
+        for text in axes.texts:
+            x, y = map(int, text.get_position())
+            found.append(
+                (axes.get_title(), rows[y], columns[x], text.get_text(), str(np.asarray(image.get_array())[y, x]))
+            )
+    return sorted(found)
+
+
+def test_every_number_of_a_map_stands_in_its_cell():
+    result = made("map")
+    whole = cells(result)
+    assert {words for *_, words in whole} - {"0.0", "nan"}
+    backwards = {"value": slice(None, None, -1), "velocity": slice(None, None, -1)}
+    for other in (
+        result.transpose("velocity", "value", ...),
+        result.isel(backwards),
+        result.sortby("value", ascending=False),
+    ):
+        assert cells(other) == whole
+    assert set(cells(result.isel(velocity=[1]))) < set(whole)
+
+
+def undisturbed(figure: Any) -> list[Line2D]:
+    return [line for axes in figure.axes for line in axes.lines if line.get_linestyle() == ":"]
+
+
+def test_only_the_undisturbed_case_is_drawn_as_such():
+    result = made("disturb")
+    whole = hexmj.plot(result)
+    expected = result.kinematic.sel(window="whole").isel(case=0).values
+    for one in (whole, hexmj.plot(result.isel(case=slice(None, None, -1)))):
+        assert len(undisturbed(one)) == 2
+        assert all(np.array_equal(line.get_ydata(), expected) for line in undisturbed(one))
+        assert sorted(axes.get_title() for axes in one.axes) == ["body halted", "one leg stopped"]
+    assert {NO_DISTURBANCE} < {text.get_text() for text in whole.legends[0].get_texts()}
+    part = hexmj.plot(result.isel(case=result.disturbance.values == "halt"))
+    assert not undisturbed(part)
+    assert [axes.get_title() for axes in part.axes] == ["body halted"]
+    assert NO_DISTURBANCE not in {text.get_text() for text in part.legends[0].get_texts()}
+
+
+def test_obstacles_without_flat_ground_have_a_column_each():
+    result = made("terrain")
+    part = hexmj.plot(result.isel(obstacle=result.ground.values != "flat"))
+    assert [axes.get_xlabel() for axes in part.axes] == ["height of the step [mm]", "height of the hurdle [mm]"]
+
+
+def test_the_mean_of_variants_is_that_of_those_shown():
+    result = made("variants").isel(network=[0], velocity=[0])
+    for one in (result, result.isel(variant=[0, 1])):
+        *_, mean = (line for line in hexmj.plot(one).axes[0].lines if line.get_marker() == "|")
+        assert np.asarray(mean.get_xdata())[0] == pytest.approx(one.flss.mean().item())
+    assert result.flss.mean().item() == pytest.approx(result["mean"].item())
+
+
+def test_candidates_stand_at_their_evaluation():
+    def drawn(history: xr.Dataset) -> list[list[tuple[float, float]]]:
+        return [
+            [*zip(*np.asarray(line.get_data()).tolist(), strict=True)] for line in hexmj.plot(history).axes[0].lines
+        ]
+
+    history = made("search")
+    assert drawn(history)[:2] == [[(1, 0.9), (2, 0.5), (3, 0.7)], [(1, 0.9), (2, 0.5), (3, 0.5)]]
+    assert drawn(history.sortby("cost")) == drawn(history)
+    assert drawn(history.drop_vars("evaluation")) == drawn(history)
+    assert drawn(history.isel(evaluation=slice(4, None))) == [[(5, 0.4), (6, 0.5)], [(5, 0.4), (6, 0.4)]]
+
+
+def test_each_group_of_an_ablation_is_set_off_however_its_rows_are_sorted():
+    model, other = {"ldvs": hexmj.LDVS, "a": hexmj.HWS, "b": hexmj.HWS}, {"hws": hexmj.HWS}
+    result = conduct(Ablation({"ldvs": model, "hws": other}, [0.5], **FEW))
+    for one, row in ((result, 2.5), (result.isel(controller=slice(None, None, -1)), 0.5)):
+        assert [np.asarray(line.get_ydata())[0] for line in hexmj.plot(one).axes[0].lines] == [row]
