@@ -113,7 +113,7 @@ class Walkers:
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
-        """Whether steps may follow: all have begun, and no step has failed since."""
+        """Whether steps may follow: all have begun, and no step or beginning has failed since."""
         self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
@@ -137,8 +137,8 @@ class Walkers:
         Raises:
             SimulationError: a start that does not settle.
         """
-        task = self._task
-        settled = self._settling.at(starts)
+        task, self.begun = self._task, False  # until all is done
+        settled = self._settling.at(starts, ids)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)
@@ -165,8 +165,7 @@ class Walkers:
             InputError: actions out of bounds, no episode has begun, or a plan that makes no sense.
             SimulationError: an insect that diverged.
         """
-        if not self.begun:
-            raise InputError("a step before the first reset, or after a step that failed; expected a reset of all")
+        self.check_begun()
         ids = self._ids
         if len(ids) == 0:
             return self._nothing()
@@ -179,6 +178,17 @@ class Walkers:
             self._leave(ids)
             self.begun = False
             raise
+
+    def check_begun(self) -> None:
+        """Refuse a step that nothing goes before.
+
+        Raises:
+            InputError: not all have begun, or the last step or beginning failed.
+        """
+        if not self.begun:
+            raise InputError(
+                "a step before the first reset, or after a step or a reset that failed; expected a reset of all"
+            )
 
     def control(self, wanted: np.ndarray) -> np.ndarray:
         """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,
