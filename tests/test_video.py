@@ -128,6 +128,7 @@ def test_a_film_of_a_part_shows_the_moments_that_it_tells(fallen, tmp_path):
     take, row = Take.of(part), int(np.argmin(np.abs(fallen.seconds.values - 0.15)))
     np.testing.assert_array_equal(take.qpos[take.row(0.15)], fallen.qpos[row])
     assert _ticks(1000 * take.begin, 1000 * take.end).tolist() == list(range(100, 201, 10))
+    assert [f"{one:g}" for one in _ticks(0.0, 10.0)] == [str(one) for one in range(11)]
 
 
 def test_a_gif_plays_the_same_walk(fallen, tmp_path):

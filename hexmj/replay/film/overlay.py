@@ -122,7 +122,8 @@ class Overlay:
         for milliseconds in _ticks(1000 * self._begin, 1000 * self._end):
             x = self._column(milliseconds / 1000)
             draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
-            if x + draw.textlength(f"{milliseconds:g}", font) / 2 < width:
+            half = draw.textlength(f"{milliseconds:g}", font) / 2
+            if self._left - self._pixels(6) < x - half and x + half < width:
                 draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
         return np.asarray(image)
 
@@ -178,7 +179,7 @@ def _ticks(begin: float, end: float) -> np.ndarray:
     span = end - begin
     power = 10.0 ** np.floor(np.log10(span))
     step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if span <= 11 * power * part)
-    return np.arange(np.ceil(begin / step - 1e-9) * step, end + 1e-9 * span, step)
+    return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # never from -0
 
 
 @cache
