@@ -22,6 +22,7 @@ from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import Shown
 from hexmj.physics.foot_path import TipTargets, standing_tips
+from hexmj.physics.orders import check_made_for
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settling
 
@@ -140,6 +141,7 @@ class Walkers:
         task, self.begun = self._task, False  # until all is done
         settled = self._settling.at(starts, ids)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
+        check_made_for(plan, task.conditions)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)
         group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, ReadingPlan) else None)
