@@ -1,5 +1,6 @@
 """What a film shows of a recording: the measured walk of a physical insect, or the plan that a puppet shows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.replay.recording import recorded_conditions
+from hexmj.replay.schema import check_recording
 from hexmj.rotations import heading, turned
 from hexmj.stability import support_polygon
 
@@ -87,6 +89,20 @@ class Take:
     def row(self, seconds: float) -> int:
         """The step whose end is nearest to a time; the first one before the beginning, the last one after the end."""
         return int(np.clip(round((seconds - self.begin) / self.step) - 1, 0, len(self.qpos) - 1))
+
+
+def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> list[Take]:
+    """Read recordings of a body.
+
+    Raises:
+        InputError: what is no recording, holds no pose, or is of another body.
+    """
+    try:
+        for recording in recordings:
+            check_recording(recording)
+        return [Take.of(recording, body) for recording in recordings]
+    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
+        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
 
 
 def support_on_ground(

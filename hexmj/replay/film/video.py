@@ -21,8 +21,7 @@ from hexmj.replay.film.encoder import HOW, encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.schema import check_recording
-from hexmj.replay.take import Take, support_on_ground
+from hexmj.replay.take import Take, support_on_ground, takes_of
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
@@ -69,12 +68,7 @@ def render(
         raise InputError(f"the film cannot be written to {path}; expected a name with {ends} in a folder that exists")
     if reason := gl.missing():
         raise RenderingError(reason)
-    try:
-        for recording in recordings:
-            check_recording(recording)
-        takes = [Take.of(recording, body) for recording in recordings]
-    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
-        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
+    takes = takes_of(recordings, body)
     begin, end = min(take.begin for take in takes), max(take.end for take in takes)
     frames = max(1, round((end - begin) * film.slow_motion * film.fps))
     overlays = [Overlay(take, film, begin, end) for take in takes]
