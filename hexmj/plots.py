@@ -35,6 +35,10 @@ FIGURES: dict[str, dict[str, str]] = {
 """What a result is of, as its attribute `study` tells -> its figures by name, each a module and a function of it."""
 
 
+COUNTED = "start", "case", "row", "evaluation"
+"""Axes of results that only count; any other has values or names."""
+
+
 def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     """Draw a result; a notebook shows the figure, and `savefig` of it writes PNG, PDF or SVG.
 
@@ -53,9 +57,8 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
-    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
-    if gone and _study(result) != RECORDING:
-        raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
+    if _study(result) != RECORDING:
+        _check_axes(result)
     chosen = next(iter(figures)) if which is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
@@ -63,12 +66,22 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
     try:
         return draw(result)
-    except (LookupError, TypeError, ValueError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
         sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
         raise InputError(
             f"the figure {chosen!r} cannot be drawn of this part of a result, {sizes} ({error!r:.200});"
             " expected the result as it was computed"
         ) from error
+
+
+def _check_axes(result: "xr.Dataset") -> None:
+    """Refuse a result without one of its axes, or with one that has lost its values."""
+    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
+    if gone:
+        raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
+    bare = [name for name in result.sizes if name not in (*COUNTED, *result.coords)]
+    if bare:
+        raise InputError(f"a result without the values of its axis {bare[0]}; expected the result as it was computed")
 
 
 def _study(result: "xr.Dataset") -> str:

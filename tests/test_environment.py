@@ -13,7 +13,7 @@ from episodes import KINDS, ZEROS, episode
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.environments import dm
-from hexmj.errors import InputError
+from hexmj.errors import InputError, SimulationError
 from hexmj.legs import LEGS
 from hexmj.replay.film import gl
 from hexmj.timing import Stride
@@ -148,6 +148,16 @@ def test_divergence_raises():
     walking.reset()
     walking.physics.data.qvel[0] = np.nan
     with pytest.raises(control.PhysicsError):
+        walking.step(ZEROS)
+    assert walking.reset().first()
+    assert walking.step(ZEROS).mid()
+
+
+def test_no_step_follows_a_start_that_did_not_settle():
+    walking = dm.load(actions="tips", conditions=Conditions.of(centre_of_mass=-8.0), seed=1)
+    with pytest.raises(SimulationError, match="did not settle"):
+        walking.reset()
+    with pytest.raises(InputError, match="a reset that failed"):
         walking.step(ZEROS)
     assert walking.reset().first()
     assert walking.step(ZEROS).mid()

@@ -7,12 +7,15 @@ from math import pi
 import numpy as np
 import pytest
 
+from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import divergence
+from hexmj.physics.backend import Diverged
+from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk, Push, drive
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
@@ -152,6 +155,13 @@ def test_the_state_of_a_walk_that_cannot_be_measured_is_its_start(tmp_path):
         OutcomesSoFar(settled, np.full(2, np.inf)).outcomes()
     positions = divergence.replayed(divergence.save_state(error.value, tmp_path))
     np.testing.assert_allclose(positions, settled.qpos[:1].repeat(settled.substeps, axis=0), atol=1e-3)
+
+
+def test_a_state_of_a_body_with_bounds_of_its_own_is_replayed(tmp_path):
+    body = replace(STICK_INSECT, name="high", lengths=replace(STICK_INSECT.lengths, highest_lift=20.0))
+    settled = settle(draw_starts(1, 0), Conditions(body=body).but(step_height=15.0))
+    error = walk_error(Diverged(0, "thrown", settled.saved(0)), "walking", 0.0, settled.conditions)
+    assert len(divergence.replayed(divergence.save_state(error, tmp_path), body)) == settled.substeps
 
 
 def test_a_state_that_diverged_says_so_again(tmp_path, capsys):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import warnings
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -27,6 +28,8 @@ from hexmj.timing import Stride
 from tests.plain_observations import plain_observations, plain_rewards
 
 TIPS: dict[str, Any] = {"actions": "tips"}
+TILTING: dict[str, Any] = TIPS | {"conditions": Conditions.of(centre_of_mass=-8.0)}
+"""Not every start settles."""
 LDVS: Controller = hexmj.LDVS
 NAMES = pytest.mark.parametrize("name", IDS)
 
@@ -78,6 +81,19 @@ def test_it_is_rendered():
     np.testing.assert_array_equal(first, frame)
     assert (second != frame).any()
     many.close()
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@pytest.mark.parametrize("kind", [StickInsect, StickInsects])
+def test_what_is_drawn_was_compiled_at_first(kind, tmp_path):
+    file = tmp_path / "insect.xml"
+    file.write_text(hexmj.STICK_INSECT.mjcf.read_text())
+    body = replace(hexmj.STICK_INSECT, name="insect", mjcf=file)
+    walking = kind(render_mode="rgb_array", conditions=Conditions(body=body))
+    file.write_text("gone")
+    walking.reset(seed=0)
+    assert np.std(walking.render()) > 5
+    walking.close()
 
 
 @pytest.mark.parametrize("actions", ["joints", "tips"])
@@ -326,11 +342,48 @@ def test_after_a_step_that_failed_all_begin_anew():
     walking._walkers.bodies.qvel[1, 0] = 1e30
     with pytest.raises(SimulationError):
         walking.step(np.zeros((2, 18)))
-    with pytest.raises(InputError, match="whose last step failed; expected a reset of all"):
+    with pytest.raises(InputError, match="whose last step or reset failed; expected a reset of all"):
         walking.reset(options={"reset_mask": np.array([False, True])})
-    with pytest.raises(InputError, match="after a step that failed; expected a reset of all"):
+    with pytest.raises(InputError, match="after a step or a reset that failed; expected a reset of all"):
         walking.step(np.zeros((2, 18)))
     assert_same(walking.reset(seed=4)[0], StickInsects(2, **TIPS).reset(seed=4)[0])
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_after_a_start_that_did_not_settle_all_begin_anew(mode):
+    """The third start by the seed 9 does not; no insect stays behind without rewards."""
+    walking = StickInsects(3, duration=0.2, autoreset_mode=mode, **TILTING)
+    walking.reset(seed=[2, 3, 9])
+    with pytest.raises(SimulationError, match="start 2 did not settle"):  # though insects with others begin, too
+        for _ in range(10):
+            walking.step(np.zeros((3, 18)))
+    with pytest.raises(InputError, match="a reset that failed; expected a reset of all"):
+        walking.step(np.zeros((3, 18)))
+    with pytest.raises(InputError, match="or reset failed; expected a reset of all"):
+        walking.reset(options={"reset_mask": np.array([False, False, True])})
+    assert_same(walking.reset(seed=5)[0], StickInsects(3, **TILTING).reset(seed=5)[0])
+    walking.step(np.zeros((3, 18)))
+
+
+def test_the_insect_is_told_whose_start_did_not_settle():
+    walking = StickInsects(3, autoreset_mode="Disabled", **TILTING)
+    walking.reset(seed=5)
+    with pytest.raises(SimulationError, match="start 2 did not settle"):
+        walking.reset(seed=[0, 0, 1], options={"reset_mask": np.array([False, False, True])})
+
+
+@pytest.mark.parametrize("steps", [1, 2], ids=["in mid-episode", "at its end"])
+def test_no_step_follows_a_reset_that_failed(steps):
+    walking = StickInsect(duration=0.2, **TILTING)
+    walking.reset(seed=3)
+    for _ in range(steps):
+        walking.step(np.zeros(18))
+    with pytest.raises(SimulationError, match="start 0 did not settle"):
+        walking.reset(seed=1)
+    with pytest.raises(InputError, match="a reset that failed"):
+        walking.step(np.zeros(18))
+    walking.reset(seed=3)
+    walking.step(np.zeros(18))
 
 
 @pytest.mark.parametrize("walking", [StickInsect(), StickInsects(2)], ids=["one", "many"])
@@ -341,6 +394,9 @@ def test_a_step_needs_a_reset_and_a_copy_another_make(walking: Any):
         deepcopy(walking)
     with pytest.raises(InputError, match="options = 5"):
         walking.reset(options=5)
+    valid = "none" if walking.action_space.shape == (18,) else "reset_mask"
+    with pytest.raises(InputError, match=f"option 'mask'; valid names: {valid}"):
+        walking.reset(options={"mask": np.array([True, False])})
 
 
 def test_seeds_of_many_are_whole_numbers():
@@ -348,7 +404,7 @@ def test_seeds_of_many_are_whole_numbers():
     plain = many.reset(seed=3)[0]["tips"]
     for seed in (np.int64(3), [3, 4], np.array([3, 4])):
         assert np.array_equal(many.reset(seed=seed)[0]["tips"], plain)  # pyright: ignore[reportArgumentType]
-    for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1]):
+    for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1], np.array(5)):
         with pytest.raises(InputError, match="seed = "):
             many.reset(seed=wrong)  # pyright: ignore[reportArgumentType]
 

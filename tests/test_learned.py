@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
+from hexmj.errors import InputError
 from hexmj.loaded import importable
 
 ROOT = Path(__file__).parents[1]
@@ -45,6 +47,29 @@ def test_no_offsets_plan_what_the_controller_plans(example):
     np.testing.assert_allclose(planned.x, own.x, rtol=0, atol=1e-9)
     np.testing.assert_allclose(planned.y, own.y, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(planned.stance, own.stance)
+
+
+@pytest.mark.parametrize("values", [{}, {"step_height": 8.0, "lift_time": 40.0, "standing_height": 12.0}, {"vp": 40.0}])
+def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
+    """Heights come in evenly over a step, so not to the last bit."""
+    conditions, still = Conditions.of(**values), example("train_cma").Reflexes()
+    walks = [
+        hexmj.physical_walk(hexmj.draw_starts(1, 3), one, 0.3, 10.0, conditions=conditions, threads=1)
+        for one in (WithOffsets(still, conditions=conditions), hexmj.LDVS)
+    ]
+    np.testing.assert_allclose(walks[0].qpos, walks[1].qpos, rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"), [({"step_height": 8.0}, "step_height = 12.0; .* 8.0"), ({"vp": 40.0}, "vp = 80.0; .* 40.0")]
+)
+def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values, told):
+    conditions, still = Conditions.of(**values), WithOffsets(example("train_cma").Reflexes())
+    with pytest.raises(InputError, match=f"the plan is made for {told}"):
+        hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=conditions)
+    with pytest.raises(InputError, match=f"the plan is made for {told}"):
+        StickInsect(controller=still, conditions=conditions).reset(seed=0)
+    hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(load=1.0))
 
 
 @pytest.mark.slow

@@ -83,6 +83,19 @@ def test_poses_are_those_of_the_recording(fallen):
     assert_allclose(array(told["planned_tips"]), take.planned_tip[rows], atol=1e-5)
 
 
+def test_what_has_happened_is_told_as_far_as_it_is_shown(fallen, plan):
+    take = Take.of(fallen)
+    lost, fell = (f"{1000 * seconds:.0f} ms" for seconds in (take.lost, take.fell))
+    before = int(take.lost / take.step) - 1
+    for recording, told in (
+        (fallen, f"stability first lost at {lost}, fell on {take.part} at {fell}"),
+        (fallen.isel(step=slice(before)), "stability not lost in this part"),
+        (fallen.isel(step=slice(before + 5, before + 9)), f"stability first lost at {lost}"),
+        (plan.assign(planned_loss_time=np.inf), "stability never lost"),
+    ):
+        assert embedded(page_text([recording]))[0]["happened"] == told
+
+
 def test_a_polygon_has_standing_feet_as_corners(fallen):
     (told,) = embedded(page_text([fallen]))
     take = Take.of(fallen)

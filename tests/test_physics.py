@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Generator
-from contextlib import chdir
+from contextlib import chdir, nullcontext
 from time import perf_counter, sleep
 from typing import cast
 
@@ -23,7 +23,7 @@ from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import Diverged, MujocoBatch
-from hexmj.physics.callbacks import stopped_clock
+from hexmj.physics.callbacks import CHANGING, stopped_clock
 from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.orders import OrdersFromPlan
@@ -151,7 +151,7 @@ def test_a_push_gives_the_momentum_asked_for(vp):
     settled = settle(draw_starts(3, 0), Conditions.of(friction=0.0, vp=vp))
     speed = []
     for impulse in (0.0, 30.0):
-        push = Push(np.array([impulse, -impulse, impulse]), np.array([2.0, 2.0, 1e9]))
+        push = Push(np.array([impulse, -impulse, 0.0]), np.full(3, 2.0))
         plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
         centre = settled.compiled.columns.centre_of_mass
         y = np.concatenate(
@@ -160,6 +160,36 @@ def test_a_push_gives_the_momentum_asked_for(vp):
         speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
     assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
     assert speed[1][2] == speed[0][2]
+
+
+@pytest.mark.parametrize("time", [-1.0, 5.0, 1e9])
+def test_a_push_beside_the_walk_is_refused(time):
+    settled = settle(draw_starts(2, 0))
+    for impulse, refused in ((0.0, False), (100.0, True)):
+        push = Push(np.array([0.0, impulse]), np.array([0.0, time]))
+        chunks = drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.0, push=push)
+        said = pytest.raises(InputError, match=r"the push of start 1 is at .*; expected 0 to below 5")
+        with said if refused else nullcontext():
+            list(chunks)
+
+
+@pytest.mark.parametrize("name", ["impulse", "time"])
+def test_a_push_is_finite(name):
+    for wrong in (np.nan, np.inf):
+        with pytest.raises(InputError, match=f"a push's {name} = {wrong}; expected a finite number"):
+            Push(**{"impulse": np.zeros(2), "time": np.zeros(2), name: np.array([0.0, wrong])})
+
+
+@pytest.mark.parametrize("name", CHANGING)
+def test_callbacks_that_would_change_the_physics_are_refused(name):
+    change = getattr(mujoco, f"set_mjcb_{name}")
+    change(lambda *_: 0)
+    try:
+        with pytest.raises(InputError, match=f"mjcb_{name} is set, .*; expected none: mujoco.set_mjcb_{name}.None."):
+            settle(draw_starts(1, 0))
+    finally:
+        change(None)
+    settle(draw_starts(1, 0))
 
 
 def test_a_push_lasts_as_long_whatever_the_physics_step():

@@ -2,6 +2,8 @@
 
 import pytest
 
+import hexmj
+
 NONSENSE = [
     (["reproduce", "--only", "nothing"], "claim 'nothing'; valid keys: "),
     (["reproduce", "--quick", "--seed", "-1"], "seed = -1"),
@@ -132,3 +134,12 @@ def test_a_folder_that_is_a_file(run, tmp_path):
 def test_bad_input_makes_no_folder(run, tmp_path):
     assert run("walk", "--velocity", 2, "--out", tmp_path / "new")[0] == 2
     assert not (tmp_path / "new").exists()
+
+
+def test_what_cannot_be_filmed_makes_no_folder(run, tmp_path):
+    walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 1.0)
+    hexmj.save_recording(hexmj.record(walked).assign_attrs(body="beetle"), tmp_path / "beetle.nc")
+    code, _, error = run("render", tmp_path / "beetle.nc", "--out", tmp_path / "new" / "films")
+    assert code == 2
+    assert "the recording is of the body 'beetle'" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["beetle.nc"]

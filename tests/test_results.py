@@ -305,5 +305,9 @@ def test_what_has_lost_its_velocities_gets_a_sentence():
     for wrong in (0, []):
         with pytest.raises(InputError, match="without the axis velocity"):
             hexmj.plot(result.isel(velocity=wrong))
+    with pytest.raises(InputError, match="without the values of its axis velocity"):
+        hexmj.plot(result.drop_vars("velocity"))
+    with pytest.raises(InputError, match=r"cannot be drawn of this part of a result, V 2.* no attribute 'velocity'"):
+        hexmj.plot(result.rename(velocity="V"))
     with pytest.raises(InputError, match="result = None"):
         hexmj.settings(None)  # pyright: ignore[reportArgumentType]

@@ -20,7 +20,7 @@ from hexmj.errors import InputError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
-from hexmj.replay.film.overlay import Overlay
+from hexmj.replay.film.overlay import Overlay, _ticks
 from hexmj.replay.film.video import _view, render
 from hexmj.replay.footfall import walk_figure
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
@@ -115,6 +115,22 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen
     assert np.abs(left[5] - left[2]).mean() > 2 * np.abs(left[17] - left[14]).mean(), "the shorter one freezes"
 
 
+def test_a_film_of_a_part_shows_the_moments_that_it_tells(fallen, tmp_path):
+    """Its frames are those of the whole film at these times."""
+    film, part = Film(slow_motion=5.0, width=320, height=240), fallen.isel(step=slice(80, 160))  # from 0.1 to 0.2 s
+    frames = 15  # 0.1 s * 5 * 30
+    assert render([part], tmp_path / "part.mp4", film) == frames
+    render([fallen], tmp_path / "whole.mp4", film)
+    shown, whole = (read_film(tmp_path / f"{name}.mp4")[0] for name in ("part", "whole"))
+    same = np.abs(scene(shown) - scene(whole)[frames : 2 * frames]).mean(axis=(1, 2, 3))
+    other = np.abs(scene(shown) - scene(whole)[:frames]).mean(axis=(1, 2, 3))
+    assert (same[1:] < 0.3 * other[1:]).all()  # at its beginning a part shows its first step, not the one before
+    take, row = Take.of(part), int(np.argmin(np.abs(fallen.seconds.values - 0.15)))
+    np.testing.assert_array_equal(take.qpos[take.row(0.15)], fallen.qpos[row])
+    assert _ticks(1000 * take.begin, 1000 * take.end).tolist() == list(range(100, 201, 10))
+    assert [f"{one:g}" for one in _ticks(0.0, 10.0)] == [str(one) for one in range(11)]
+
+
 def test_a_gif_plays_the_same_walk(fallen, tmp_path):
     frames = render([fallen], tmp_path / "film.gif", Film(width=320, height=240, fps=10, slow_motion=4.0))
     with Image.open(tmp_path / "film.gif") as film:
@@ -143,12 +159,12 @@ def test_a_film_and_the_figure_of_its_walk_have_the_same_bars(kind: str, request
 def test_what_is_stable_is_told_without_colours(fallen):
     """By a sign and by words, of now and of what was before; the bar of the scale is as long as it says."""
     take = Take.of(fallen)
-    overlay = Overlay(take, Film(slow_motion=4.0), take.duration)
+    overlay = Overlay(take, Film(slow_motion=4.0), take.begin, take.end)
     unstable = int(np.argmax(take.margin <= 0))
     again = replace(take, margin=np.abs(take.margin))
     states = [overlay._state(row, seconds)[0] for row, seconds in ((0, 0.0), (unstable, take.lost), (0, take.fell))]
     assert [state[0] for state in states] == ["●", "▲", "■"]
-    assert "stable, but lost at" in Overlay(again, Film(), 1.0)._state(unstable, take.lost)[0]
+    assert "stable, but lost at" in Overlay(again, Film(), 0.0, 1.0)._state(unstable, take.lost)[0]
     frame = np.full((480, 640, 3), 200, dtype=np.uint8)
     overlay.draw(frame, 0, 0.0, 5.0)
     strip = frame[400 - 9]

@@ -55,11 +55,13 @@ class Render(WalkingCommand):
         from hexmj.replay.film import gl
         from hexmj.replay.film.video import render
         from hexmj.replay.recording import load_recording
+        from hexmj.replay.take import takes_of
 
         self._check()
         beside = [] if self.beside in (None, "planned") else [self.beside]
         controllers = self.controlled.controllers([self.model, *beside])
         shown = [load_recording(path) for path in self.recordings]
+        takes_of(shown)  # refuses what cannot be filmed before a folder is made
         name = self._name(shown)
         video, manifest = f"{name}.{self.format}", f"{name}.{self.format}-{MANIFEST}"
         out = results_folder(self.out, (video, f"{name}-1.nc", f"{name}-2.nc", manifest))

@@ -19,7 +19,10 @@ from hexmj.walks import PlannedWalk
 
 @runtime_checkable
 class Plan(Protocol):
-    """A walk of many starts, planned as far as asked for.  The starts do not know of each other."""
+    """A walk of many starts, planned as far as asked for.  The starts do not know of each other.
+
+    One that lifts the feet itself may tell the `Conditions` that it is `made_for`; others refuse it.
+    """
 
     @property
     def starts(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.loading import check_home, compile_body
 from hexmj.checks import given, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
@@ -69,6 +69,7 @@ def load(
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
     task = Task(velocity, actions, controller, conditions, stride, duration)
     compiled = compile_body(conditions, conditions.timestep(stride))
+    check_home(compiled)
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
     physics.compiled = compiled
     return control.Environment(physics, Walking(task, seed), n_sub_steps=task.substeps)
@@ -144,11 +145,12 @@ class Walking(control.Task):
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
-        self._walkers.begin(ONLY, drawn(self._random, self.task))
         self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
+        self._walkers.begin(ONLY, drawn(self._random, self.task))
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
         """Advance the plan by one step and tell the joints where to go."""
+        self._walkers.check_begun()
         spec, action = self._spec, numbers("action", action)
         if action.shape != spec.shape:
             raise InputError(f"an action has the shape {action.shape}; expected {spec.shape}")

@@ -1,4 +1,7 @@
-"""Frames of an insect, drawn without a screen; a GL is chosen when the first one is drawn."""
+"""Frames of an insect, drawn without a screen; a GL is chosen when the first one is drawn.
+
+The body is compiled at once, so that files edited later do not change what is seen.
+"""
 
 import atexit
 from typing import TYPE_CHECKING
@@ -22,7 +25,8 @@ class Frames:
 
     def __init__(self, conditions: Conditions) -> None:
         """Nothing is drawn yet."""
-        self._conditions, self._renderer = conditions, None
+        self._cameras, self._renderer = conditions.body.cameras[:1], None
+        self._model = compile_body(conditions).model
 
     def draw(self, qpos: np.ndarray) -> np.ndarray:
         """The body at some `qpos`, (height, width, 3) of uint8."""
@@ -31,7 +35,7 @@ class Frames:
         mujoco.mj_kinematics(renderer.model, self._data)
         mujoco.mj_comPos(renderer.model, self._data)
         mujoco.mj_camlight(renderer.model, self._data)
-        renderer.update_scene(self._data, *self._conditions.body.cameras[:1])
+        renderer.update_scene(self._data, *self._cameras)
         return renderer.render()
 
     def close(self) -> None:
@@ -43,7 +47,6 @@ class Frames:
 
     def _begun(self) -> "Renderer":
         if self._renderer is None:
-            model = compile_body(self._conditions).model
-            self._data, self._renderer = mujoco.MjData(model), gl.renderer(model, *SIZE)
+            self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
             atexit.register(self._renderer.close)  # before the GL goes, though nobody closes the environment
         return self._renderer

@@ -55,14 +55,14 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self._body = Alone(compiled, compiled.model, mujoco.MjData(compiled.model))
         self.model, self.data = self._body.model, self._body.data
         self._walkers = Walkers(self.task, compiled, self._body, self._body.take, count=1, threads=1)
-        self._frames = Frames(self.task.conditions)
+        self._frames = Frames(self.task.conditions) if render_mode else None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Begin an episode.  With a seed it takes the first of `hexmj.draw_starts` by that seed, then its next ones."""
         super().reset(seed=seed)
-        typed("options", options, dict | None)
+        checked_options(options)
         self._walkers.begin(np.arange(1), drawn(self.np_random, self.task))
         return self._observation(), {}
 
@@ -78,11 +78,12 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     def render(self) -> np.ndarray | None:
         """A frame, (height, width, 3), if it was asked for by `render_mode`."""
-        return self._frames.draw(self.data.qpos) if self.render_mode else None
+        return self._frames.draw(self.data.qpos) if self._frames else None
 
     def close(self) -> None:
         """Free the GL, if one was chosen."""
-        self._frames.close()
+        if self._frames:
+            self._frames.close()
 
     def __reduce__(self) -> Any:
         """Refuse copies and pickles, which would not share the memory that MuJoCo steps."""
@@ -119,6 +120,19 @@ def checked_mode(render_mode: str | None) -> str | None:
     if render_mode not in RENDER_MODES:
         raise InputError(f"render_mode = {render_mode!r:.80}; valid names: rgb_array, or None")
     return render_mode
+
+
+def checked_options(options: Any, *valid: str) -> dict[str, Any]:
+    """The options of a reset, {} for none.
+
+    Raises:
+        InputError: no such option.
+    """
+    options = typed("options", options, dict | None) or {}
+    for name in options:
+        if name not in valid:
+            raise InputError(f"option {name!r:.80}; valid names: {', '.join(valid) or 'none'}")
+    return options
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -63,8 +63,9 @@ class WithOffsets:
     """What was learned."""
     controller: Controller = LDVS
     """What plans."""
-    vp: float = 80.0
-    """V_p for which the feet are lifted and lowered as the body would [mm/s]."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """Under which it walks: of their V_p and path the feet are lifted and lowered, and offsets are those of their body.
+    A walk whose own are others is refused."""
     name: str = field(default="learned")
 
     def begin(
@@ -77,7 +78,7 @@ class WithOffsets:
     ) -> "OffsetPlan":
         """See `protocol.Controller.begin`."""
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        return OffsetPlan(plan, self.policy, Conditions.of(vp=self.vp))
+        return OffsetPlan(plan, self.policy, self.conditions)
 
 
 class OffsetPlan:
@@ -86,7 +87,7 @@ class OffsetPlan:
     def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
         """Around a plan at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
-        self._plan, self._policy, self._conditions = plan, policy, conditions
+        self._plan, self._policy, self.made_for = plan, policy, conditions
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
         self._tips = standing_tips(plan.starts, conditions.path.standing_height, plan.stride)
         self._stance = np.ones(plan.starts.shape)
@@ -108,17 +109,17 @@ class OffsetPlan:
         step, count = self._plan.advance(1), len(self.starts)
         seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
         offset = np.clip(self._policy(seen), -1.0, 1.0).reshape(count, 6, 3)
-        offset = self._conditions.body.lengths.largest_tip_offset * offset
+        offset = self.made_for.body.lengths.largest_tip_offset * offset
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
         self.done = self._plan.done
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
         rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
         x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)  # where legs step, or the plan itself goes
-        height = up + self._conditions.path.standing_height
+        height = up + self.made_for.path.standing_height
         return replace(step, x=x[None], y=y[None], height=height[None])
 
     def _upright(self, velocity: np.ndarray) -> np.ndarray:
         """What is felt on paper."""
         still = np.zeros((len(self.starts), 3))
-        ahead = np.stack([velocity * self._conditions.time.vp, still[:, 0], still[:, 0]], axis=1)
+        ahead = np.stack([velocity * self.made_for.time.vp, still[:, 0], still[:, 0]], axis=1)
         return felt(still[:, :2], ahead, still, self._stance, self._stance, self._tips)

@@ -18,9 +18,16 @@ try:
 except ModuleNotFoundError:
     raise without_extra("gym", "gymnasium") from None
 
-from hexmj.checks import typed, whole
+from hexmj.checks import whole
 from hexmj.environments.frames import Frames
-from hexmj.environments.gym import checked_actions, checked_mode, compiled_for, metadata_of, spaces_of
+from hexmj.environments.gym import (
+    checked_actions,
+    checked_mode,
+    checked_options,
+    compiled_for,
+    metadata_of,
+    spaces_of,
+)
 from hexmj.environments.task import Task, action_names, drawn
 from hexmj.environments.walkers import Walkers
 from hexmj.physics.backend import MujocoBatch
@@ -70,7 +77,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._rngs: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, dtype=bool)
-        self._frames = Frames(self.task.conditions)
+        self._frames = Frames(self.task.conditions) if render_mode else None
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]  # as Gymnasium's own vector environments
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -82,12 +89,13 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             options: the mask.
 
         Raises:
-            InputError: seeds or a mask that make no sense.
+            InputError: seeds or a mask that make no sense, or no such option.
+            SimulationError: a start that does not settle; all must be reset then.
         """
-        which = _mask((typed("options", options, dict | None) or {}).get("reset_mask"), self.num_envs)
+        which = _mask(checked_options(options, "reset_mask").get("reset_mask"), self.num_envs)
         if not (self._walkers.begun or which.all()):
             raise InputError(
-                "a reset_mask leaves out insects that have never begun, or whose last step failed;"
+                "a reset_mask leaves out insects that have never begun, or whose last step or reset failed;"
                 " expected a reset of all"
             )
         self._seed(_seeds(seed, self.num_envs), which)
@@ -102,7 +110,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
         Raises:
             InputError: actions out of bounds.
-            SimulationError: a simulation that diverged.
+            SimulationError: a simulation that diverged, or a start that does not settle; all must be reset then.
         """
         actions = checked_actions(actions, (self.num_envs, len(action_names(self._compiled, self.task))))
         acted, before = self._walkers.act(actions), self._ended
@@ -118,11 +126,12 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """A frame of every insect, (height, width, 3), if they were asked for by `render_mode`."""
-        return tuple(self._frames.draw(qpos) for qpos in self._bodies.qpos) if self.render_mode else None
+        return tuple(self._frames.draw(qpos) for qpos in self._bodies.qpos) if self._frames else None
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free the GL, if one was chosen."""
-        self._frames.close()
+        if self._frames:
+            self._frames.close()
 
     def __reduce__(self) -> Any:
         """Refuse copies and pickles, which would not share the memory that MuJoCo steps."""
@@ -176,7 +185,7 @@ def _seeds(seed: Any, count: int) -> list[int | None]:
     """A seed for each insect."""
     if seed is None:
         return [None] * count
-    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+    if np.ndim(seed) or (isinstance(seed, Sequence) and not isinstance(seed, str)):
         if len(seed) != count:
             raise InputError(f"{len(seed)} seeds; expected one for each of {count} insects")
         return [None if one is None else whole("seed", one, 0) for one in seed]

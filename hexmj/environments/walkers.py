@@ -22,6 +22,7 @@ from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import Shown
 from hexmj.physics.foot_path import TipTargets, standing_tips
+from hexmj.physics.orders import check_made_for
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settling
 
@@ -113,7 +114,7 @@ class Walkers:
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
-        """Whether steps may follow: all have begun, and no step has failed since."""
+        """Whether steps may follow: all have begun, and no step or beginning has failed since."""
         self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
@@ -137,9 +138,10 @@ class Walkers:
         Raises:
             SimulationError: a start that does not settle.
         """
-        task = self._task
-        settled = self._settling.at(starts)
+        task, self.begun = self._task, False  # until all is done
+        settled = self._settling.at(starts, ids)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
+        check_made_for(plan, task.conditions)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)
         group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, ReadingPlan) else None)
@@ -165,8 +167,7 @@ class Walkers:
             InputError: actions out of bounds, no episode has begun, or a plan that makes no sense.
             SimulationError: an insect that diverged.
         """
-        if not self.begun:
-            raise InputError("a step before the first reset, or after a step that failed; expected a reset of all")
+        self.check_begun()
         ids = self._ids
         if len(ids) == 0:
             return self._nothing()
@@ -179,6 +180,17 @@ class Walkers:
             self._leave(ids)
             self.begun = False
             raise
+
+    def check_begun(self) -> None:
+        """Refuse a step that nothing goes before.
+
+        Raises:
+            InputError: not all have begun, or the last step or beginning failed.
+        """
+        if not self.begun:
+            raise InputError(
+                "a step before the first reset, or after a step or a reset that failed; expected a reset of all"
+            )
 
     def control(self, wanted: np.ndarray) -> np.ndarray:
         """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,

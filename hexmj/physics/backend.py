@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.physics.callbacks import stopped_clock, unlogged
+from hexmj.physics.callbacks import check_no_callbacks, stopped_clock, unlogged
 from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
@@ -131,7 +131,9 @@ class MujocoBatch:
 
         Raises:
             Diverged: see `Engine.roll`.
+            InputError: a callback is set that changes the physics.
         """
+        check_no_callbacks()
         ids = np.arange(len(control))
         before = self.replayed(ids)
         self._batch.bind("ctrl")[:] = control
@@ -141,6 +143,7 @@ class MujocoBatch:
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
+        check_no_callbacks()
         model, before = self._model, self.replayed(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts

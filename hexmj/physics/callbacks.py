@@ -1,4 +1,5 @@
-"""What MuJoCo calls for the whole process, while batches step: its clock is stopped, its warnings are not logged.
+"""What MuJoCo calls for the whole process, while batches step: its clock is stopped, its warnings are not logged, and
+nothing that would change the physics may be set.
 
 MuJoCo's Python package times every part of every step for `mjData.timer`.  Nobody reads that while thousands of
 insects walk, and without it they walk 5 % faster (measured), to the same bits.
@@ -9,6 +10,25 @@ from contextlib import contextmanager
 
 import mujoco
 from numba import cfunc
+
+from hexmj.errors import InputError
+
+CHANGING = "control", "passive", "contactfilter", "sensor", "act_dyn", "act_gain", "act_bias"
+"""Callbacks of MuJoCo's that change the physics."""
+
+
+def check_no_callbacks() -> None:
+    """Refuse to step where the user has set a callback that changes the physics; no result would tell of it.
+
+    Raises:
+        InputError: one is set.
+    """
+    for name in CHANGING:
+        if getattr(mujoco, f"get_mjcb_{name}")() is not None:
+            raise InputError(
+                f"MuJoCo's callback mjcb_{name} is set, which changes the physics; expected none:"
+                f" mujoco.set_mjcb_{name}(None)"
+            )
 
 
 @contextmanager

@@ -68,6 +68,25 @@ class Push:
     time: np.ndarray
     """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
 
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            if not np.isfinite(values).all():
+                raise InputError(f"a push's {name} = {values[~np.isfinite(values)][0]}; expected a finite number")
+
+    def check_within(self, duration: float) -> None:
+        """Refuse a push that does not begin while its start is watched [time units].
+
+        Raises:
+            InputError: it begins before or after that.
+        """
+        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time >= duration))
+        if beside.any():
+            start = int(np.argmax(beside))
+            raise InputError(
+                f"the push of start {start} is at {self.time[start]:g} time units;"
+                f" expected 0 to below {duration:g}, where the walk ends"
+            )
+
 
 class Insects:
     """Settled starts, wherever their steps have brought them."""

@@ -41,11 +41,14 @@ def drive(
         progress: told the fraction done since it was last called.
 
     Raises:
-        InputError: a plan of other starts, with another stride, not at time 0, or of other shapes than asked for.
+        InputError: a plan of other starts, with another stride, not at time 0, or of other shapes than asked for; a
+            push beside the observation time.
         SimulationError: a simulation that diverged; it carries its last good state.
         StillThrown: the observation time ends before a push is over, after the last chunk.
     """
     insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration)
+    if push:
+        push.check_within(duration)
     total = int(steps_within(duration, settled.stride)) * settled.substeps
     told, walking = 0.0, np.arange(len(settled.starts))
     for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):

@@ -4,8 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.asking import advanced, check_plan
 from hexmj.controllers.protocol import Plan
+from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.settling import Settled
 from hexmj.timing import steps_within
@@ -53,9 +55,10 @@ class OrdersFromPlan:
         """All legs hold their starts; `plan` is at time 0 and ends at `duration` [time units].
 
         Raises:
-            InputError: a plan of other starts, with another stride, or not at time 0.
+            InputError: a plan of other starts, with another stride, not at time 0, or made for other conditions.
         """
         check_plan(plan, settled.starts, settled.stride)
+        check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._steps = plan, settled, int(steps_within(duration, settled.stride))
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
@@ -91,6 +94,22 @@ class OrdersFromPlan:
         if self._plan.done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, done * m, ids, control, tips[:, : control.shape[1]], ~reachable)
+
+
+def check_made_for(plan: Plan, conditions: Conditions) -> None:
+    """Refuse a plan that lifts the feet itself for another V_p, path or body, as its `made_for`, if it has it, tells.
+
+    Raises:
+        InputError: it does.
+    """
+    made_for = getattr(plan, "made_for", None)
+    if isinstance(made_for, Conditions):
+        here, there = conditions.settings(), made_for.settings()
+        for name in (*vars(conditions.time), *vars(conditions.path), "body"):
+            if here[name] != there[name]:
+                raise InputError(
+                    f"the plan is made for {name} = {there[name]}; expected that of the walk, {here[name]}"
+                )
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:

@@ -84,8 +84,8 @@ class Settling:
         check_home(self._compiled)
         self._batch: MujocoBatch | None = None
 
-    def at(self, starts: ArrayLike) -> Settled:
-        """At every start, (start, leg) [mm].
+    def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
+        """At every start, (start, leg) [mm]; errors tell which by the numbers in `names`, (start,), or by its row.
 
         Raises:
             InputError, SimulationError: see `settle`.
@@ -93,6 +93,7 @@ class Settling:
         conditions, stride, compiled = self._conditions, self._stride, self._compiled
         height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
         x = checked_starts(starts, stride)
+        names = np.arange(len(x)) if names is None else names
         check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
         model, columns = compiled.model, compiled.columns
         tips = standing_tips(x, height, stride)
@@ -100,7 +101,7 @@ class Settling:
         if not reachable.all():
             start, leg = np.argwhere(~reachable)[0]
             raise InputError(
-                f"start {start}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
+                f"start {names[start]}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
                 f" at a standing height of {height:g} mm"
             )
         batch = self._begun(len(x))
@@ -111,6 +112,7 @@ class Settling:
         try:
             batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
         except Diverged as error:
+            error.start = int(names[error.start])
             raise walk_error(error, "settling", 0.0, conditions) from None
         if conditions.contact.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
@@ -122,7 +124,8 @@ class Settling:
             "the trunk is on the ground": (trunk > 0).any(axis=1),
         }.items():
             if failed.any():
-                raise SimulationError(f"start {np.argmax(failed)} did not settle in {settling_time:g} ms: {name}")
+                start = names[np.argmax(failed)]
+                raise SimulationError(f"start {start} did not settle in {settling_time:g} ms: {name}")
         torques = batch.force[:, columns.ctrl].copy()
         return Settled(x, batch.states(np.arange(len(x))), ctrl, touch, torques, compiled, conditions, stride)
 

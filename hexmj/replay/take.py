@@ -1,5 +1,6 @@
 """What a film shows of a recording: the measured walk of a physical insect, or the plan that a puppet shows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.replay.recording import recorded_conditions
+from hexmj.replay.schema import check_recording
 from hexmj.rotations import heading, turned
 from hexmj.stability import support_polygon
 
@@ -26,8 +28,10 @@ class Take:
     """Of the walk."""
     step: float
     """Duration of a step [s]."""
-    duration: float
-    """Time recorded [s], also beyond a fall."""
+    begin: float
+    """When the first step begins [s]; above 0 in a part of a recording."""
+    end: float
+    """When what was recorded ends [s], also beyond a fall."""
     velocity: np.ndarray
     """(step,) V_r as a fraction of V_p."""
     margin: np.ndarray
@@ -60,14 +64,16 @@ class Take:
         kind = "measured" if physical else "planned"
         few, conditions = recording.isel(step=shown), recorded_conditions(recording, body)
         centre, vp = few["centre_of_mass"].values, conditions.time.vp
+        step = float(recording.attrs["dt"]) / vp
         ahead = few[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
         seen = np.stack([ahead, few[f"{kind}_y"].values], axis=-1)
         return cls(
             title=recording.attrs["title"],
             physical=physical,
             conditions=conditions,
-            step=float(recording.attrs["dt"]) / vp,
-            duration=float(recording["seconds"][-1]),
+            step=step,
+            begin=float(recording["seconds"][0]) - step,
+            end=float(recording["seconds"][-1]),
             velocity=few["velocity"].values,
             margin=few[f"{kind}_margin"].values,
             stance=few[f"{kind}_stance"].values.astype(bool),
@@ -81,8 +87,22 @@ class Take:
         )
 
     def row(self, seconds: float) -> int:
-        """The step whose end is nearest to a time; the last one after the end."""
-        return int(np.clip(round(seconds / self.step) - 1, 0, len(self.qpos) - 1))
+        """The step whose end is nearest to a time; the first one before the beginning, the last one after the end."""
+        return int(np.clip(round((seconds - self.begin) / self.step) - 1, 0, len(self.qpos) - 1))
+
+
+def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> list[Take]:
+    """Read recordings of a body.
+
+    Raises:
+        InputError: what is no recording, holds no pose, or is of another body.
+    """
+    try:
+        for recording in recordings:
+            check_recording(recording)
+        return [Take.of(recording, body) for recording in recordings]
+    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
+        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
 
 
 def support_on_ground(

@@ -94,5 +94,5 @@ class ReplaySession:
     def tick(self, passed: float) -> int:
         """Let so much time pass [s]; tells the step that is seen."""
         if not self.paused:
-            self._seconds = (self._seconds + passed / self._slow) % (self.take.duration + LIES)
-        return self.take.row(self._seconds)
+            self._seconds = (self._seconds + passed / self._slow) % (self.take.end - self.take.begin + LIES)
+        return self.take.row(self.take.begin + self._seconds)

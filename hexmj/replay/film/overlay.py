@@ -27,15 +27,16 @@ BAR = 110
 class Overlay:
     """Caption and diagram of one take, for frames of one size."""
 
-    def __init__(self, take: Take, film: Film, duration: float) -> None:
+    def __init__(self, take: Take, film: Film, begin: float, end: float) -> None:
         """Draw the whole diagram once.
 
         Args:
             take: what is shown.
             film: tells the size of the frames and the speed of play.
-            duration: time that the diagram's axis spans [s].
+            begin: of the diagram's axis [s].
+            end: of it [s].
         """
-        self._take, self._duration, width, height = take, duration, film.width, film.height
+        self._take, self._begin, self._end, width, height = take, begin, end, film.width, film.height
         self._speed = "in real time" if film.slow_motion == 1 else f"at {1 / film.slow_motion:.2g} {TIMES} speed"
         self._scale = min(width / 640, height / 480)
         self._top, self._bottom = self._pixels(CAPTION), height - self._pixels(DIAGRAM)
@@ -118,10 +119,11 @@ class Overlay:
             draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
         baseline = (self._row(6) + height) / 2
         draw.text((self._left - self._pixels(6), baseline), "ms", FAINT, font, anchor="rm")
-        for milliseconds in _ticks(1000 * self._duration):
+        for milliseconds in _ticks(1000 * self._begin, 1000 * self._end):
             x = self._column(milliseconds / 1000)
             draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
-            if x + draw.textlength(f"{milliseconds:g}", font) / 2 < width:
+            half = draw.textlength(f"{milliseconds:g}", font) / 2
+            if self._left - self._pixels(6) < x - half and x + half < width:
                 draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
         return np.asarray(image)
 
@@ -129,22 +131,24 @@ class Overlay:
         """The whole diagram, on its axes."""
         take = self._take
         columns = np.arange(self._left, self._right)
-        seconds = (columns - self._left + 0.5) / (self._right - self._left) * self._duration
-        over = seconds > len(take.qpos) * take.step
+        part = (columns - self._left + 0.5) / (self._right - self._left)
+        seconds = self._begin + part * (self._end - self._begin) - take.begin
+        beyond = (seconds < 0) | (seconds > len(take.qpos) * take.step)
         steps = np.clip(np.rint(seconds / take.step).astype(int) - 1, 0, len(take.qpos) - 1)
         gap = self._pixels(1.5)
-        axes[: self._row(6), columns[over]] = SHADE
+        axes[: self._row(6), columns[beyond]] = SHADE
         for leg in range(6):
-            swing = columns[~take.stance[steps, leg] & ~over]
+            swing = columns[~take.stance[steps, leg] & ~beyond]
             axes[self._row(leg) + gap : self._row(leg + 1) - gap + 1, swing] = INK
-        if take.lost <= self._duration:
+        if self._begin <= take.lost <= self._end:
             x = self._column(take.lost)
             axes[: self._row(6), x : x + self._pixels(1.5)] = RED
         return axes
 
     def _column(self, seconds: float) -> int:
         """Pixel column of a time."""
-        return self._left + round(seconds / self._duration * (self._right - self._left - 1))
+        part = (seconds - self._begin) / (self._end - self._begin)
+        return self._left + round(part * (self._right - self._left - 1))
 
     def _row(self, leg: int) -> int:
         """Upper pixel row of a leg within the diagram."""
@@ -170,11 +174,12 @@ def _round(most: float) -> float:
     return max(float(power * part) for part in (1, 2, 5) if power * part <= most)
 
 
-def _ticks(end: float) -> np.ndarray:
-    """Round numbers from 0 to `end`, five to twelve of them."""
-    power = 10.0 ** np.floor(np.log10(end))
-    step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if end <= 11 * power * part)
-    return np.arange(0.0, end + 1e-9 * end, step)
+def _ticks(begin: float, end: float) -> np.ndarray:
+    """Round numbers from `begin` to `end`, five to twelve of them."""
+    span = end - begin
+    power = 10.0 ** np.floor(np.log10(span))
+    step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if span <= 11 * power * part)
+    return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # never from -0
 
 
 @cache

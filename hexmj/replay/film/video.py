@@ -21,8 +21,7 @@ from hexmj.replay.film.encoder import HOW, encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.schema import check_recording
-from hexmj.replay.take import Take, support_on_ground
+from hexmj.replay.take import Take, support_on_ground, takes_of
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""
@@ -52,7 +51,7 @@ def render(
         body: the description of what was recorded.
 
     Returns:
-        The number of frames: the duration of the longest walk, at `Film.fps`.
+        The number of frames: the time from the first beginning to the last end, at `Film.fps`.
 
     Raises:
         InputError: no recording or too many, no MP4 or GIF file in a folder that exists, a recording without a pose,
@@ -69,22 +68,24 @@ def render(
         raise InputError(f"the film cannot be written to {path}; expected a name with {ends} in a folder that exists")
     if reason := gl.missing():
         raise RenderingError(reason)
-    try:
-        for recording in recordings:
-            check_recording(recording)
-        takes = [Take.of(recording, body) for recording in recordings]
-    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
-        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
-    frames = max(1, round(max(take.duration for take in takes) * film.slow_motion * film.fps))
+    takes = takes_of(recordings, body)
+    begin, end = min(take.begin for take in takes), max(take.end for take in takes)
+    frames = max(1, round((end - begin) * film.slow_motion * film.fps))
+    overlays = [Overlay(take, film, begin, end) for take in takes]
     with shown(progress, "rendering") as told, replacing(path) as part:
-        _write(takes, part, frames, film, told)
+        _write(takes, overlays, part, begin + np.arange(frames) / (film.fps * film.slow_motion), film, told)
     return frames
 
 
-def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress: Progress | None) -> None:
-    """Film the takes side by side."""
-    duration = max(take.duration for take in takes)
-    overlays = [Overlay(take, film, duration) for take in takes]
+def _write(
+    takes: Sequence[Take],
+    overlays: Sequence[Overlay],
+    path: Path,
+    times: np.ndarray,
+    film: Film,
+    progress: Progress | None,
+) -> None:
+    """Film the takes side by side at some times on their clock, (frame,) [s]."""
     rows = 1 if len(takes) <= IN_A_ROW else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
@@ -96,15 +97,14 @@ def _write(takes: Sequence[Take], path: Path, frames: int, film: Film, progress:
             for conditions, model in worlds.items()
         }
         add = opened.enter_context(encoder(path, *picture.shape[:2], film.fps))
-        for frame in range(frames):
-            seconds = frame / (film.fps * film.slow_motion)
+        for seconds in times.tolist():
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
                 panel[:], scale = _view(*stages[take.conditions], film.camera, take, row)
                 overlay.draw(panel, row, seconds, scale)
             add(picture)
             if progress:
-                progress(1 / frames)
+                progress(1 / len(times))
 
 
 def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:

@@ -566,9 +566,7 @@ class Panel {
     const part = recording.part.replaceAll("_", " ");
     this.part("word").textContent = fallen ? `\u2716 fell on ${part}` : stable ? "\u2713 within the polygon" : "\u2716 outside the polygon";
     this.part("state").classList.toggle("lost", !stable);
-    const events = [[recording.lost, "stability first lost"], [recording.fell, `fell on ${part}`]].filter(([time]) => time !== null && time <= recording.end);
-    const happened = events.map(([time, word]) => `${word} at ${told(1000 * time, 0)} ms`).join(", ") || "stability never lost";
-    this.part("now").textContent = `V = ${told(recording.velocity[row], 2)}, ${told(recording.seconds[row] * recording.vp, 1)} time units; ${happened}`;
+    this.part("now").textContent = `V = ${told(recording.velocity[row], 2)}, ${told(recording.seconds[row] * recording.vp, 1)} time units; ${recording.happened}`;
     this.chart.draw(seconds, theme);
     if (!this.scene) return;
     const centre = item(recording.centre_of_mass, pose), target = [centre[0], centre[1], recording.level[pose] + 0.12 * this.size];

@@ -13,8 +13,7 @@ from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import write_whole
 from hexmj.replay.page.shown import shown
-from hexmj.replay.schema import check_recording
-from hexmj.replay.take import Take
+from hexmj.replay.take import takes_of
 
 MOST = 2
 """Recordings side by side, at most."""
@@ -50,12 +49,8 @@ def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> st
     if not 1 <= len(recordings) <= MOST:
         raise InputError(f"{len(recordings)} recordings were given; expected 1 or {MOST}")
     typed("body", body, Body)
-    try:
-        for recording in recordings:
-            check_recording(recording)
-        told = [shown(recording, Take.of(recording, body)) for recording in recordings]
-    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
-        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
+    takes = takes_of(recordings, body)
+    told = [shown(recording, take) for recording, take in zip(recordings, takes, strict=True)]
     parts = {"STYLE": _part("page.css"), "SCRIPT": _part("page.js"), "RECORDINGS": script_json(told)}
     text = _part("page.html")
     for name, part in parts.items():

@@ -38,6 +38,7 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "legs": LEGS,
         "vp": take.conditions.time.vp,
         "step": take.step,
+        "happened": happened(take),
         "lost": _or_none(take.lost),
         "fell": _or_none(take.fell),
         "part": take.part,
@@ -72,6 +73,13 @@ def told_conditions(conditions: Conditions, physical: bool) -> str:
     who = f"{body} in physics" if physical else f"the plan, shown by a {body} that follows it"
     values_told = (f"{name.replace('_', ' ')} {values[name]}" for name in unusual(values) if name != "vp")
     return ", ".join([who, f"V_p = {conditions.time.vp:g} mm/s", *values_told])
+
+
+def happened(take: Take) -> str:
+    """When stability was lost and when it fell, by the end of what is shown."""
+    events = (take.lost, "stability first lost"), (take.fell, f"fell on {take.part.replace('_', ' ')}")
+    told = [f"{what} at {1000.0 * seconds:.0f} ms" for seconds, what in events if seconds <= take.end]
+    return ", ".join(told) or f"stability {'never lost' if take.lost == np.inf else 'not lost in this part'}"
 
 
 def packed(values: Any, kind: str) -> dict[str, Any]:
