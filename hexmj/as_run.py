@@ -3,17 +3,23 @@
 They are noted as modules run, from the first import of this package on; those that ran before are read then.
 """
 
+import ast
 import os
-import re
 import sys
 import sysconfig
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES
+from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
+from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
 from hexmj.errors import InputError
-from hexmj.files import digest
+from hexmj.files import digest, digest_of
+from hexmj.parsing import compiled, parsed
+
+INSTALLED = {"site-packages", "dist-packages"}
+"""Folders of installed packages, this Python's own or another's."""
 
 _NOT_ITS_USERS = tuple(
     f"{folder}{os.sep}"
@@ -23,8 +29,8 @@ _NOT_ITS_USERS = tuple(
     )
 )
 
-DATA = re.compile(r"""["']([\w. /\\-]+\.(?:toml|xml|json))["']""")
-"""Names of data files in a source."""
+DATA = (".toml", ".xml", ".json")
+"""Ends of the names of data files."""
 
 COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
 """Ends of the names of modules without a source."""
@@ -32,8 +38,12 @@ COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
 _RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
 
-_READ: dict[Path, bytes] = {}
-"""Data file -> what it held when the first module that names it ran, which may have read it then."""
+_STALE: set[str] = set()
+"""Files of which bytecode ran that is not of their source, which Python knows by its time and size alone."""
+
+_READ: dict[tuple[str, str], list[str]] = {}
+"""File, and a data file that it names -> what was held where that is looked for when the file first ran: it may have
+read it then."""
 
 
 def as_run(file: Path, stamp: str = "") -> bytes | None:
@@ -44,8 +54,10 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
         stamp: the first digits of the digest of the version that is meant.
 
     Raises:
-        InputError: it ran in several versions, and none or more than one is meant.
+        InputError: it ran in several versions, and none or more than one is meant; or as none that it has.
     """
+    if str(file) in _STALE:
+        raise InputError(f"{file} ran as {cache_from_source(file)} keeps it, not as it is; delete that and start again")
     if (versions := _RUN.get(str(file))) is None:
         return None
     meant = [one for one in versions if digest(one).startswith(stamp)]
@@ -54,9 +66,10 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
     return meant[0]
 
 
-def data_names(source: bytes) -> list[str]:
-    """The data files that a source names."""
-    return DATA.findall(source.decode(errors="replace"))
+def data_names(nodes: Iterable[ast.AST]) -> list[str]:
+    """The data files that the nodes of a source name, in texts of their own or after a folder in a formatted one."""
+    texts = [one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    return sorted({part for one in texts if one.endswith(DATA) for part in (one, one.lstrip("/"))})
 
 
 def data_folders(file: Path) -> list[Path]:
@@ -64,21 +77,39 @@ def data_folders(file: Path) -> list[Path]:
     return [file.parent, Path.cwd()]
 
 
-def data(path: Path) -> bytes:
-    """What a data file holds, and what it held when a module that names it ran, if that was something else."""
-    now = path.read_bytes()
-    return now if (then := _READ.get(path, now)) == now else now + then
+def data(file: Path, name: str, folders: Sequence[Path]) -> str:
+    """A digest of what a data file holds in each folder, and of what it held when the file that names it ran, if that
+    was something else; empty if it is in none and was not."""
+    now = _held(name, folders)
+    then = _READ.get((str(file), name), now)
+    return digest(repr(now if then == now else (now, then)).encode()) if any((*now, *then)) else ""
+
+
+def _held(name: str, folders: Sequence[Path]) -> list[str]:
+    """What a file holds in each folder, as a digest; empty where there is none to be read."""
+    held = []
+    for folder in folders:
+        try:
+            held.append(digest_of(folder / name))
+        except InputError:
+            held.append("")
+    return held
 
 
 def _note(file: Any) -> None:
-    if isinstance(file, str) and not file.endswith(COMPILED) and not file.startswith(_NOT_ITS_USERS):
-        with suppress(OSError):
-            source = Path(file).read_bytes()
-            if source not in (versions := _RUN.setdefault(file, [])):
-                versions.append(source)
-            for path in (folder / name for name in data_names(source) for folder in data_folders(Path(file))):
-                if path not in _READ and path.is_file():
-                    _READ[path] = path.read_bytes()
+    if not isinstance(file, str) or file.endswith(COMPILED) or file.startswith(_NOT_ITS_USERS):
+        return
+    if not INSTALLED.isdisjoint((path := Path(file)).parts):
+        return
+    with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
+        if (source := path.read_bytes()) not in (versions := _RUN.setdefault(file, [])):
+            versions.append(source)
+        for name in data_names(ast.walk(parsed(source))):
+            _READ.setdefault((file, name), _held(name, data_folders(path)))
+        if os.path.exists(cache_from_source(file)):
+            runs = SourceFileLoader(file, file).get_code(file)
+            if runs != compiled(source, file):
+                _STALE.add(file)
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:

@@ -46,6 +46,11 @@ def progress_bar(label: str) -> Iterator[Progress]:
         yield told
 
 
+def part_of(progress: Progress | None, part: float) -> Progress | None:
+    """What a part of some work is told by, where the whole is told by a progress."""
+    return progress and (lambda done: progress(part * done))
+
+
 @contextmanager
 def _in_terminal(label: str) -> Iterator[Progress]:
     from rich.console import Console

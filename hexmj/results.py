@@ -62,8 +62,12 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
     try:
         nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))
         if not nearest.is_dir():
-            raise InputError(f"--out {path}: {nearest} is a file; expected a folder")
-        _try(nearest, path.absolute().relative_to(nearest.absolute()).parts)
+            what = "is a file" if nearest.exists() else "is a link to nothing"
+            raise InputError(f"--out {path}: {nearest} {what}; expected a folder")
+        missing = path.absolute().relative_to(nearest.absolute()).parts
+        if os.pardir in missing:
+            raise InputError(f"--out {path} leads through {missing[0]}, which is not there; expected a folder")
+        _try(nearest, missing)
         taken = [name for name in names if (path / name).is_dir()]
     except OSError as error:
         raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None

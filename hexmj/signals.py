@@ -52,6 +52,21 @@ def unheard_by_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, usual)
 
 
+@contextmanager
+def stops_wait() -> Iterator[None]:
+    """A stop that comes while the block runs, which would be left in pieces, comes at its end."""
+    came = list[int]()
+    for one in (heard := [one for one in STOPS if signal.getsignal(one) is _stop]):
+        signal.signal(one, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for one in heard:
+            signal.signal(one, _stop)
+        if came:
+            os.kill(os.getpid(), came[0])
+
+
 def _stop(number: int, frame: Any) -> None:
     _HEARD.append(number)
     _comes_again(SWALLOWED)

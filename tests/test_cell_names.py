@@ -15,6 +15,7 @@ from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.sweeps import Cell
 from hexmj.sweeps.code import code
+from hexmj.sweeps.plain import module_label
 from small_cells import ENVIRONMENT, MINE, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
 
@@ -102,6 +103,37 @@ def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
         found.append(json.loads(toy_record(toy))["sources"])
     assert found[0].pop("profile") != found[1].pop("profile")
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        *((repr(name), name) for name in ("gains_V=0.3.toml", "a (1), 50 %+~@.json", "it's ö.xml", "a/[b] 'c'.toml")),
+        *(("f'{HERE}/gains.toml'", "gains.toml"), ("'a\\x2etoml'", "a.toml")),
+    ],
+)
+def test_a_data_file_counts_whatever_its_name(tmp_path: Path, text: str, name: str) -> None:
+    (tmp_path / "mine.py").write_text(f"HERE = '.'\nNAME = {text}")
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text("")
+    made = code(frozenset({(module := importable(tmp_path / "mine.py").__name__)}))
+    assert f"{module_label(module)}, {name}" in made.sources
+
+
+def test_a_data_file_beside_its_module_and_one_in_the_current_folder_are_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = set()
+    for folder, beside, here in (("a/code", "1", "2"), ("c/code", "2", "1"), ("d/code", "", "1"), ("e/code", "1", "")):
+        (mine := tmp_path / folder / "mine.py").parent.mkdir(parents=True)
+        (current := tmp_path / folder[0] / "b").mkdir()
+        mine.write_text("NAME = 'gains.toml'")
+        for where, held in ((mine.parent, beside), (current, here)):
+            if held:
+                (where / "gains.toml").write_text(held)
+        monkeypatch.chdir(current)
+        names.add(tuple(code(frozenset({importable(mine).__name__})).sources.values()))
+    assert len(names) == 4
 
 
 PRINT_MAIN = """

@@ -311,7 +311,8 @@ def test_folders_that_cannot_take_results(tmp_path, monkeypatch):
     for path, said in {
         tmp_path / "file": "is a file; expected a folder",
         tmp_path / "file" / "below": "is a file; expected a folder",
-        tmp_path / "dangling": "is a file; expected a folder",
+        tmp_path / "dangling": "dangling is a link to nothing; expected a folder",
+        tmp_path / "new" / ".." / "data": "leads through .*new, which is not there; expected a folder",
         tmp_path / "new" / ("x" * 300): "File name too long",
         Path("/proc/none"): "cannot be written to",
     }.items():

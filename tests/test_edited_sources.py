@@ -1,6 +1,7 @@
 """Sources and data that are edited while a program uses them: they count as they ran, or are refused."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -83,26 +84,63 @@ def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: P
     assert not list(tmp_path.rglob("*.nc"))
 
 
+STALE = """
+import sys
+if sys.argv[1] == "before": import stale
+from hexmj.sweeps import Cell
+import stale
+from toy.study import cell
+print(Cell("toy", cell, {"controller": stale.Tripod()}).record())
+"""
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_bytecode_of_another_source_is_refused(tmp_path: Path, when: str) -> None:
+    """Python knows it by its time and size alone; whether the module ran before the package was imported or after."""
+    write_toy(tmp_path)
+    environment = {name: value for name, value in ENVIRONMENT.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    command, ended = [sys.executable, "-c", STALE, when], []
+    for gain in ("12.0", "01.0"):
+        (tmp_path / "stale.py").write_text(f"{MINE}GAIN = {gain}")
+        os.utime(tmp_path / "stale.py", (1e9, 1e9))
+        ended.append(subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True))
+    assert json.loads(ended[0].stdout), ended[0].stderr
+    assert "stale.py ran as " in ended[1].stderr
+    assert ended[1].stderr.endswith(".pyc keeps it, not as it is; delete that and start again\n")
+
+
 READ = """
+import os, sys
 from pathlib import Path
 from hexmj.sweeps import Cell
 import reads
-if __name__ == "__main__":
-    Path("gains.toml").write_text("g = 9.0")
-    print(Cell("reads", reads.cell, {}).record())
+data, then = Path("gains.toml"), sys.argv[1]
+if then == "vanishes": data.unlink()
+elif then == "moves": Path("inner").mkdir(); os.chdir("inner")
+elif then: data.write_text(then)
+print(Cell("reads", reads.cell, {}).record())
 """
+
+
+def read_digest(folder: Path, before: str, then: str) -> str | None:
+    """Of a data file that is there when the module that names it runs, or that becomes another one then."""
+    folder.mkdir()
+    (folder / "reads.py").write_text("GAINS = 'gains.toml'\ndef cell(): ...")
+    if before:
+        (folder / "gains.toml").write_text(before)
+    command = [sys.executable, "-c", READ, then]
+    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)["sources"].get("reads, gains.toml")
 
 
 def test_a_data_file_counts_as_it_was_when_its_module_ran_too(tmp_path: Path) -> None:
     """The module may have read it then, or may read it now; in a new program both are the same."""
-    (tmp_path / "reads.py").write_text("GAINS = open('gains.toml').read()\ndef cell(): ...")
-    sources_of = []
-    for text in ("g = 1.0", "g = 9.0"):
-        (tmp_path / "gains.toml").write_text(text)
-        command = [sys.executable, "-c", READ]
-        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-        sources_of.append(json.loads(done.stdout)["sources"])
-    assert sources_of[0]["reads, gains.toml"] != sources_of[1]["reads, gains.toml"]
+    runs = [
+        *(("", ""), ("g = 1.0", ""), ("g = 9.0", "")),
+        *(("", "g = 9.0"), ("g = 1.0", "g = 9.0"), ("g = 1.0", "vanishes"), ("g = 1.0", "moves")),
+    ]
+    found = [read_digest(tmp_path / str(i), *run) for i, run in enumerate(runs)]
+    assert len(set(found)) == len(runs) and found[0] is None
 
 
 def test_data_files_count_as_they_are_now(tmp_path: Path) -> None:

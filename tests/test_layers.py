@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("as_run", "attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf"),
-    ("field_docs", "parsing", "pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
+    ("attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf", "parsing"),
+    ("as_run", "field_docs", "pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
     ("sweeps",),  # knows nothing of walking
     ("diagrams", "timing"),
     ("stability", "walks"),

@@ -1,6 +1,7 @@
 """Settings of a cell become plain data, files among them what they hold; what cannot is refused."""
 
 import json
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ import hexmj
 from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.loaded import importable
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Stride
@@ -97,6 +99,42 @@ def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
     assert plain(text := str(tmp_path)) == text
     assert plain("0.5" * 2000) == "0.5" * 2000
     assert plain("a.b\0") == "a.b\0"
+
+
+TABLED = """
+from dataclasses import dataclass
+from pathlib import Path
+from base_of_tabled import Reads
+
+@dataclass(frozen=True)
+class Tabled(Reads):
+    table: {kind} = {kind}("{name}")
+    inner: tuple = ()
+"""
+
+
+@pytest.mark.parametrize("kind", ["str", "Path"])
+@pytest.mark.parametrize("name", ["gains.txt", "gains", "tables/gains.json"])
+def test_a_field_names_a_file_beside_its_class_its_bases_or_in_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
+) -> None:
+    folders = [tmp_path / one for one in ("code", "base", "here")]
+    for folder in folders:
+        (folder / name).parent.mkdir(parents=True)
+    (folders[0] / "mine.py").write_text(TABLED.format(kind=kind, name=name))
+    (folders[1] / "base_of_tabled.py").write_text("class Reads: ...")
+    monkeypatch.syspath_prepend(folders[1])
+    monkeypatch.delitem(sys.modules, "base_of_tabled", raising=False)
+    monkeypatch.chdir(folders[2])
+    tabled = importable(folders[0] / "mine.py").Tabled
+    found = [plain(tabled())["table"]]
+    assert found == [name]
+    for folder in folders:
+        for text in ("1", "2"):
+            (folder / name).write_text(text)
+            found.append(plain(tabled(inner=({"of": tabled()},)))["inner"][0]["of"]["table"])
+    assert len(set(found)) == 7
+    assert plain(Conditions()) == plain(tabled(inner=(Conditions(),)))["inner"][0]
 
 
 def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Readings of the paper: all combinations, what each may and may not change, and how they are ranked."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from hexmj.paper.readings import (
     choice_in,
     chosen,
     combinations,
+    compare_readings,
     effects,
     gained,
     ranking,
@@ -31,6 +33,7 @@ from hexmj.paper.readings import (
 from hexmj.paper.readings_table import readings_markdown
 from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, refined
 from hexmj.starts import draw_starts
+from hexmj.sweeps import run
 from hexmj.timing import Acceleration, Stride
 
 SMALL = replace(SCORING, **REFINING, sample=20, gait_starts=2)
@@ -128,6 +131,41 @@ def test_held_out_claims_rank_and_calibrated_ones_do_not():
     assert "gains ldvs-late, hws-majority; loses none" in page
     assert "| ipsilateral lasting | 2 of 2 | 0.0123 |" in page
     assert len(hexmj.plot(scores.assign_attrs(study="readings")).axes) == len(CHOICES)
+
+
+@pytest.fixture
+def scored_at_once(monkeypatch):
+    """Every score is made up, and none kept."""
+    one = scores_of([SCORING], [[1, 0, 0, 1]]).isel(reading=0, drop=True)
+    as_is = one[["agrees", "miss"]].isel(constants=0, drop=True)
+    ideal = as_is.isel(claim=[0]).assign(flss=("ideal_velocity", [0.5])).assign_coords(ideal_velocity=[0.1])
+    for name, made in {"score": one, "score_as_is": as_is, "score_of_ideals": ideal}.items():
+        monkeypatch.setattr(f"hexmj.paper.readings.{name}", lambda protocol, made=made: made)
+    monkeypatch.setattr("hexmj.paper.readings.run", lambda cells, folder, **how: run(cells, **how))
+
+
+@pytest.mark.parametrize("count", [2, 72])
+def test_progress_comes_to_one_and_the_result_tells_what_it_was_made_with(scored_at_once, count):
+    told = []
+    readings = list(combinations(SMALL))[:count]
+    scores = compare_readings(readings, 2, progress=told.append)
+    assert sum(told) == pytest.approx(1.0)
+    made_with = hexmj.settings(scores)
+    assert {name: made_with[name] for name in ("study", "starts", "gait_starts", "seed", "best")} == {
+        **{"study": "readings", "starts": 20, "gait_starts": 2},
+        **{"seed": 1998, "best": 2},
+    }
+    assert ("## What a choice alone changes" in readings_markdown(scores, readings)) == (count == 72)
+
+
+def test_json_tells_the_settings_and_every_number(scored_at_once, tmp_path, capsys):
+    options_of(["readings", "--json", "--only", "lasting", "--starts", "30", "--out", str(tmp_path / "new")]).run()
+    told, saved = json.loads(capsys.readouterr().out), hexmj.load(tmp_path / "new" / "readings.nc")
+    assert told["settings"]["starts"] == 30 and told["settings"]["only"] == ["lasting"]
+    assert hexmj.settings(saved)["only"] == ["lasting"]
+    assert told["agrees"] == saved.agrees.values.tolist()
+    assert {*saved.variables} < {*told}
+    assert [row["reading"] for row in told["readings"]] == ["as printed", "ipsilateral lasting"]
 
 
 def test_choices_are_read_and_titled():

@@ -60,6 +60,25 @@ def test_while_it_is_imported(by, module):
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 
+def test_while_a_pool_of_processes_is_made(tmp_path):
+    """Its semaphores are left to nobody, who would be told of them."""
+    script = (
+        "import os\n"
+        "from multiprocessing import resource_tracker\n"
+        "usual = resource_tracker.register\n"
+        "def register(*one):\n"
+        "    usual(*one)\n"
+        "    os.kill(os.getpid(), 2)\n"
+        "resource_tracker.register = register\n"
+        "from hexmj.__main__ import main\n"
+        "main()"
+    )
+    words = [sys.executable, "-c", script, "flss", "--starts", "9", "--processes", "2", "--out", str(tmp_path)]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.strip() == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
+
+
 def test_while_c_code_calls_back():
     """As numba does while it loads compiled code; what such a callback raises goes no farther."""
     script = (

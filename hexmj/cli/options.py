@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
 
@@ -25,7 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.signals import of_stop, unheard_by_children
+from hexmj.signals import of_stop, stops_wait, unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -211,7 +211,10 @@ class Sweepers:
 
         from hexmj.sweeps.workers import end_with_parent
 
-        with ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent) as executor:
+        with ExitStack() as ended:
+            with stops_wait():  # else semaphores might be left behind
+                pool = ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent)
+                executor = ended.enter_context(pool)
             try:
                 with unheard_by_children():
                     for _ in range(self.processes):

@@ -5,9 +5,11 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.attributes import attributes
 from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
+from hexmj.cli.study import lists_of
 from hexmj.cli.tables import new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.progress import progress_bar
@@ -63,6 +65,7 @@ class Readings:
         with self.sweepers.executor() as executor, progress_bar("reading") as progress:
             how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads}
             scores = compare_readings(readings, best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
+        scores.attrs |= attributes({"only": self.only or ()})
         files = [
             save_text(readings_markdown(scores, readings), out / "readings.md"),
             save_dataset(scores, out / "readings.nc"),
@@ -72,7 +75,8 @@ class Readings:
         files.append(save_manifest(self, settings, files, out / MANIFEST))
         rows = readings_rows(scores, ranking(scores).tolist()[:best])
         if self.json:
-            print_json({"readings": [dict(zip(HEADS, row, strict=True)) for row in rows], "files": files})
+            told = {"readings": [dict(zip(HEADS, row, strict=True)) for row in rows]}
+            print_json(lists_of(scores) | told | {"files": files})
             return
         table = new_table(*HEADS)
         for row in rows:

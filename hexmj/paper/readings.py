@@ -4,19 +4,22 @@ First every combination, with the constants as inferred and refined; then the be
 acceleration or the measure knows of, and with ideal sets searched under each.
 """
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack, get_args, get_type_hints
 
 import numpy as np
 
+from hexmj.attributes import attributes
 from hexmj.controllers.cruse1998 import Order, Reading
 from hexmj.legs import CENTRED, FIG1
 from hexmj.paper.claims import INFERRED_FROM
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.scores import score, score_as_is, score_of_ideals, with_stride
+from hexmj.progress import part_of, shown
 from hexmj.sweeps import Cell, Execution, run
 
 if TYPE_CHECKING:
@@ -37,6 +40,9 @@ ASIDE: dict[str, tuple[Any, ...]] = {
     "margin": (0.0, 1.0),
 }
 """Choices of which only acceleration or the measure knows: combined for the best."""
+
+REFINED, SEARCHED = 3.0, 3.0
+"""Work of a score with refined constants, and of one of ideal sets; that of one as it is is 1."""
 
 CALIBRATED = frozenset(key for keys in INFERRED_FROM.values() for key in keys)
 
@@ -89,13 +95,25 @@ def compare_readings(
     """
     import xarray as xr
 
-    first = run([Cell(title(one), score, {"protocol": one}) for one in readings], folder, **how)
-    scores = xr.concat(first, xr.Variable("reading", [title(one) for one in readings]))
-    order = ranking(scores)[:best]
-    closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
+    first, then = REFINED * len(readings), best * (math.prod(map(len, ASIDE.values())) - 1 + SEARCHED)
+    with shown(how.get("progress"), "reading") as told:
+        cells = [Cell(title(one), score, {"protocol": one}) for one in readings]
+        scored = run(cells, folder, **how | {"progress": part_of(told, first / (first + then))})
+        scores = xr.concat(scored, xr.Variable("reading", [title(one) for one in readings]))
+        order = ranking(scores)[:best]
+        closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
+        closer = look_closer(closest, folder, **how | {"progress": part_of(told, then / (first + then))})
+    one = readings[0]
+    settings = {
+        "study": "readings",
+        "starts": one.samples * one.sample,
+        "gait_starts": one.gait_starts,
+        "seed": one.seed,
+        "stride": asdict(one.stride),
+        "best": best,
+    }
     names = scores.reading.values[order]
-    whole = scores.assign(look_closer(closest, folder, **how)).assign_coords(best=names)
-    return whole.assign_attrs(study="readings")
+    return scores.assign(closer).assign_coords(best=names).assign_attrs(attributes(settings))
 
 
 def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
@@ -104,10 +122,12 @@ def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how:
 
     asides = [dict(zip(ASIDE, one, strict=True)) for one in product(*ASIDE.values())][1:]
     looked = [read(one, aside) for one in readings for aside in asides]
-    judged = run([Cell(title(one), score_as_is, {"protocol": one}) for one in looked], folder, **how)
+    cells = [Cell(title(one), score_as_is, {"protocol": one}) for one in looked]
+    cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, SEARCHED) for one in readings]
+    found = run(cells, folder, **how)
+    judged, searched = found[: len(looked)], found[len(looked) :]
     rows = [xr.concat(judged[i : i + len(asides)], "aside").agrees for i in range(0, len(judged), len(asides))]
     names = ["; ".join(f"{name} {one}" for name, one in aside.items() if one != ASIDE[name][0]) for aside in asides]
-    searched = run([Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}) for one in readings], folder, **how)
     ideal = xr.concat(searched, "best").rename(claim="ideal_claim")
     closer = {"aside_agrees": xr.concat(rows, "best").assign_coords(aside=names)}
     return xr.Dataset(closer | {"ideal_agrees": ideal.agrees, "ideal_flss": ideal.flss})

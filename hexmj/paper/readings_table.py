@@ -1,5 +1,6 @@
 """The comparison of readings as a page: Markdown."""
 
+import math
 from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING
@@ -30,16 +31,17 @@ def readings_rows(scores: "xr.Dataset", places: Sequence[int]) -> list[tuple[str
 
 
 def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str:
-    """The page: best readings, what each choice alone changes, a closer look, and every reading."""
+    """The page: best readings, what each choice alone changes, if all are combined, a closer look, every reading."""
     ranked = ranking(scores).tolist()
+    change = "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred"
+    all_combined = len(readings) == math.prod(map(len, CHOICES.values()))
     sections = {
         "# Readings of the 1998 paper": [
             _judged_on(scores, readings[0]),
             *_table(HEADS, readings_rows(scores, ranked[: scores.sizes["best"]])),
         ],
         "## As printed, and the named readings": _named_ones(scores, readings),
-        "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred":
-            _changes(scores, readings),
+        **({change: _changes(scores, readings)} if all_combined else {}),
         "## A closer look at the best": [*_aside(scores), "", *_ideal_sets(scores)],
         "## Every reading": _table(HEADS, readings_rows(scores, ranked)),
     }  # fmt: skip

@@ -3,8 +3,9 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, count as they
-are now, if they lie beside it, in the package's `assets` or, for a user's own, in the current folder.
+the one module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, are looked
+for beside it, in the package's `assets` or, for a user's own, in the current folder: they count as they are now and as
+they were when it ran, and so does it that there is none.
 """
 
 import ast
@@ -21,9 +22,7 @@ from hexmj import as_run
 from hexmj.errors import InputError
 from hexmj.files import digest
 from hexmj.parsing import parsed
-from hexmj.sweeps.plain import module_label
-
-PACKAGE = Path(__file__).parents[1]
+from hexmj.sweeps.plain import PACKAGE, module_label
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -34,8 +33,8 @@ CARRIERS = {
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
 
-INSTALLED = {"site-packages", "dist-packages"}
-"""Folders of installed packages, this Python's own or another's."""
+_ASSETS = PACKAGE / "assets" if (PACKAGE / "assets").is_dir() else PACKAGE.parent / "assets"
+"""Of an installed package, and of one that runs from its repository."""
 
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _STANDARD = sysconfig.get_path("stdlib")
@@ -66,10 +65,10 @@ class _Module:
 
 
 def code(modules: frozenset[str]) -> Code:
-    """All that some modules need, and they themselves: sources as this program ran them, data files as they are now.
+    """All that some modules need, and they themselves: sources as they ran, data files as they are and were.
 
     Raises:
-        InputError: one has no source, or a source was edited while this program used it.
+        InputError: one has no source, or a source is not what this program ran.
     """
     sources, versions, read = _needed(modules)
     data: dict[str, str] = {}
@@ -155,7 +154,7 @@ def _found(module: str) -> Path | None:
 
 
 def _is_installed(file: Path) -> bool:
-    return any(file.is_relative_to(one) for one in _INSTALLED) or not INSTALLED.isdisjoint(file.parts)
+    return any(file.is_relative_to(one) for one in _INSTALLED) or not as_run.INSTALLED.isdisjoint(file.parts)
 
 
 @cache
@@ -181,7 +180,7 @@ def _read(name: str, file: Path) -> _Module:
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), as_run.data_names(python), package == name, imports, bound)
+    return _Module(digest(content), as_run.data_names(nodes), package == name, imports, bound)
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
@@ -205,11 +204,10 @@ def _stamp(module: str) -> str:
 
 def _data(module: str, file: Path, names: list[str]) -> Iterator[tuple[str, str]]:
     """Digests of the data files that a module names."""
-    ours = [file.parent, PACKAGE / "assets", PACKAGE.parent / "assets"]
-    folders = ours if file.is_relative_to(PACKAGE) else as_run.data_folders(file)
+    folders = [file.parent, _ASSETS] if file.is_relative_to(PACKAGE) else as_run.data_folders(file)
     for name in names:
-        if paths := {folder / name for folder in folders if (folder / name).is_file()}:
-            yield f"{module}, {name}", digest(b"".join(as_run.data(path) for path in sorted(paths)))
+        if held := as_run.data(file, name, folders):
+            yield f"{module}, {name}", held
 
 
 @cache

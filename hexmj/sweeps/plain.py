@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from inspect import getattr_static
@@ -18,30 +18,40 @@ from hexmj.files import digest, read_bytes
 NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["']""")
 """Files and their folders in an MJCF."""
 
+PACKAGE = Path(__file__).parents[1]
+"""Folder of this package."""
 
-def plain(value: Any) -> Any:
+
+def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     """A setting as JSON can hold it: a frozen dataclass with the name of its class, an array as a list.
 
-    A file is its name and a digest of its content, wherever it lies; so is a text with an ending that names one.
+    A file is its name and a digest of its content, wherever it lies; so is a text with a dot that names one.  A field
+    of a user's own class may name one without a dot, and beside the class's module or those of its bases as well.
+
+    Args:
+        value: of the setting.
+        folders: where files are looked for, beside the current one.
 
     Raises:
         InputError: it is none of the things that a setting can be.
     """
     if _frozen(value):
         _check_fields(value)
-        return {"class": label(type(value))} | {one.name: plain(getattr(value, one.name)) for one in fields(value)}
+        of_class = (*folders, *_folders(type(value)))
+        told = {one.name: plain(getattr(value, one.name), of_class) for one in fields(value)}
+        return {"class": label(type(value))} | told
     if isinstance(value, np.ndarray | np.generic) and value.dtype in (np.bool_, np.int64, np.float64):
         return value.tolist()
-    if type(value) is str and _is_file(value):
-        return f"{value}@{digest(content(Path(value)))}"
+    if type(value) is str and (folders or "." in value) and (held := _held(value, folders)):
+        return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
         return value
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [plain(item, folders) for item in value]
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-        return {key: plain(item) for key, item in value.items()}
+        return {key: plain(item, folders) for key, item in value.items()}
     if isinstance(value, Path) and not value.is_dir():
-        return f"{value.name}@{digest(content(value))}" if value.is_file() else str(value)
+        return f"{value.name}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
         f"{value!r:.80} is no setting; expected a number, text, path of a file, frozen dataclass, or a tuple, dict or"
         " array (float64, int64, bool) of these"
@@ -99,11 +109,18 @@ def content(path: Path) -> bytes:
     return b"".join(found[one] for one in sorted(found))
 
 
-def _is_file(text: str) -> bool:
-    try:
-        return "." in text and Path(text).is_file()
-    except (OSError, ValueError):  # too long for a name, or with a null character
-        return False
+def _held(name: str | Path, folders: Sequence[Path]) -> str:
+    """Digests of what a file holds in the current folder and in others, each empty without it; none if all are."""
+    paths = dict.fromkeys(folder / name for folder in (Path(), *folders))
+    held = [digest(content(path)) if isfile(path) else "" for path in paths]
+    return ",".join(held) if any(held) else ""
+
+
+def _folders(kind: type) -> list[Path]:
+    """Where the modules of a user's own class and of its bases lie."""
+    names = [one.__module__ for one in kind.__mro__ if one.__module__.partition(".")[0] not in sys.stdlib_module_names]
+    files = [Path(file) for name in names if (file := getattr(sys.modules.get(name), "__file__", None))]
+    return list(dict.fromkeys(file.parent for file in files if not file.is_relative_to(PACKAGE)))
 
 
 def _check_fields(value: Any) -> None:
