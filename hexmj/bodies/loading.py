@@ -11,6 +11,7 @@ from hexmj.bodies.additions import complete
 from hexmj.bodies.checks import check_described
 from hexmj.bodies.compiled import CompiledBody, measured
 from hexmj.bodies.description import Body
+from hexmj.bodies.finished import check_finished
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
 from hexmj.bodies.reading import posed
@@ -126,6 +127,7 @@ def _compiled(conditions: Conditions, looks: bool, files: bytes) -> CompiledBody
         under = f"ground = {conditions.ground.ground!r}, load = {masses.load:g}, grasp = {contact.grasp:g}"
         raise InputError(f"body {body.name!r} with {under} cannot be built: {_sentence(error)}") from None
     model.pair_friction[:, :2] = contact.friction
+    check_finished(model, conditions)
     if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
         _redistribute(model, body, masses)
     return measured(model, conditions)
