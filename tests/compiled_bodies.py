@@ -1,5 +1,7 @@
 """Conditions of any body, its model at home, and what differs between two models."""
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -44,3 +46,13 @@ def at_home(compiled: CompiledBody) -> mujoco.MjData:
     data.ctrl[compiled.columns.ctrl] = compiled.home[compiled.columns.qpos]
     mujoco.mj_forward(compiled.model, data)
     return data
+
+
+def changed_body(folder: Path, changes: dict[str, str]) -> Body:
+    """The stick insect with some words of its MJCF replaced."""
+    text = STICK_INSECT.text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (file := folder / "changed.xml").write_text(text)
+    return replace(STICK_INSECT, name="changed", mjcf=file)

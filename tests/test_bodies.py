@@ -1,5 +1,6 @@
 """What is compiled from the stick insect's description: gains, home, columns, masses and grounds."""
 
+import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from compiled_bodies import at_home, conditions, differences
+from compiled_bodies import at_home, changed_body, conditions, differences
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.description import ROOT_QPOS, Servo
 from hexmj.bodies.gains import gains, longest_lever
@@ -156,3 +157,73 @@ def test_what_an_mjcf_lacks_is_added(insect: CompiledBody, tmp_path: Path):
     assert plain_model(bare.body).nu == 0
     assert differences(bare.model, insect.model) == ["key_ctrl"]
     assert bare.columns == insect.columns
+
+
+UNLISTED = {"\n  <contact>\n": "\n  <!--\n", "  </contact>\n": "  -->\n"}
+GROUND = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
+
+
+@pytest.mark.parametrize(
+    ("changes", "under"),
+    [
+        (UNLISTED | {'<pair condim="3"': '<pair condim="1"'}, {}),
+        (UNLISTED | {'solref="0.00125 1" ': ""}, {"ground": "step"}),
+        ({'<pair condim="3"': '<pair condim="1"', "<pair name": '<pair condim="3" name'}, {"ground": "rough"}),
+        ({'forcerange="-4e5 4e5"': 'forcelimited="false"'}, {}),
+        ({'inheritrange="1"': 'inheritrange="1" ctrllimited="false"'}, {}),
+        ({' integrator="implicitfast"': ""}, {}),
+        ({GROUND: f'<frame pos="0 0 5">{GROUND} pos="0 0 -5"', "\n    <body": "</frame><body"}, {"ground": "gap"}),
+    ],
+)
+def test_what_an_mjcf_tells_otherwise_is_made_as_ever(tmp_path: Path, changes: dict[str, str], under: dict[str, Any]):
+    changed = compile_body(conditions(changed_body(tmp_path, changes), **under))
+    assert differences(changed.model, compile_body(conditions(**under)).model) == []
+
+
+def test_a_mass_beside_the_body_moves_nothing(tmp_path: Path):
+    beside = {"</worldbody>": '<body pos="90 0 0"><geom type="sphere" size="9" mass="5"/></body></worldbody>'}
+    data = at_home(changed := compile_body(conditions(changed_body(tmp_path, beside), centre_of_mass=5.0)))
+    assert (data.subtree_com[changed.root] - data.qpos[:3])[0] == pytest.approx(5.0, abs=1e-6)
+
+
+def test_masses_are_moved_ahead_however_parts_are_turned(tmp_path: Path):
+    """Not along their own axes."""
+    turned = {'<body name="prothorax" pos': '<body name="prothorax" euler="0 20 90" pos'}
+    masses = {"centre_of_mass": 5.0, "leg_mass": 0.5}
+    centres = []
+    for own in ({}, turned):
+        data = at_home(changed := compile_body(conditions(changed_body(tmp_path, own), **masses)))
+        centres.append(data.subtree_com[changed.root] - data.qpos[:3])
+    assert [centre[0] for centre in centres] == pytest.approx([5.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    "altered", ['cutoff="30"', 'noise="1"', 'nsample="20" delay="0.01"', 'nsample="2" interval="0.01"']
+)
+def test_sensors_that_show_something_else_are_left_alone(insect: CompiledBody, tmp_path: Path, altered: str):
+    """And others are added."""
+    body = changed_body(tmp_path, {"<framepos ": f"<framepos {altered} "})
+    compiled = compile_body(conditions(body))
+    assert compiled.columns.foot.start == insect.model.nsensordata
+    assert replace(compiled.columns, foot=insect.columns.foot) == insect.columns
+
+
+def test_counts_of_contacts_are_one_number_for_each_part(tmp_path: Path):
+    columns = compile_body(conditions(changed_body(tmp_path, {'data="found"': 'data="found" num="3"'}))).columns
+    assert columns.trunk.stop - columns.trunk.start == len(STICK_INSECT.trunk)
+
+
+def test_a_mesh_that_is_edited_within_a_second_is_read_anew(tmp_path: Path):
+    head = '<geom name="head" '
+    pack = {
+        "<asset>": '<asset><mesh name="pack" file="pack.obj"/>',
+        head: f'<geom name="pack" type="mesh" mesh="pack"/>{head}',
+    }
+    body, faces = changed_body(tmp_path, pack), "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    for size in (1.0, 3.0):
+        corners = f"v 0 0 0\nv {size} 0 0\nv 0 {size} 0\nv 0 0 {size}\n"
+        (tmp_path / "pack.obj").write_text(corners + faces)
+        os.utime(tmp_path / "pack.obj", (1e9, 1e9))
+        model = compile_body(conditions(body)).model
+        first = model.mesh("pack").vertadr[0]
+        assert np.ptp(model.mesh_vert[first : first + 4], axis=0).max() == pytest.approx(size, rel=0.5)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from compiled_bodies import at_home, conditions
+from compiled_bodies import at_home, changed_body, conditions
 from hexmj.bodies.description import Leg
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
@@ -26,6 +26,17 @@ def changed_leg(**changes: Any) -> tuple[Leg, ...]:
 
 
 SECOND = STICK_INSECT.legs[1]
+
+ROOT, WORLD, OPTION, JOINT = '<freejoint name="root"/>', "</worldbody>", "<option ", '<joint armature="1" '
+FLAG, PAIR, TRUNK, HEAD = '<flag island="disable"', '<pair condim="3"', '<geom name="mesothorax" ', '<geom name="head" '
+PLANE = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
+SERVO, SITE = "<position name", '<site name="R3_foot" '
+SKY = '<site name="sky" pos="0 0 200"/></worldbody><tendon><spatial stiffness="60"><site site="sky"/><site site="top"/>'
+SKY += "</spatial></tendon>"
+FLEX = '<flexcomp name="f" type="grid" count="3 3 1" spacing="5 5 5" pos="0 0 4" mass=".01" dim="2" rigid="true"/>'
+PLUGIN = '<extension><plugin plugin="mujoco.sensor.touch_grid"/></extension><asset>'
+GRID = '<plugin plugin="mujoco.sensor.touch_grid" objtype="site" objname="L1_foot">'
+GRID += '<config key="size" value="2 2"/><config key="fov" value="10 10"/><config key="nchannel" value="1"/></plugin>'
 
 
 @pytest.mark.parametrize(
@@ -52,6 +63,21 @@ def test_descriptions_without_sense_are_refused(changes: dict[str, Any], message
 def test_a_home_that_is_not_as_described_is_refused(changes: dict[str, Any]):
     with pytest.raises(InputError, match=r"at 'home' foot 'L[12]_foot' is at .*; expected it on the origin of"):
         settle(draw_starts(1, 0), Conditions(body=replace(STICK_INSECT, **changes)))
+
+
+@pytest.mark.parametrize(
+    ("pack", "turn", "message"),
+    [
+        ("3 0 3", "1 0 0 0", r"centre of mass lies 1 mm ahead of O; expected it at O"),
+        ("3 0 3", "1 0 0 1", r"centre of mass lies 1 mm ahead of O; expected it at O"),
+        ("0 4 3", "1 0 0 0", r"centre of mass lies 1\.33\d mm to the left of O; expected 0"),
+    ],
+)
+def test_a_centre_of_mass_elsewhere_is_seen_however_home_is_turned(tmp_path: Path, pack: str, turn: str, message: str):
+    load = f'<geom type="sphere" size="1" pos="{pack}" mass="0.5"/>{TRUNK}'
+    body = changed_body(tmp_path, {TRUNK: load, 'qpos="0 0 10.4  1 0 0 0': f'qpos="0 0 10.4 {turn}'})
+    with pytest.raises(InputError, match=message):
+        settle(draw_starts(1, 0), conditions(replace(body, mass=1.5)))
 
 
 def test_a_centre_of_mass_elsewhere_is_said_and_stays_there(tmp_path: Path):
@@ -111,12 +137,12 @@ def test_descriptions_that_the_mjcf_does_not_fit_are_refused(changes: dict[str, 
             'type="plane" euler="5 0 0" size',
             "lies at z = 0 mm, quat = .* expected it level at z = 0",
         ),
-        ('condim="3"', 'condim="1"', "has condim = 1; expected 3 or more: friction"),
+        ('condim="3"', 'condim="1"', "condim = 1 of the pair .*; expected 3 or more: friction"),
         ('<geom name="L2_foot" class="foot"', '<geom name="L2_foot" class="foot" size="0.5"', "feet have the radii"),
         ("<mujoco model", "<mujoco mod", "does not compile"),
-        ("</worldbody>", '</worldbody><equality><weld body1="mesothorax"/></equality>', "1 equality constraints"),
-        ('gravity="0 0 -9810"', 'gravity="0 0 -9810" density="1000" viscosity="10"', "density = 1000, viscosity = 10"),
-        ('<body name="mesothorax"', '<body name="mesothorax" gravcomp="1"', "gravity is compensated"),
+        ("</worldbody>", '</worldbody><equality><weld body1="mesothorax"/></equality>', "equality constraints = 1"),
+        ('gravity="0 0 -9810"', 'gravity="0 0 -9810" density="1000" viscosity="10"', "density = 1000.0; expected 0"),
+        ('<body name="mesothorax"', '<body name="mesothorax" gravcomp="1"', "gravcomp = 1.0 of the body 'mesothorax'"),
     ],
 )
 def test_mjcfs_that_cannot_walk_are_refused(tmp_path: Path, old: str, new: str, message: str):
@@ -125,3 +151,83 @@ def test_mjcfs_that_cannot_walk_are_refused(tmp_path: Path, old: str, new: str, 
     file.write_text(STICK_INSECT.text().replace(old, new))
     with pytest.raises(InputError, match=message):
         compile_body(conditions(replace(STICK_INSECT, mjcf=file)))
+
+
+def root_joint(attribute: str) -> dict[str, str]:
+    """A root whose joint takes an attribute, as it takes those of a default."""
+    return {ROOT: f'<joint type="free" name="root" limited="false" {attribute}/>'}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({HEAD: '<geom name="skull" ', WORLD: f'{HEAD}size="1"/>{WORLD}'}, "geom 'head' is on the body 'world'; expec"),
+        (root_joint('damping="500"'), r"damping = 500\.0 of the root; expected 0"),
+        (root_joint('damping="0 5"'), r"damping = \[5\.0, .* of the root; expected 0"),
+        (root_joint('frictionloss="300"'), r"frictionloss = 300\.0 of the root; expected 0"),
+        (root_joint('armature="5"'), r"armature = 5\.0 of the root; expected 0"),
+        (root_joint('stiffness="5000"'), r"stiffness = 5000\.0 of the root; expected 0"),
+        ({WORLD: SKY, TRUNK: f'<site name="top"/>{TRUNK}'}, "number of tendons = 1; expected"),
+        ({WORLD: FLEX + WORLD}, "number of flexes = 1; expected none"),
+        ({"<asset>": PLUGIN, "</sensor>": f"{GRID}</sensor>"}, "number of plugins = 1; expected none"),
+        ({PAIR: '<pair condim="1"'}, "condim = 1 of the pair"),
+        ({PAIR: f'{PAIR} margin="3"'}, r"margin = 3\.0 of the pair"),
+        ({PAIR: f'{PAIR} gap="3"'}, r"gap = 3\.0 of the pair"),
+        ({PAIR: f'{PAIR} solreffriction="0.02 1"'}, r"solreffriction = \[0\.02, 1\.0\] of the pair"),
+        ({'solref="0.00125 1"': 'solref="0.05 1"'}, r"solref = \[0\.05, 1\.0\] of the pair .* at most 0\.0025 s"),
+        ({'solref="0.00125 1"': 'solref="-640000 -1600"'}, r"solref = \[-640000\.0, .* a time constant above 0"),
+        ({FLAG: f'{FLAG} override="enable"', OPTION: '<option o_friction="0 0 0 0 0" '}, "flag 'override' is enabled"),
+        ({FLAG: f'{FLAG} sleep="enable"'}, "flag 'sleep' is enabled; expected flags as MuJoCo has them"),
+        *(
+            ({FLAG: f'{FLAG} {flag}="disable"'}, f"flag '{flag}' is disabled; expected flags as MuJoCo has them")
+            for flag in ("contact", "gravity", "actuation", "limit", "clampctrl", "warmstart", "refsafe")
+        ),
+        ({"implicitfast": "RK4"}, "integrator = RK4; expected IMPLICITFAST or IMPLICIT"),
+        ({'solver="Newton"': 'solver="PGS"'}, "solver = PGS; expected NEWTON or CG"),
+        ({OPTION: '<option iterations="1" '}, "iterations = 1; expected 100 or more"),
+        ({OPTION: '<option ls_iterations="1" '}, "ls_iterations = 1; expected 50 or more"),
+        ({'tolerance="1e-5" ': 'tolerance="1" '}, r"tolerance = 1\.0; expected at most 1e-05"),
+        ({OPTION: '<option actuatorgroupdisable="1" '}, "actuatorgroupdisable = 2; expected none"),
+        ({WORLD: f'<body name="ball"><freejoint name="b"/><geom size="3"/></body>{WORLD}'}, "joint 'b' is no leg's"),
+        ({SITE: f'<body><joint name="spur"/><geom size="0.1" mass="1e-6"/></body>{SITE}'}, "joint 'spur' is no leg's"),
+        ({JOINT: f'{JOINT} actuatorfrcrange="-9 9" '}, "actuatorfrclimited = True of the joint 'L1_thorax_coxa'"),
+        ({SERVO: '<position nsample="20" delay="0.01" name'}, r"nsample, interp = \[20, 0\] of the actuator"),
+        ({WORLD: f'<geom name="wall" type="box" size="3 9 9" contype="1"/>{WORLD}'}, "geom 'wall' beside the body"),
+        ({WORLD: f'<geom name="upper" type="plane" size="9 9 9" conaffinity="1"/>{WORLD}'}, "geom 'upper' beside the"),
+    ],
+)
+def test_what_is_in_force_unseen_is_refused(tmp_path: Path, changes: dict[str, str], message: str):
+    body = changed_body(tmp_path, changes)
+    with pytest.raises(InputError, match=message):
+        compile_body(conditions(body))
+
+
+@pytest.mark.parametrize(
+    ("changes", "under", "message"),
+    [
+        (
+            {HEAD: f'<geom name="step" type="sphere" size="1"/>{HEAD}'},
+            {"ground": "step"},
+            "ground = 'step', .* repeated name 'step'",
+        ),
+        (
+            {HEAD: f'<geom name="bump_3" type="sphere" size="1"/>{HEAD}'},
+            {"ground": "rough"},
+            "cannot be built: .* 'bump_3'",
+        ),
+        ({HEAD: f'<body name="load"/>{HEAD}'}, {"load": 1.0}, "load = 1, .* repeated name 'load'"),
+        ({' autolimits="true"/>': ' settotalmass="1"/>'}, {"load": 1.0}, "with load = 1 it weighs 1 g; expected 2 g"),
+        (
+            {PLANE: f'<frame quat="0 1 0 0">{PLANE} quat="0 1 0 0"', "\n    <body": "</frame><body"},
+            {"ground": "gap"},
+            "with ground = 'gap' its plane lies at z = 31 mm; expected -31 mm",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass'")
+def test_what_conditions_cannot_be_met_with_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, str], under: dict[str, Any], message: str
+):
+    monkeypatch.chdir(tmp_path)  # MuJoCo logs its warnings there
+    with pytest.raises(InputError, match=message):
+        compile_body(conditions(changed_body(tmp_path, changes), **under))

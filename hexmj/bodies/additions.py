@@ -1,4 +1,4 @@
-"""What a body's MJCF may lack is added as it is compiled: servos, pairs that touch, sensors.
+"""What a body's MJCF may lack is added as it is compiled: an implicit integrator, servos, pairs that touch, sensors.
 
 Nothing is added to an MJCF that has it all, as the stick insect's.
 """
@@ -15,8 +15,8 @@ from hexmj.legs import LEGS
 
 _SENSOR, _OBJECT = mujoco.mjtSensor, mujoco.mjtObj
 
-_FOUND = 1 << mujoco.mjtConDataField.mjCONDATA_FOUND.value
-"""Of a contact sensor that counts contacts."""
+_COUNTS = (1 << mujoco.mjtConDataField.mjCONDATA_FOUND.value, 0, 1)
+"""Of a contact sensor that counts contacts, in one number."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,14 @@ class SensorGroup:
     """Of the sensors where they are added."""
 
     def find(self, model: mujoco.MjModel) -> slice | None:
-        """Their columns of `sensordata`; none where the model lacks them, or has them in another order."""
+        """Their columns of `sensordata`; none where the model lacks them, has them in another order, or alters what
+        they show."""
         wanted = np.array([mujoco.mj_name2id(model, self.of, name) for name in self.objects])
         fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.of) & (model.sensor_refid < 0)
+        for altered in (model.sensor_cutoff, model.sensor_noise, model.sensor_delay, model.sensor_interval[:, 0]):
+            fits &= altered == 0
         if self.kind == _SENSOR.mjSENS_CONTACT:
-            fits &= model.sensor_intprm[:, 0] == _FOUND
+            fits &= (model.sensor_intprm[:, :3] == _COUNTS).all(axis=1)
         there = np.where(fits, model.sensor_objid, -1)
         for first in range(model.nsensor - len(wanted) + 1):
             last = first + len(wanted) - 1
@@ -59,22 +62,28 @@ def sensor_groups(body: Body) -> dict[str, SensorGroup]:
 def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gains) -> None:
     """Make a spec walk: servos with these gains at the joints, nothing that touches but feet and trunk the ground.
 
+    Where the integrator is Euler's, which is MuJoCo's own if none is told, damping is integrated implicitly instead.
+
     Args:
         spec: the body's, as its MJCF says.
         plain: the same, compiled.
         body: its description.
         gains: of the servos.
     """
+    if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
     paired = [{pair.geomname1, pair.geomname2} for pair in spec.pairs]
     for touching in (*body.trunk, *body.feet):
         if {body.ground, touching} not in paired:
-            spec.add_pair(name=f"{body.ground}_{touching}", geomname1=body.ground, geomname2=touching)
+            pair = spec.add_pair(name=f"{body.ground}_{touching}", geomname1=body.ground, geomname2=touching)
+            pair.condim, pair.solref = 3, [2 * body.longest_step, 1.0]
     for servo in _servos(spec, body):
         servo.set_to_position(kp=gains.stiffness, dampratio=gains.damping_ratio)
         servo.forcerange, servo.gear = [-gains.torque, gains.torque], [1.0] + 5 * [0.0]
         servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
+        servo.forcelimited = servo.ctrllimited = True
     for group in sensor_groups(body).values():
         if group.find(plain) is None:
             _add_sensors(spec, group)
@@ -95,4 +104,4 @@ def _add_sensors(spec: mujoco.MjSpec, group: SensorGroup) -> None:
         name = f"{name}_measured" if name in taken else name
         sensor = spec.add_sensor(name=name, type=group.kind, objtype=group.of, objname=of)
         if group.kind == _SENSOR.mjSENS_CONTACT:
-            sensor.intprm[:3] = _FOUND, 0, 1
+            sensor.intprm[:3] = _COUNTS

@@ -16,6 +16,9 @@ BUMPS = (15, 9)
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
 
+CONTACT = ("condim", "solref", "solimp")
+"""Of what touches the ground: it touches what lies ahead alike."""
+
 
 def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
     """Add what lies ahead to a spec of a body on its plane."""
@@ -32,17 +35,20 @@ def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
         size = (end - begin) / 2, lengths.ground_half_width, half
         pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
     if ground.ground == "gap":
-        spec.geom(body.ground).pos[2] = -lengths.shortest_leg
+        spec.geom(body.ground).pos[2] -= lengths.shortest_leg  # in its own frame, if it stands in one
     if ground.ground == "rough":
         # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that
         # is deeper than its distance from their sides sideways into the next, and there it stays.
         for i, ((x, y), top, radius) in enumerate(zip(*_bumps(ground, lengths), strict=True)):
             pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
     look = LOOK | {"material": spec.geom(body.ground).material}
+    alike = {frozenset((pair.geomname1, pair.geomname2)): pair for pair in spec.pairs}
     for name, (kind, size, place) in pieces.items():
         spec.worldbody.add_geom(name=name, type=kind, size=size, pos=place, **look)
         for touching in (*body.trunk, *body.feet):
-            spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
+            pair = spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
+            for setting in CONTACT:
+                setattr(pair, setting, getattr(alike[frozenset((body.ground, touching))], setting))
 
 
 def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.ndarray:

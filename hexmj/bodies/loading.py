@@ -11,8 +11,10 @@ from hexmj.bodies.additions import complete
 from hexmj.bodies.checks import check_described
 from hexmj.bodies.compiled import CompiledBody, measured
 from hexmj.bodies.description import Body
+from hexmj.bodies.finished import check_finished
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
+from hexmj.bodies.reading import posed
 from hexmj.conditions import Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
@@ -67,7 +69,7 @@ def _plain_model(body: Body, files: bytes) -> mujoco.MjModel:
 
 def check_home(compiled: CompiledBody) -> None:
     """Refuse a body that is not as described in posture home: its feet, and its centre of mass, which is at O unless
-    `Masses.centre_of_mass` says where.
+    `Masses.centre_of_mass` says how far ahead.
 
     Raises:
         InputError: it is not.
@@ -83,20 +85,23 @@ def check_home(compiled: CompiledBody) -> None:
             f"body {body.name!r}: at {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()} mm;"
             f" expected it on the origin of its line, a standing height below the root, {expected[leg].tolist()}"
         )
-    own = _centre_of_mass(plain_model(body), body)
+    own, aside, _ = _centre_of_mass(plain_model(body), body)
     if masses.centre_of_mass == 0.0 and abs(own) > allowed:
         raise InputError(
             f"body {body.name!r}: at {body.home!r} its centre of mass lies {own:.4g} mm ahead of O; expected it at O,"
             f" or centre_of_mass = {own:.4g} among the conditions, to leave it there"
         )
+    if abs(aside) > allowed:
+        raise InputError(
+            f"body {body.name!r}: at {body.home!r} its centre of mass lies {aside:.4g} mm to the left of O; expected 0"
+        )
 
 
-def _centre_of_mass(model: mujoco.MjModel, body: Body) -> float:
-    """How far ahead of O it lies in posture home [mm]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(body.home).id)
-    mujoco.mj_forward(model, data)
-    return float((data.subtree_com[model.body(body.root).id] - data.qpos[:3])[0])
+def _centre_of_mass(model: mujoco.MjModel, body: Body) -> np.ndarray:
+    """Where it lies from O in posture home, in the root's frame (x ahead, y to the left, z up), (axis,) [mm]."""
+    data = posed(model, model.key(body.home).qpos)
+    mujoco.mj_comPos(model, data)
+    return data.subtree_com[model.body(body.root).id]
 
 
 def gravity(body: Body) -> float:
@@ -110,19 +115,19 @@ def _compiled(conditions: Conditions, looks: bool, files: bytes) -> CompiledBody
     body, masses, contact = conditions.body, conditions.masses, conditions.contact
     plain, spec = _plain_model(body, files), _spec(body)
     spec.compiler.discardvisual = not looks
-    complete(spec, plain, body, gains(plain, body))
-    lay_ground(spec, conditions.ground, body)
-    if masses.load:
-        mass = masses.load * body.mass
-        load = spec.body(body.root).add_body(name="load", mass=mass, inertia=3 * [body.lengths.load_gyration**2 * mass])
-        load.explicitinertial = True
-    if contact.grasp:
-        _add_grasp(spec, body, contact.grasp * body.mass * gravity(body))
     try:
+        complete(spec, plain, body, gains(plain, body))
+        lay_ground(spec, conditions.ground, body)
+        if masses.load:
+            _add_load(spec, body, masses.load)
+        if contact.grasp:
+            _add_grasp(spec, body, contact.grasp * body.mass * gravity(body))
         model = spec.compile()
     except ValueError as error:
-        raise InputError(f"{conditions.ground} cannot be built: {_sentence(error)}") from None
+        under = f"ground = {conditions.ground.ground!r}, load = {masses.load:g}, grasp = {contact.grasp:g}"
+        raise InputError(f"body {body.name!r} with {under} cannot be built: {_sentence(error)}") from None
     model.pair_friction[:, :2] = contact.friction
+    check_finished(model, conditions)
     if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
         _redistribute(model, body, masses)
     return measured(model, conditions)
@@ -133,7 +138,15 @@ def _sentence(error: ValueError) -> str:
 
 
 def _spec(body: Body) -> mujoco.MjSpec:
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # of meshes, which it knows by names and whole seconds
     return mujoco.MjSpec.from_file(str(body.mjcf))
+
+
+def _add_load(spec: mujoco.MjSpec, body: Body, load: float) -> None:
+    """Let the root carry a load, in multiples of the body's own mass."""
+    mass = load * body.mass
+    part = spec.body(body.root).add_body(name="load", mass=mass, inertia=3 * [body.lengths.load_gyration**2 * mass])
+    part.explicitinertial = True
 
 
 def _add_grasp(spec: mujoco.MjSpec, body: Body, force: float) -> None:
@@ -159,6 +172,8 @@ def _redistribute(model: mujoco.MjModel, body: Body, masses: Masses) -> None:
         model.body_inertia[bodies] *= factor
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
-    offset = masses.centre_of_mass - _centre_of_mass(model, body)
-    model.body_ipos[trunk, 0] += offset * model.body_mass.sum() / model.body_mass[trunk].sum()
+    offset = masses.centre_of_mass - _centre_of_mass(model, body)[0]
+    in_all = np.where(model.body_rootid == model.body(body.root).id, model.body_mass, 0.0).sum()
+    ahead = posed(model, model.qpos0).xmat[trunk, :3]  # the root's x in the frame of each part
+    model.body_ipos[trunk] += offset * in_all / model.body_mass[trunk].sum() * ahead
     mujoco.mj_setConst(model, data)
