@@ -12,6 +12,8 @@ import pytest
 import hexmj
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.leg_lost import LegLost
+from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
 from hexmj.errors import InputError
@@ -65,8 +67,9 @@ def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
 )
 def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values, told):
     conditions, still = Conditions.of(**values), WithOffsets(example("train_cma").Reflexes())
-    with pytest.raises(InputError, match=f"the plan is made for {told}"):
-        hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=conditions)
+    for one in (still, LegLost(still, 2), PoorSenses(still)):
+        with pytest.raises(InputError, match=f"the plan is made for {told}"):
+            hexmj.physical_walk(hexmj.draw_starts(1, 3), one, 0.3, 1.0, conditions=conditions)
     with pytest.raises(InputError, match=f"the plan is made for {told}"):
         StickInsect(controller=still, conditions=conditions).reset(seed=0)
     hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(load=1.0))

@@ -55,6 +55,11 @@ class LamePlan:
         self.starts, self.stride, self._plan, self._leg = plan.starts, plan.stride, plan, leg
 
     @property
+    def made_for(self) -> object:
+        """The conditions that its controller's plan is made for, if it tells them; see `protocol.Plan`."""
+        return getattr(self._plan, "made_for", None)
+
+    @property
     def done(self) -> int:
         """See `protocol.Plan`."""
         return self._plan.done

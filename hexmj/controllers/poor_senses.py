@@ -72,6 +72,11 @@ class PoorlyToldPlan:
         self._late = late
 
     @property
+    def made_for(self) -> object:
+        """The conditions that its controller's plan is made for, if it tells them; see `protocol.Plan`."""
+        return getattr(self._plan, "made_for", None)
+
+    @property
     def done(self) -> int:
         """See `protocol.Plan`."""
         return self._plan.done
