@@ -177,7 +177,9 @@ class _Parcel:
             ) from None
         if record != self.record:
             other = difference(self.record, record)
-            raise InputError(f"{cell.name}: {here} has another {other} than the sender; start the worker again")
+            raise InputError(
+                f"{cell.name}: {here} has another {other} than the sender; start the worker again, in the same folder"
+            )
         if self.mark and not self.mark.exists():
             raise InputError(
                 f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
