@@ -160,6 +160,6 @@ def edited_rows(rows: np.ndarray, data: str) -> np.ndarray:
 def test_evaluations_during_which_a_file_is_edited_are_not_kept(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
     values = KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept")
-    with pytest.raises(InputError, match="rows: data of settings was edited while it was in use; start again"):
+    with pytest.raises(InputError, match="rows: data of settings has changed while it was in use; start again"):
         values(np.eye(2))
     assert KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept").known == 0

@@ -158,7 +158,7 @@ def edits(path: str, text: str) -> xr.Dataset:
 
 def test_a_file_that_is_edited_while_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
-    with pytest.raises(InputError, match="edits: path of settings was edited while it was in use; start again"):
+    with pytest.raises(InputError, match="edits: path of settings has changed while it was in use; start again"):
         run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
     assert not list(tmp_path.rglob("*.nc"))
     assert len(run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1

@@ -118,6 +118,37 @@ def test_a_plan_may_write_into_its_own_arrays_again(settled):
         assert np.array_equal(joined, getattr(whole, name), equal_nan=True)
 
 
+@dataclass(frozen=True)
+class Restless:
+    """Draws where its legs step anew, whenever it begins."""
+
+    name: str = "restless"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        inner = LDVS.begin(starts, velocity, stride, acceleration)
+        shift = np.random.default_rng().uniform(0.0, 1.0, starts.shape)
+
+        def step(v):
+            walk = inner.advance(1)
+            return Step(walk.x[0] - shift, walk.stance[0])
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+@pytest.mark.parametrize(
+    "measured",
+    [
+        lambda starts: hexmj.physical_walk(starts, Restless(), 0.5, 2.0),
+        lambda starts: hexmj.compare(Restless(), [0.5], n_starts=2, window=2.0),
+    ],
+    ids=["a walk", "both measures"],
+)
+def test_a_controller_that_plans_otherwise_when_it_begins_again_is_refused(measured):
+    with pytest.raises(hexmj.InputError, match="plans another walk when it begins again: x is"):
+        measured(hexmj.draw_starts(2, 0))
+
+
 def test_a_plan_that_goes_on_by_other_steps_is_refused():
     plan = LDVS.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
     true, plan.advance = plan.advance, lambda steps: true(steps + 1)

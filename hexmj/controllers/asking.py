@@ -24,6 +24,9 @@ from hexmj.walks import PLANNED, PlannedWalk, copied
 KEPT = 400
 """Memory that a step of a start takes while it is planned [bytes]."""
 
+REPEATED = 20
+"""Steps by which two plans are told apart: every leg that lifts in two time units shows."""
+
 
 def begin(
     controller: Controller,
@@ -106,6 +109,39 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     if not ((walk.velocity >= 0.0) & (walk.velocity < 1.0)).all():
         raise InputError("a plan's velocity is below 0 or not below 1; expected V_r as it was commanded")
     return walk
+
+
+def check_repeats(
+    controller: Controller,
+    starts: np.ndarray,
+    velocity: ArrayLike,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+) -> None:
+    """Refuse a controller whose first steps are others when it begins again, as by random numbers without a seed.
+
+    Raises:
+        InputError: it is one.
+    """
+    plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
+    check_same(*(advanced(plan, REPEATED) for plan in plans), controller.name)
+
+
+def check_same(one: PlannedWalk, other: PlannedWalk, whose: str) -> None:
+    """Refuse two plans that ought to be the same and are not: what is told of one is not of the other.
+
+    Raises:
+        InputError: they differ.
+    """
+    for name in PLANNED:
+        a, b = getattr(one, name), getattr(other, name)
+        same = (a == b) | (a != a) & (b != b)
+        if not same.all():
+            at = tuple(np.argwhere(~same)[0])
+            raise InputError(
+                f"{whose} plans another walk when it begins again: {name} is {a[at]:g} and {b[at]:g} in"
+                f" {place(one, at)}; expected the same numbers each time, as from seeds that are fields"
+            )
 
 
 def place(walk: PlannedWalk, at: Sequence[int]) -> str:

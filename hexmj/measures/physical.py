@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.asking import begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
@@ -87,6 +87,7 @@ def physical_outcomes(
     """
     duration = typed("duration", duration, float)
     how: Any = {"stride": settled.stride, "acceleration": acceleration}
+    check_repeats(controller, settled.starts, velocity, **how)
     plan = begin(controller, settled.starts, velocity, **how, threads=1)
     planned_loss = first_loss(settled.starts, controller, velocity, duration, **how, threads=threads)
     return outcomes_of_plan(settled, plan, duration, planned_loss, threads=threads, progress=progress)
@@ -156,7 +157,11 @@ def physical_walk_of_plan(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> PhysicalWalk:
-    """The same for any plan that is at time 0, which goes as `planned`."""
+    """The same for any plan that is at time 0, which goes as `planned`.
+
+    Raises:
+        InputError: it goes otherwise, and reads nothing.
+    """
     conditions, stride = settled.conditions, settled.stride
     so_far = OutcomesSoFar(settled, loss_time(planned, threads=threads))
     shape = planned.stance.shape
@@ -165,7 +170,12 @@ def physical_walk_of_plan(
     told: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
         so_far.add(chunk)
-        told += [chunk.plan] if isinstance(plan, ReadingPlan) else []
+        if isinstance(plan, ReadingPlan):
+            told.append(chunk.plan)
+        else:
+            first = chunk.first // settled.substeps
+            same = part_of(planned, slice(first, first + len(chunk.plan.time)))
+            check_same(same, chunk.plan, "the controller")
         columns, seen, seen_centre = measured_walk(chunk, settled)
         at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
         x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
 from typing import Any
@@ -53,28 +54,41 @@ class Cell:
         Raises:
             InputError: a setting, or the function, is nothing that can be written down.
         """
-        owner = getattr(self.function, "__self__", None)
+        told = self._told()
+        made = code(frozenset(one.__module__ for one in (self.function, *classes([self.settings, self._owner]))))
+        return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
+
+    def settings_now(self) -> str:
+        """The function and its settings as they are, as JSON; empty if they cannot be written down."""
+        with suppress(InputError):
+            return json.dumps(self._told(), sort_keys=True)
+        return ""
+
+    def _told(self) -> dict[str, Any]:
         if not hasattr(self.function, "__qualname__"):
             raise InputError(f"{self.function!r:.80} of {self.name}; expected a function or a method")
-        made = code(frozenset(one.__module__ for one in (self.function, *classes([self.settings, owner]))))
-        told = {"function": label(self.function), "of": plain(owner), "settings": plain(self.settings)}
-        return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
+        return {"function": label(self.function), "of": plain(self._owner), "settings": plain(self.settings)}
+
+    @property
+    def _owner(self) -> Any:
+        """What the function is a method of, if it is one."""
+        return getattr(self.function, "__self__", None)
 
     def stem(self, record: str) -> str:
         """The name of its file without the ending."""
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
 
 
-def check_unedited(cell: Cell, record: str) -> None:
-    """Refuse what a cell has given if something that it depends on was edited since its record was made.
+def check_unchanged(cell: Cell, before: str, now: str) -> None:
+    """Refuse what a cell has given if something that it depends on has changed since, as its records tell.
 
     Raises:
-        InputError: it was.
+        InputError: it has.
     """
-    if (now := cell.record()) != record:
+    if now != before:
         raise InputError(
-            f"{cell.name}: {difference(record, now)} was edited while it was in use; start again, and let fields"
-            " name files that are read, not written"
+            f"{cell.name}: {difference(before, now)} has changed while it was in use; start again, with fields that"
+            " stay as they are and name files that are read, not written"
         )
 
 

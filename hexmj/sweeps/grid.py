@@ -16,7 +16,7 @@ from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
-from hexmj.sweeps.cells import Cell, check_unedited, difference
+from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.files import read, write
 
 if TYPE_CHECKING:
@@ -145,11 +145,10 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
 
     if path and path.exists():
         return read(path, record)
+    before = record if path else cell.settings_now()
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
-    if path is None:
-        return data
-    check_unedited(cell, record)
-    return write(path, record, data)
+    check_unchanged(cell, before, cell.record() if path else cell.settings_now())
+    return write(path, record, data) if path else data
 
 
 @dataclass(frozen=True)

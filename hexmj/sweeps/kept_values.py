@@ -10,7 +10,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.files import opened
-from hexmj.sweeps.cells import Cell, check_unedited
+from hexmj.sweeps.cells import Cell, check_unchanged
 
 
 class KeptValues:
@@ -55,7 +55,7 @@ class KeptValues:
             picked = rows[list(new.values())]
             values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
-                check_unedited(self._cell, self._record)
+                check_unchanged(self._cell, self._record, self._cell.record())
                 _add(self._path, "".join(map(self._line, new, values.tolist())))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])
