@@ -56,3 +56,9 @@ def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, t
     else:
         assert "start 3 diverged; give --out to keep its last good state there" in error
         assert not list(tmp_path.iterdir())
+
+
+def test_an_answer_that_can_go_nowhere_is_a_sentence(run, monkeypatch):
+    monkeypatch.setattr("sys.stdout", None)
+    code, _, error = run("flss", "--starts", 5, "--window", 10, "--json")
+    assert (code, error) == (2, "hexmj: standard output is closed; expected it open, for the answer\n")

@@ -23,7 +23,7 @@ from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import Diverged, MujocoBatch
-from hexmj.physics.callbacks import CHANGING, stopped_clock
+from hexmj.physics.callbacks import CHANGING, stopped_clock, unlogged
 from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.orders import OrdersFromPlan
@@ -97,6 +97,16 @@ def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
     assert mujoco.get_mjcb_time() is None
     list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
     assert mujoco.get_mjcb_time() is None
+
+
+def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
+    first, second = unlogged(), unlogged()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert mujoco.get_mju_user_warning() is not None
+    second.__exit__(None, None, None)
+    assert mujoco.get_mju_user_warning() is None
 
 
 def test_a_clock_of_the_users_own_goes_on(settled):

@@ -79,6 +79,24 @@ def test_while_a_pool_of_processes_is_made(tmp_path):
     assert done.stderr.strip() == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
 
 
+def test_while_a_pool_of_processes_is_left(tmp_path):
+    script = (
+        "import os\n"
+        "from concurrent.futures import ProcessPoolExecutor as Pool\n"
+        "usual = Pool.shutdown\n"
+        "def shutdown(*some, **more):\n"
+        "    os.kill(os.getpid(), 2)\n"
+        "    usual(*some, **more)\n"
+        "Pool.shutdown = shutdown\n"
+        "from hexmj.__main__ import main\n"
+        "main()"
+    )
+    words = [sys.executable, "-c", script, "flss", "--starts", "9", "--processes", "2", "--out", str(tmp_path)]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.splitlines()[-1] == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
+
+
 def test_while_c_code_calls_back():
     """As numba does while it loads compiled code; what such a callback raises goes no farther."""
     script = (

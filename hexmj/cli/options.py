@@ -226,6 +226,8 @@ class Sweepers:
                     for worker in active_children():
                         worker.terminate()
                 raise
+            with stops_wait():  # nothing is left to do but to leave
+                executor.shutdown()
 
     def _cluster(self) -> AbstractContextManager[Executor | None]:
         """The workers of the scheduler, if one was named."""
