@@ -190,6 +190,15 @@ def test_a_push_is_finite(name):
             Push(**{"impulse": np.zeros(2), "time": np.zeros(2), name: np.array([0.0, wrong])})
 
 
+@pytest.mark.parametrize("wrong", [np.ones(1), np.array(1.0), [1.0, 2.0], "hard"], ids=repr)
+def test_a_push_is_of_all_starts(settled, wrong):
+    n_starts = len(settled.starts)
+    words = "a push's impulse (has the shape|= 'hard'; expected numbers)"
+    with pytest.raises(InputError, match=words):
+        push = Push(wrong, np.zeros(n_starts))
+        list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0, push=push))
+
+
 @pytest.mark.parametrize("name", CHANGING)
 def test_callbacks_that_would_change_the_physics_are_refused(name):
     change = getattr(mujoco, f"set_mjcb_{name}")

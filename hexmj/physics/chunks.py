@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.bodies.grounds import beyond_the_ground
+from hexmj.checks import numbers
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
@@ -69,16 +70,21 @@ class Push:
     """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
 
     def __post_init__(self) -> None:
-        for name, values in vars(self).items():
+        for name, given in vars(self).items():
+            values = numbers(f"a push's {name}", given)
             if not np.isfinite(values).all():
                 raise InputError(f"a push's {name} = {values[~np.isfinite(values)][0]}; expected a finite number")
+            object.__setattr__(self, name, values)
 
-    def check_within(self, duration: float) -> None:
-        """Refuse a push that does not begin while its start is watched [time units].
+    def check_within(self, duration: float, n_starts: int) -> None:
+        """Refuse a push that is not of so many starts, or does not begin while its start is watched [time units].
 
         Raises:
-            InputError: it begins before or after that.
+            InputError: it is of others, or begins before or after that.
         """
+        for name, values in vars(self).items():
+            if values.shape != (n_starts,):
+                raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
         beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time >= duration))
         if beside.any():
             start = int(np.argmax(beside))

@@ -48,7 +48,7 @@ def drive(
     """
     insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration)
     if push:
-        push.check_within(duration)
+        push.check_within(duration, len(settled.starts))
     total = int(steps_within(duration, settled.stride)) * settled.substeps
     told, walking = 0.0, np.arange(len(settled.starts))
     for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):
