@@ -36,6 +36,8 @@ def encode(data: "xr.Dataset") -> bytes:
         InputError: something that NetCDF cannot hold.
     """
     plain = data.drop_encoding()
+    if odd := [name for name in (*plain.variables, *plain.dims) if not _is_text(name)]:
+        raise InputError(f"NetCDF cannot hold this: the name {literal(repr(odd[0])):.80}; expected a text without NUL")
     _check_attributes("the dataset", plain.attrs, TAKEN)
     for name, variable in plain.variables.items():
         texts = variable.dtype != object or all(isinstance(one, str) for one in variable.values.flat)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.checks import typed
 from hexmj.errors import InputError
+from hexmj.measures.parts import check_axes, what_parts_may_lack
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,10 +36,6 @@ FIGURES: dict[str, dict[str, str]] = {
 """What a result is of, as its attribute `study` tells -> its figures by name, each a module and a function of it."""
 
 
-COUNTED = "start", "case", "row", "evaluation"
-"""Axes of results that only count; any other has values or names."""
-
-
 def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     """Draw a result; a notebook shows the figure, and `savefig` of it writes PNG, PDF or SVG.
 
@@ -58,30 +55,14 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
     if _study(result) != RECORDING:
-        _check_axes(result)
+        check_axes(result)
     chosen = next(iter(figures)) if which is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
     module, _, name = figures[chosen].partition(":")
     draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
-    try:
+    with what_parts_may_lack(result, f"the figure {chosen!r} cannot be drawn"):
         return draw(result)
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
-        raise InputError(
-            f"the figure {chosen!r} cannot be drawn of this part of a result, {sizes} ({error!r:.200});"
-            " expected the result as it was computed"
-        ) from error
-
-
-def _check_axes(result: "xr.Dataset") -> None:
-    """Refuse a result without one of its axes, or with one that has lost its values."""
-    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
-    if gone:
-        raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
-    bare = [name for name in result.sizes if name not in (*COUNTED, *result.coords)]
-    if bare:
-        raise InputError(f"a result without the values of its axis {bare[0]}; expected the result as it was computed")
 
 
 def _study(result: "xr.Dataset") -> str:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,8 @@ ATTRIBUTES = "(attributes)"
 """Stands for all attributes of a NetCDF file and of its variables."""
 
 STRUCTURE = "(structure)"
-"""Stands for the keys and lists of a JSON or TOML file, whatever they hold."""
+"""Stands for the keys and lists of a JSON or TOML file, whatever they hold; of a NetCDF file for the axes of each
+variable in their order, and for which variables are coordinates."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class Compared:
     """A variable of a file beside that of another."""
 
     name: str
-    """Of the variable; for JSON and TOML the keys that lead to it, for all items of a list at once."""
+    """Of the variable; for JSON and TOML the keys that lead to it, for all items of a list at once.  One that could be
+    taken for several, or for what stands for a whole file, is in quotation marks."""
     values: int
     """How many it has."""
     differ: int
@@ -91,15 +94,34 @@ def _distance(a: Any, b: Any) -> float:
 
 
 def _of_netcdf(path: Path) -> dict[str, np.ndarray]:
-    """Variables, and all attributes as one; with the seal or without it, since a number may have been changed."""
+    """Variables, all attributes as one, and all axes as one text; with the seal or without it, since a number may have
+    been changed."""
     with opened(path) as file:
         content = file.read()
     data = netcdf.decode(unsealed(content) or content, f"{path} cannot be read as NetCDF")
-    owners = {"": data} | {f"{name}: ": one for name, one in sorted(data.variables.items())}
-    attributes = [f"{of}{key} = {value!r}" for of, one in owners.items() for key, value in sorted(one.attrs.items())]
-    found = {str(name): one.values for name, one in data.variables.items()}
+    variables = {str(name): one for name, one in sorted(data.variables.items())}
+    owners: dict[tuple[str, ...], Any] = {(): data} | {(name,): one for name, one in variables.items()}
+    attributes = [
+        f"{_name(*of, str(key))} = {_exact(value)}"
+        for of, one in owners.items()
+        for key, value in sorted(one.attrs.items())
+    ]
+    found = {_name(name): one.values for name, one in variables.items()}
     texts = {name: one.astype(object) for name, one in found.items() if one.dtype.kind not in "biuf"}
-    return found | texts | {ATTRIBUTES: np.array(attributes, dtype=object)}
+    axes = {name: [*map(str, one.dims), name in data.coords] for name, one in variables.items()}
+    told = {ATTRIBUTES: attributes, STRUCTURE: [json.dumps(axes, sort_keys=True)]}
+    return found | texts | {name: np.array(one, dtype=object) for name, one in told.items()}
+
+
+def _exact(attribute: Any) -> str:
+    """Type and value of a text, a number or a row of them, with all digits."""
+    array = np.asarray(attribute)
+    return f"{array.tolist()!r} ({array.dtype})"
+
+
+def _name(*keys: str) -> str:
+    """Keys as one name, which no other keys have."""
+    return ".".join(key if re.fullmatch(r'[^."(]+', key) else json.dumps(key) for key in keys)
 
 
 def _of_json(path: Path) -> dict[str, np.ndarray]:
@@ -117,7 +139,7 @@ def _gathered(table: Any) -> dict[str, np.ndarray]:
     """Values of nested dictionaries and lists by the keys that lead to them, and how they are nested as one text."""
     found: dict[str, list[Any]] = {}
     for keys, value in _leaves(table):
-        found.setdefault(".".join(keys), []).append(value)
+        found.setdefault(_name(*keys), []).append(value)
     found[STRUCTURE] = [json.dumps(_structure(table), sort_keys=True)]
     return {name: np.array(values, dtype=object) for name, values in found.items()}
 

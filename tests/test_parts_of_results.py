@@ -16,10 +16,12 @@ from hexmj.plots import FIGURES
 from hexmj.search.history import History
 from hexmj.studies.ablation.study import Ablation
 from hexmj.studies.biology.study import Biology
+from hexmj.studies.biology.table import biology_markdown
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
 from hexmj.studies.disturbance.study import DisturbedWalks
 from hexmj.studies.league.entrants import entrants
 from hexmj.studies.league.study import League
+from hexmj.studies.league.table import league_markdown
 from hexmj.studies.stability_map.study import StabilityMap
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.studies.terrain.study import Terrain
@@ -89,6 +91,27 @@ def test_ranks_over_all_velocities_are_not_drawn_of_a_part_of_them():
     for which in FIGURES["league"]:
         with pytest.raises(InputError, match=r"^1 of 2 along the axis velocity; expected all"):
             hexmj.plot(made("league").isel(velocity=[1]), which)
+
+
+@pytest.mark.parametrize(
+    ("part", "sentence"),
+    [
+        (lambda one: one.isel(trial=[0]), "the tables .* cannot be made of this part of a result, .*trial 1"),
+        (lambda one: one.isel(measure=[0]), "the tables .* cannot be made of this part of a result, .*measure 1"),
+        (lambda one: one.isel(entrant=0), "the tables .* cannot be made of this part of a result, "),
+        (lambda one: one.isel(entrant=[]), "a result without the axis entrant; expected all"),
+        (lambda one: one.rename(entrant="e"), "the tables .* cannot be made of this part of a result, .*e 2"),
+        (lambda one: one.drop_attrs(), "the tables .* cannot be made of this part of a result, "),
+    ],
+)
+def test_tables_of_a_part_of_a_league_are_refused_in_a_sentence(part: Callable, sentence: str):
+    with pytest.raises(InputError, match=f"^{sentence}"):
+        league_markdown(part(made("league")))
+
+
+def test_the_table_of_insects_of_too_small_a_part_is_refused_in_a_sentence():
+    with pytest.raises(InputError, match=r"^the table of insects cannot be made of this part of a result, "):
+        biology_markdown(made("biology").isel(row=0))
 
 
 def cells(result: xr.Dataset) -> list[tuple[str, ...]]:

@@ -104,7 +104,7 @@ def test_a_number_that_was_changed_is_found_and_named(run, flss):
     assert code == 1
     assert "high 1 1 differ, by at most 1e-09" in told
     assert "low 1 equal" in told
-    assert "1 of 27 values differ; what else differs, and may be why: changed since they were written (flss.nc)" in told
+    assert "1 of 28 values differ; what else differs, and may be why: changed since they were written (flss.nc)" in told
     code, text, _ = run("rerun", flss / "manifest.json", "--json")
     answer = json.loads(text)
     (result,) = answer["results"]
@@ -273,6 +273,7 @@ def test_every_bit_counts(tmp_path):
         save_dataset(data.assign_attrs(seed=len(name)), tmp_path / f"{name}.nc")
     assert sorted(compared(tmp_path / "old.nc", tmp_path / "new.nc"), key=lambda one: one.name) == [
         Compared("(attributes)", 1, 0, None),
+        Compared("(structure)", 1, 1, None),
         Compared("b", 5, 0, None),
         Compared("came", 5, 5, None, "not there then"),
         Compared("gone", 5, 5, None, "not there now"),
@@ -304,7 +305,6 @@ def test_json_and_toml_are_compared_by_their_keys(tmp_path):
     [
         ('{"a": []}', "{}"),
         ("[[1, 2], [3]]", "[[1], [2, 3]]"),
-        ('{"a.b": 1}', '{"a": {"b": 1}}'),
         ('[{"a": 1}, {}]', '[{}, {"a": 1}]'),
     ],
 )
@@ -313,6 +313,21 @@ def test_what_is_nested_otherwise_is_not_equal(tmp_path, old, new):
     for path, text in zip(paths, (old, new), strict=True):
         path.write_text(text)
     assert [one.name for one in compared(*paths) if one.differ] == ["(structure)"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "names"),
+    [
+        ('{"(structure)": 1}', '{"(structure)": 2}', ['"(structure)"']),
+        ('{"a.b": 1}', '{"a": {"b": 1}}', ["(structure)", '"a.b"', "a.b"]),
+        ('{"a.b": 1, "a": {"b": 2}}', '{"a": {"b": 1}, "a.b": 2}', ['"a.b"', "a.b"]),
+    ],
+)
+def test_keys_that_look_like_others_are_their_own(tmp_path, old, new, names):
+    paths = tmp_path / "old.json", tmp_path / "new.json"
+    for path, text in zip(paths, (old, new), strict=True):
+        path.write_text(text)
+    assert [one.name for one in compared(*paths) if one.differ] == names
 
 
 def test_the_order_of_keys_counts_for_nothing(tmp_path):
@@ -327,4 +342,26 @@ def test_a_variable_in_another_unit_is_not_equal(tmp_path):
     assert compared(tmp_path / "old.nc", tmp_path / "new.nc") == [
         Compared("x", 1, 0, None),
         Compared("(attributes)", 1, 1, None),
+        Compared("(structure)", 1, 0, None),
     ]
+
+
+def row(values: object, *axes: str, **attributes: object) -> xr.Dataset:
+    return xr.Dataset({"a": (axes or "x", np.asarray(values), attributes)})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "name"),
+    [
+        (row([1.0], k=[0.1, 0.2]), row([1.0], k=[0.1, 0.2 + 1e-12]), "(attributes)"),
+        (row([1.0], k=np.zeros(2000)), row([1.0], k=np.eye(1, 2000, 1000)[0]), "(attributes)"),
+        (row([1.0], k=np.float32([1, 2])), row([1.0], k=[1.0, 2.0]), "(attributes)"),
+        (row([1.0], k="v"), row([1.0]).assign_attrs({"a.k": "v"}), "(attributes)"),
+        (row(np.eye(2), "x", "y"), row(np.eye(2), "y", "x"), "(structure)"),
+        (row([1.0]), row([1.0]).set_coords("a"), "(structure)"),
+        (row([1.0]).rename(a="(attributes)"), row([2.0]).rename(a="(attributes)"), '"(attributes)"'),
+    ],
+)
+def test_all_that_a_netcdf_file_tells_counts(tmp_path, old, new, name):
+    paths = [save_dataset(one, tmp_path / f"{n}.nc") for n, one in enumerate((old, new))]
+    assert [one.name for one in compared(*paths) if one.differ] == [name]

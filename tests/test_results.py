@@ -271,6 +271,15 @@ def test_orders_to_readers_of_netcdf_are_no_attributes(tmp_path: Path):
         hexmj.save(small().rename(c="my c"), tmp_path / "a.nc")
 
 
+@pytest.mark.parametrize("old", ["x", "c", "i"])
+def test_a_name_that_would_not_come_back_is_refused(old: str, tmp_path: Path):
+    for name in ("a\0b", "\ud800", 3):
+        with pytest.raises(
+            InputError, match=r"^NetCDF cannot hold this: the name [ -~]+; expected a text without NUL$"
+        ):
+            hexmj.save(small().rename({old: name}), tmp_path / "a.nc")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["png", "pdf", "svg"])
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):

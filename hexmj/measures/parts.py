@@ -1,5 +1,7 @@
-"""Which parts of a result can be drawn: none along an axis over which its numbers were taken."""
+"""Which parts of a result can be drawn, or told in tables: none along an axis over which its numbers were taken."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from hexmj.attributes import settings
@@ -7,6 +9,46 @@ from hexmj.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+COUNTED = "start", "case", "row", "evaluation"
+"""Axes of results that only count; any other has values or names."""
+
+
+def check_axes(result: "xr.Dataset") -> None:
+    """Refuse a result without one of its axes, or with one that has lost its values.
+
+    Args:
+        result: of `compare`, `flss` or any study.
+
+    Raises:
+        InputError: with the name of the first one.
+    """
+    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
+    if gone:
+        raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
+    bare = [name for name in result.sizes if name not in (*COUNTED, *result.coords)]
+    if bare:
+        raise InputError(f"a result without the values of its axis {bare[0]}; expected the result as it was computed")
+
+
+@contextmanager
+def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
+    """Refuse in one sentence whatever the block does not find in a part of a result.
+
+    Args:
+        result: that the block reads.
+        cannot: what then cannot be done, such as "the figure cannot be drawn".
+
+    Raises:
+        InputError: in place of the errors of Python, NumPy and xarray.
+    """
+    try:
+        yield
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
+        raise InputError(
+            f"{cannot} of this part of a result, {sizes} ({error!r:.200}); expected the result as it was computed"
+        ) from error
 
 
 def check_starts(result: "xr.Dataset", told: int | None = None) -> None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from hexmj.measures.parts import check_axes, what_parts_may_lack
 from hexmj.studies.biology.animals import SOURCES
 
 if TYPE_CHECKING:
@@ -26,9 +27,15 @@ def rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
 
 
 def biology_markdown(result: "xr.Dataset") -> str:
-    """The table, and the sources it names."""
-    lines = [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, rows(result)), ""]
-    named = {*result.source.values}
+    """The table, and the sources it names.
+
+    Raises:
+        InputError: a part of a result that holds too little.
+    """
+    check_axes(result)
+    with what_parts_may_lack(result, "the table of insects cannot be made"):
+        lines = [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, rows(result)), ""]
+        named = {*result.source.values}
     return (
         "\n".join([*lines, *(f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text)]) + "\n"
     )

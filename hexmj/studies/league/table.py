@@ -1,6 +1,5 @@
 """The league as tables: each a title, a head and rows of texts, for the terminal and as Markdown."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from hexmj.attributes import settings
 from hexmj.measures.captions import rules
-from hexmj.measures.parts import check_whole
+from hexmj.measures.parts import check_axes, check_whole, what_parts_may_lack
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:
@@ -34,14 +33,16 @@ class Table:
     rows: list[tuple[str, ...]]
 
 
-def tables(result: "xr.Dataset") -> Iterator[Table]:
-    """Everything that is told of a result of `League`."""
-    yield _ranks(result)
-    for measure, title in MEASURES.items():
-        yield _over_velocity(result, measure, title)
-    yield _regimes(result)
-    yield _trials(result)
-    yield _costs(result)
+def tables(result: "xr.Dataset") -> list[Table]:
+    """Everything that is told of a result of `League`.
+
+    Raises:
+        InputError: a part of it that holds too little.
+    """
+    check_axes(result)
+    with what_parts_may_lack(result, "the tables of a league cannot be made"):
+        over_velocity = [_over_velocity(result, measure, title) for measure, title in MEASURES.items()]
+        return [_ranks(result), *over_velocity, _regimes(result), _trials(result), _costs(result)]
 
 
 def league_markdown(result: "xr.Dataset") -> str:
