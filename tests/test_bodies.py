@@ -172,6 +172,8 @@ GROUND = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
         ({'forcerange="-4e5 4e5"': 'forcelimited="false"'}, {}),
         ({'inheritrange="1"': 'inheritrange="1" ctrllimited="false"'}, {}),
         ({' integrator="implicitfast"': ""}, {}),
+        ({'<site type="sphere" size="0.44"': '<site type="box" size="0.1 0.005 0.005"'}, {}),
+        ({' autolimits="true"/>': ' autolimits="true" inertiafromgeom="true"/>'}, {"load": 1.0}),
         ({GROUND: f'<frame pos="0 0 5">{GROUND} pos="0 0 -5"', "\n    <body": "</frame><body"}, {"ground": "gap"}),
     ],
 )

@@ -150,6 +150,23 @@ def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
     assert len(found) == 3
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("a&b.xml", '"a&amp;b.xml"'),
+        ("a&b.xml", "'a&#38;b.xml'"),
+        ("it's.xml", '"it\'s.xml"'),
+        ("a&amp.xml", '"a&amp.xml"'),
+    ],
+)
+def test_an_mjcf_may_include_files_of_any_name(tmp_path: Path, name: str, told: str) -> None:
+    (tmp_path / "main.xml").write_text(f"<mujoco><include file={told}/></mujoco>")
+    (tmp_path / name).write_text("<mujocoinclude/>")
+    before = plain(tmp_path / "main.xml")
+    (tmp_path / name).write_text("<mujocoinclude> </mujocoinclude>")
+    assert plain(tmp_path / "main.xml") != before
+
+
 def test_an_mjcf_in_folders_is_looked_for_beside_each_file(tmp_path: Path) -> None:
     (tmp_path / "sub" / "m").mkdir(parents=True)
     (tmp_path / "main.xml").write_text('<mujoco><include file="sub/legs.xml"/></mujoco>')

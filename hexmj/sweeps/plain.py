@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
+from html import unescape
 from inspect import getattr_static
 from os.path import isfile
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from hexmj.errors import InputError
 from hexmj.files import digest, read_bytes
 
-NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*["']([^"']*)["']""")
+NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2""")
 """Files and their folders in an MJCF."""
 
 PACKAGE = Path(__file__).parents[1]
@@ -98,9 +99,9 @@ def content(path: Path) -> bytes:
     found, new = dict[Path, bytes](), {path}
     while new:
         found |= {one: read_bytes(one) for one in new}
-        named = [
-            one for text in found.values() if b"\0" not in text for one in NAMED.findall(text.decode(errors="replace"))
-        ]
+        texts = [text.decode(errors="replace") for text in found.values() if b"\0" not in text]
+        told = [(kind, value) for text in texts for kind, _, value in NAMED.findall(text)]
+        named = told + [(kind, unescape(value)) for kind, value in told]
         names = {name for kind, value in named if kind == "file" for name in (value, Path(value).name)}
         folders = {
             one.parent / folder for one in found for folder in ("", *(value for kind, value in named if kind != "file"))
