@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.checks import typed
 from hexmj.errors import InputError
-from hexmj.measures.parts import check_axes, what_parts_may_lack
+from hexmj.measures.parts import check_axes, check_window, what_parts_may_lack
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,8 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
         which: of several figures; the first one unless given.
 
     Raises:
-        InputError: a dataset that no figure belongs to, no such figure, or a part of a result that shows too little.
+        InputError: a dataset that no figure belongs to, no such figure, a part of a result that shows too little, or
+            results joined whose controllers or windows are not those that their settings tell.
     """
     import xarray as xr
 
@@ -54,14 +55,15 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
-    if _study(result) != RECORDING:
-        check_axes(result)
     chosen = next(iter(figures)) if which is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
     module, _, name = figures[chosen].partition(":")
     draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
     with what_parts_may_lack(result, f"the figure {chosen!r} cannot be drawn"):
+        if _study(result) != RECORDING:
+            check_axes(result)
+            check_window(result)
         return draw(result)
 
 

@@ -114,6 +114,27 @@ def test_the_table_of_insects_of_too_small_a_part_is_refused_in_a_sentence():
         biology_markdown(made("biology").isel(row=0))
 
 
+def test_a_title_names_the_controllers_that_are_shown():
+    result = made("compare")
+    for names in (["a"], ["b"], ["b", "a"]):
+        title = hexmj.plot(result.sel(controller=names)).get_suptitle()
+        assert f"\n{', '.join(sorted(names))};" in title
+
+
+def test_results_of_other_settings_are_not_drawn_under_those_of_the_first():
+    def one(name: str, window: float) -> xr.Dataset:
+        return hexmj.compare({name: hexmj.LDVS}, [0.5], n_starts=2, window=window)
+
+    a, b, longer = one("a", 5.0), one("b", 5.0), one("a", 10.0)
+    with pytest.raises(InputError, match=r"^a result of the controller 'b', but with the settings of a; expected"):
+        hexmj.plot(xr.concat([a, b], "controller"))
+    for joined in ([a, longer], [longer, a]):
+        with pytest.raises(InputError, match=r"^a result with the window \d+\.0 in its settings, but with walks of "):
+            hexmj.plot(xr.concat(joined, xr.DataArray([0.5, 0.7], dims="velocity", name="velocity")))
+    told = xr.concat([a, b], "controller", combine_attrs="drop_conflicts")
+    assert "a, b; 2 starts" in hexmj.plot(told).get_suptitle()
+
+
 def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
     """Title, row and column of each cell of a map's panels, and what it says in words and as a colour."""
     found, figure = [], hexmj.plot(result)

@@ -355,7 +355,7 @@ def row(values: object, *axes: str, **attributes: object) -> xr.Dataset:
     [
         (row([1.0], k=[0.1, 0.2]), row([1.0], k=[0.1, 0.2 + 1e-12]), "(attributes)"),
         (row([1.0], k=np.zeros(2000)), row([1.0], k=np.eye(1, 2000, 1000)[0]), "(attributes)"),
-        (row([1.0], k=np.float32([1, 2])), row([1.0], k=[1.0, 2.0]), "(attributes)"),
+        (row([1.0], k=np.array([1, 2], np.float32)), row([1.0], k=[1.0, 2.0]), "(attributes)"),
         (row([1.0], k="v"), row([1.0]).assign_attrs({"a.k": "v"}), "(attributes)"),
         (row(np.eye(2), "x", "y"), row(np.eye(2), "y", "x"), "(structure)"),
         (row([1.0]), row([1.0]).set_coords("a"), "(structure)"),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from hexmj.attributes import settings
 from hexmj.conditions import unusual
+from hexmj.errors import InputError
 from hexmj.literal import in_figure
 
 if TYPE_CHECKING:
@@ -40,14 +41,37 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 WALKS = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
 """What is told of the walks."""
 
+NAMED = "controller", "entrant"
+"""Axes of controllers by name."""
+
 FEW = 3
 """Most controllers whose names a title tells."""
 
 
 def caption(result: "xr.Dataset") -> str:
-    """One line for the title of a figure: all that was chosen, and of the conditions V_p and what is not as usual."""
+    """One line for the title of a figure: all that was chosen, and of the conditions V_p and what is not as usual.
+
+    Raises:
+        InputError: a controller that the result's settings do not tell of.
+    """
     told = settings(result)
+    told["controllers"] = _shown(result, told)
     return "; ".join(filter(None, [controllers(told), *_walks(told), conditions(told)]))
+
+
+def _shown(result: "xr.Dataset", told: Mapping[str, Any]) -> dict[str, Any]:
+    """Name -> settings of the controllers along a result's axis of them, or of all without such an axis."""
+    axis = next((name for name in NAMED if name in result.coords), None)
+    if axis is None:
+        return told.get("controllers", {})
+    names = result[axis].values.ravel().tolist()
+    known = told.get("controllers", dict.fromkeys(names))
+    if unknown := [name for name in names if name not in known]:
+        raise InputError(
+            f"a result of the controller {unknown[0]!r:.80}, but with the settings of {', '.join(known):.200}; expected"
+            ' controllers that walked together, or results joined with combine_attrs="drop_conflicts"'
+        )
+    return {name: one for name, one in known.items() if name in names}
 
 
 def controllers(told: dict[str, Any]) -> str:
@@ -56,7 +80,8 @@ def controllers(told: dict[str, Any]) -> str:
     several = told.get("controllers", {})
     if len(several) > FEW:
         found = told.get("not_printed", not_printed(told))
-        return "; ".join(f"{words}: {', '.join(map(in_figure, names))}" for words, names in found.items())
+        shown = {words: [in_figure(name) for name in names if name in several] for words, names in found.items()}
+        return "; ".join(f"{words}: {', '.join(names)}" for words, names in shown.items() if names)
     return ", ".join(
         in_figure(name) + (f" ({words})" if (words := rules(one)) else "") for name, one in several.items()
     )

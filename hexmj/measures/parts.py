@@ -1,11 +1,15 @@
-"""Which parts of a result can be drawn, or told in tables: none along an axis over which its numbers were taken."""
+"""Which parts of results, and results joined, can be drawn or told in tables: no part along an axis over which numbers
+were taken, and none of other walks than the settings tell."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hexmj.attributes import settings
 from hexmj.errors import InputError
+from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +33,31 @@ def check_axes(result: "xr.Dataset") -> None:
     bare = [name for name in result.sizes if name not in (*COUNTED, *result.coords)]
     if bare:
         raise InputError(f"a result without the values of its axis {bare[0]}; expected the result as it was computed")
+
+
+def check_window(result: "xr.Dataset") -> None:
+    """Refuse observation times that are not those of the window in the settings, as of results that were joined.
+
+    Nothing is said of a result without such times, nor of variants, whose strides are their own.
+
+    Args:
+        result: of `compare`, `flss` or any study, over velocity.
+
+    Raises:
+        InputError: with the first time that differs.
+    """
+    told = settings(result)
+    if "duration" not in result.variables or "window" not in told or "variant" in result.duration.dims:
+        return
+    stride = Stride(**{name: value for name, value in told["stride"].items() if name != "geometry"})
+    acceleration = Acceleration(**told["acceleration"]) if told.get("acceleration") else None
+    times = observation_time(told["window"], result.velocity.values, stride, acceleration)
+    walked = result.duration.transpose(..., "velocity").values
+    if (odd := walked[~np.isclose(walked, times)]).size:
+        raise InputError(
+            f"a result with the window {told['window']} in its settings, but with walks of {odd[0]:g} time units;"
+            ' expected one window, or results joined with combine_attrs="drop_conflicts"'
+        )
 
 
 @contextmanager
