@@ -127,6 +127,9 @@ def _compiled(conditions: Conditions, looks: bool, files: bytes) -> CompiledBody
         under = f"ground = {conditions.ground.ground!r}, load = {masses.load:g}, grasp = {contact.grasp:g}"
         raise InputError(f"body {body.name!r} with {under} cannot be built: {_sentence(error)}") from None
     model.pair_friction[:, :2] = contact.friction
+    feet = [model.site(foot).id for foot in body.feet]
+    model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
+    model.site_size[feet, 0] = radius + radius / 10  # around the foot: touch is felt inside the site alone
     check_finished(model, conditions)
     if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
         _redistribute(model, body, masses)
@@ -139,7 +142,13 @@ def _sentence(error: ValueError) -> str:
 
 def _spec(body: Body) -> mujoco.MjSpec:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # of meshes, which it knows by names and whole seconds
-    return mujoco.MjSpec.from_file(str(body.mjcf))
+    spec = mujoco.MjSpec.from_file(str(body.mjcf))
+    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        # The same by other words, under which geoms that are only to look at may be discarded.
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+        for part in spec.bodies:
+            part.explicitinertial, part.ipos = False, 3 * [np.nan]
+    return spec
 
 
 def _add_load(spec: mujoco.MjSpec, body: Body, load: float) -> None:
@@ -167,6 +176,11 @@ def _redistribute(model: mujoco.MjModel, body: Body, masses: Masses) -> None:
     legs = [model.body(part).id for leg in body.legs for part in leg.parts]
     trunk = [model.body(part).id for part in body.trunk]
     in_legs, in_trunk = model.body_mass[legs].sum(), model.body_mass[trunk].sum()
+    if not in_legs * masses.leg_mass < in_legs + in_trunk:
+        raise InputError(
+            f"body {body.name!r}: leg_mass = {masses.leg_mass:g}; expected below {1.0 + in_trunk / in_legs:.4g}, or"
+            " nothing is left of the trunk"
+        )
     for bodies, factor in ((legs, masses.leg_mass), (trunk, 1.0 + in_legs / in_trunk * (1.0 - masses.leg_mass))):
         model.body_mass[bodies] *= factor
         model.body_inertia[bodies] *= factor
