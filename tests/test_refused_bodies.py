@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from compiled_bodies import at_home, changed_body, conditions
+from compiled_bodies import at_home, changed_body, conditions, differences
 from hexmj.bodies.description import Leg
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
@@ -30,6 +30,7 @@ SECOND = STICK_INSECT.legs[1]
 ROOT, WORLD, OPTION, JOINT = '<freejoint name="root"/>', "</worldbody>", "<option ", '<joint armature="1" '
 FLAG, PAIR, TRUNK, HEAD = '<flag island="disable"', '<pair condim="3"', '<geom name="mesothorax" ', '<geom name="head" '
 PLANE = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
+CONTACTS, BELLY = "  </contact>", '<pair geom1="ground" geom2="belly"/>'
 SERVO, SITE = "<position name", '<site name="R3_foot" '
 SKY = '<site name="sky" pos="0 0 200"/></worldbody><tendon><spatial stiffness="60"><site site="sky"/><site site="top"/>'
 SKY += "</spatial></tendon>"
@@ -171,6 +172,22 @@ def root_joint(attribute: str) -> dict[str, str]:
         ({WORLD: FLEX + WORLD}, "number of flexes = 1; expected none"),
         ({"<asset>": PLUGIN, "</sensor>": f"{GRID}</sensor>"}, "number of plugins = 1; expected none"),
         ({PAIR: '<pair condim="1"'}, "condim = 1 of the pair"),
+        ({'solimp="0.95 0.99': 'solimp="0.3 0.3'}, r"solimp = \[0\.3, 0\.3\] of the pair .*; expected 0\.9 or more"),
+        ({'solimp="0.95 0.99': 'solimp="0.95 0.5'}, r"solimp = \[0\.95, 0\.5\] of the pair"),
+        ({'impratio="3"': 'impratio="0.1"'}, r"impratio = 0\.1; expected 1 or more"),
+        *(
+            ({CONTACTS: f'<pair geom1="{one}" geom2="{other}"/>{CONTACTS}'}, f"pair of '{one}' and '{other}'; expected")
+            for one, other in (("mesothorax", "L1_knee"), ("L1_foot", "L2_foot"), ("ground", "R3_knee"))
+        ),
+        ({CONTACTS: f'<pair geom1="L1_foot" geom2="ground"/>{CONTACTS}'}, "'ground' and 'L1_foot'; .* each once"),
+        (
+            {TRUNK: f'<geom name="belly" type="sphere" size="5"/>{TRUNK}', CONTACTS: f"{BELLY}{CONTACTS}"},
+            "a pair of 'ground' and 'belly'; expected pairs of 'ground' with its trunk's parts and its feet alone",
+        ),
+        (
+            {WORLD: f'<geom name="wall" size="3"/>{WORLD}', CONTACTS: f"{BELLY.replace('belly', 'wall')}{CONTACTS}"},
+            "a pair of 'ground' and 'wall'; expected",
+        ),
         ({PAIR: f'{PAIR} margin="3"'}, r"margin = 3\.0 of the pair"),
         ({PAIR: f'{PAIR} gap="3"'}, r"gap = 3\.0 of the pair"),
         ({PAIR: f'{PAIR} solreffriction="0.02 1"'}, r"solreffriction = \[0\.02, 1\.0\] of the pair"),
@@ -200,6 +217,19 @@ def test_what_is_in_force_unseen_is_refused(tmp_path: Path, changes: dict[str, s
     body = changed_body(tmp_path, changes)
     with pytest.raises(InputError, match=message):
         compile_body(conditions(body))
+
+
+def test_euler_s_damping_is_idle(tmp_path: Path):
+    model = compile_body(conditions(changed_body(tmp_path, {FLAG: f'{FLAG} eulerdamp="disable"'}))).model
+    assert differences(model, compile_body(conditions()).model) == ["opt.disableflags"]
+
+
+def test_legs_that_leave_nothing_of_the_trunk_are_refused(tmp_path: Path):
+    heavy = {'<geom type="sphere" size="0.4" ': '<geom type="sphere" size="0.4" mass="0.5" '}
+    body = replace(changed_body(tmp_path, heavy), mass=4.0)
+    compile_body(conditions(body, leg_mass=1.2))
+    with pytest.raises(InputError, match=r"leg_mass = 1\.4; expected below 1\.2\d+, or nothing is left of the trunk"):
+        compile_body(conditions(body, leg_mass=1.4))
 
 
 @pytest.mark.parametrize(

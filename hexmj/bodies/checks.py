@@ -19,7 +19,7 @@ def check_described(model: mujoco.MjModel, body: Body) -> None:
     Raises:
         InputError: a name that is not there, joints in another order, or a mass, root, foot or ground that differs.
     """
-    for faults in (_in_names, _in_joints, _in_legs, _in_the_rest):
+    for faults in (_in_names, _in_joints, _in_legs, _in_ground, _in_pairs, _in_the_rest):
         for fault in faults(model, body):
             raise InputError(f"body {body.name!r}: {fault}")
 
@@ -86,16 +86,32 @@ def _in_legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
         yield f"its feet have the radii {sorted(radii)} mm; expected one for all"
 
 
-def _in_the_rest(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+def _in_ground(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     ground = model.geom(body.ground)
     if ground.type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
         yield f"the ground {body.ground!r} is no plane; expected a geom of type plane"
     if ground.bodyid[0] or ground.pos[2] or ground.quat[1:3].any():
         where = f"at z = {ground.pos[2]:g} mm, quat = {ground.quat.round(4).tolist()}"
         yield f"the ground {body.ground!r} lies {where}; expected it level at z = 0, in the world"
+
+
+def _in_pairs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    ground = model.geom(body.ground).id
+    left = {frozenset((ground, model.geom(part).id)) for part in (*body.trunk, *body.feet)}
+    for pair in zip(model.pair_geom1, model.pair_geom2, strict=True):
+        if (touching := frozenset(pair)) not in left:
+            names = " and ".join(repr(model.geom(geom).name) for geom in pair)
+            yield (
+                f"a pair of {names}; expected pairs of {body.ground!r} with its trunk's parts and its feet alone, each"
+                " once: nothing else shall touch, as every contact of the trunk is a fall"
+            )
+        left -= {touching}
+
+
+def _in_the_rest(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     outside = model.body_rootid[model.geom_bodyid] != model.body(body.root).id
-    known = np.isin(np.arange(model.ngeom), (ground.id, *model.pair_geom1, *model.pair_geom2))
-    for geom in np.flatnonzero(outside & ~known & (model.geom_contype | model.geom_conaffinity != 0)):
+    outside[model.geom(body.ground).id] = False
+    for geom in np.flatnonzero(outside & (model.geom_contype | model.geom_conaffinity != 0)):
         yield (
             f"the geom {model.geom(geom).name!r} beside the body touches nothing, since only pairs touch; expected"
             " contype = conaffinity = 0, and what lies ahead told by `ground`"

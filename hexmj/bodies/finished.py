@@ -30,8 +30,8 @@ class Owner(NamedTuple):
 
     called: str
     """In a sentence."""
-    rows: slice
-    """Of the arrays that have one row for each of them."""
+    rows: slice | tuple[slice, slice]
+    """Of the arrays that have one row for each of them, and their columns where not all count."""
     kind: mujoco.mjtObj = mujoco.mjtObj.mjOBJ_UNKNOWN
     """MuJoCo's, where each has a name."""
 
@@ -42,6 +42,7 @@ JOINT = Owner(" of the joint", _ALL, _OBJECT.mjOBJ_JOINT)
 BODY = Owner(" of the body", _ALL, _OBJECT.mjOBJ_BODY)
 ACTUATOR = Owner(" of the actuator", _ALL, _OBJECT.mjOBJ_ACTUATOR)
 PAIR = Owner(" of the pair", _ALL, _OBJECT.mjOBJ_PAIR)
+PAIR_ENDS = PAIR._replace(rows=np.s_[:, :2])
 
 
 class Rule(NamedTuple):
@@ -83,9 +84,11 @@ RULES = (
     Rule("actuatorgroupdisable", "opt.disableactuator", MODEL, 0, 0, "none"),
     Rule("condim", "pair_dim", PAIR, 3, inf, "3 or more: friction"),
     Rule("solreffriction", "pair_solreffriction", PAIR, 0, 0, "0: friction is as hard as the contact"),
+    Rule("solimp", "pair_solimp", PAIR_ENDS, 0.9, inf, "0.9 or more, MuJoCo's own, at both ends"),
     Rule("margin", "pair_margin", PAIR, 0, 0, "0: feet stand on the ground"),
     Rule("gap", "pair_gap", PAIR, 0, 0, "0: feet stand on the ground"),
     Rule("adhesion", "pair_adhesion", PAIR, 0, 0, "0: what grasps is told by `grasp`"),
+    Rule("impratio", "opt.impratio", MODEL, 1, inf, "1 or more, MuJoCo's own"),
     Rule("iterations", "opt.iterations", MODEL, 100, inf, "100 or more, MuJoCo's own"),
     Rule("ls_iterations", "opt.ls_iterations", MODEL, 50, inf, "50 or more, MuJoCo's own"),
     Rule("tolerance", "opt.tolerance", MODEL, 0, 1e-5, "at most 1e-05, MuJoCo's own in mm"),
@@ -98,8 +101,8 @@ CHOICES = {
 }
 """Option -> its kinds in MuJoCo, and the names of those with which walks are what they are measured as."""
 
-HARMLESS = ("equality", "filterparent", "midphase", "nativeccd", "multiccd", "island", "energy", "fwdinv")
-"""Flags that may be anything."""
+HARMLESS = ("equality", "filterparent", "midphase", "nativeccd", "multiccd", "island", "energy", "fwdinv", "eulerdamp")
+"""Flags that may be anything; the last is for Euler's integrator alone, which is never used."""
 
 
 def check_finished(model: mujoco.MjModel, conditions: Conditions) -> None:
