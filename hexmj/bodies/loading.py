@@ -144,7 +144,7 @@ def _spec(body: Body) -> mujoco.MjSpec:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # of meshes, which it knows by names and whole seconds
     spec = mujoco.MjSpec.from_file(str(body.mjcf))
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-        # The same by other words: a load's own inertia counts, and the geoms that are only to look at may go.
+        # The same by other words, under which geoms that are only to look at may be discarded.
         spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
         for part in spec.bodies:
             part.explicitinertial, part.ipos = False, 3 * [np.nan]
