@@ -12,6 +12,7 @@ from contextlib import suppress
 from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import cache_from_source
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from hexmj.errors import InputError
@@ -96,7 +97,8 @@ def _held(name: str, folders: Sequence[Path]) -> list[str]:
     return held
 
 
-def _note(file: Any) -> None:
+def _note(file: Any, runs: CodeType | None = None) -> None:
+    """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
     if not isinstance(file, str) or file.endswith(COMPILED) or file.startswith(_NOT_ITS_USERS):
         return
     if not INSTALLED.isdisjoint((path := Path(file)).parts):
@@ -107,14 +109,25 @@ def _note(file: Any) -> None:
         for name in data_names(ast.walk(parsed(source))):
             _READ.setdefault((file, name), _held(name, data_folders(path)))
         if os.path.exists(cache_from_source(file)):
-            runs = SourceFileLoader(file, file).get_code(file)
-            if runs != compiled(source, file):
+            kept = _what_runs(SourceFileLoader(file, file).get_code(file))
+            if kept != _what_runs(compiled(source, file)) and (runs is None or kept == _what_runs(runs)):
                 _STALE.add(file)
+
+
+def _what_runs(one: Any) -> Any:
+    """A code, or a constant of one, as what it does: of any line numbers, and with a NaN that is equal to itself."""
+    if isinstance(one, CodeType):
+        counts = one.co_argcount, one.co_posonlyargcount, one.co_kwonlyargcount, one.co_flags
+        names = one.co_name, one.co_qualname, one.co_names, one.co_varnames, one.co_freevars, one.co_cellvars
+        return one.co_code, one.co_exceptiontable, counts, names, _what_runs(one.co_consts)
+    if isinstance(one, tuple):
+        return tuple(_what_runs(inner) for inner in one)
+    return type(one), sorted(map(repr, one)) if isinstance(one, frozenset) else repr(one)
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event == "exec" and getattr(arguments[0], "co_name", "") == "<module>":
-        _note(arguments[0].co_filename)
+        _note(arguments[0].co_filename, arguments[0])
 
 
 for _module in list(sys.modules.values()):
