@@ -120,6 +120,37 @@ def test_a_data_file_counts_whatever_its_name(tmp_path: Path, text: str, name: s
     assert f"{module_label(module)}, {name}" in made.sources
 
 
+JOINED = {
+    "Path(__file__).parent / 'data' / 'sub' / 'g.json'": "code/data/sub/g.json",
+    "os.path.join(os.path.dirname(__file__), 'data', 'g.JSON')": "code/data/g.JSON",
+    "'data/' + 'g.yaml'": "code/data/g.yaml",
+    "importlib.resources.files(__name__) / 'data' / 'g.npz'": "code/data/g.npz",
+    "f'{HERE}/data' + '/g.csv'": "code/data/g.csv",
+    "'data/g.toml'": "code/data/g.toml",
+    "Path(__file__).resolve().parent.joinpath('..', 'data', 'g.txt')": "data/g.txt",
+}
+
+
+@pytest.mark.parametrize("text", JOINED)
+@pytest.mark.parametrize("real", ["", "real"])
+def test_a_data_file_in_a_folder_that_is_joined_to_its_name_counts(tmp_path: Path, text: str, real: str) -> None:
+    """As the same wherever all of it lies, beside the module or what that links to."""
+    found = []
+    for folder, held in (("a", "1"), ("b", "1"), ("c", "2")):
+        mine, file = tmp_path / folder / "code" / "mine.py", tmp_path / folder / real / JOINED[text]
+        written = tmp_path / folder / real / "code" / "mine.py"
+        for one in (mine, written, file):
+            one.parent.mkdir(parents=True, exist_ok=True)
+        written.write_text(f"DATA = lambda: {text}, 'later'")
+        if real:
+            mine.symlink_to(written)
+        file.write_text(held)
+        found.append(code(frozenset({importable(mine).__name__})).sources)
+        (mine.parent / "later").mkdir()
+        found.append(code(frozenset({importable(mine).__name__})).sources)
+    assert found[0] == found[1] == found[2] == found[3] != found[4] == found[5]
+
+
 def test_a_data_file_beside_its_module_and_one_in_the_current_folder_are_two(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import py_compile
 import subprocess
 import sys
 from pathlib import Path
@@ -107,6 +108,39 @@ def test_bytecode_of_another_source_is_refused(tmp_path: Path, when: str) -> Non
     assert json.loads(ended[0].stdout), ended[0].stderr
     assert "stale.py ran as " in ended[1].stderr
     assert ended[1].stderr.endswith(".pyc keeps it, not as it is; delete that and start again\n")
+
+
+SOUND = """
+import sys
+from hexmj.loaded import importable
+from hexmj.sweeps import Cell
+import sound
+print(Cell("sound", sound.cell, {"controller": importable("mine.py").Tripod()}).record())
+"""
+
+
+@pytest.mark.parametrize("how", [{}, {"PYTHONNODEBUGRANGES": "1"}])
+def test_bytecode_that_does_what_its_source_says_is_not_refused(tmp_path: Path, how: dict[str, str]) -> None:
+    """With a NaN, which is unequal to itself, and a set, whatever its order; made with columns of lines or without."""
+    text = "NAN = 1e999 - 1e999\nKNOWN = 'a' in {'a', 'b', 'c', 'd'}\ndef cell(controller): ..."
+    (tmp_path / "sound.py").write_text(text)
+    (tmp_path / "mine.py").write_text(MINE)
+    environment = {name: value for name, value in ENVIRONMENT.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    for more in (how, {}):
+        command = [sys.executable, "-c", SOUND]
+        done = subprocess.run(command, cwd=tmp_path, env=environment | more, capture_output=True, text=True)
+        assert "sound" in json.loads(done.stdout)["sources"], done.stderr
+    assert list(tmp_path.glob("__pycache__/sound.*.pyc"))
+
+
+def test_stale_bytecode_beside_a_file_that_runs_from_its_source_is_not_refused(tmp_path: Path) -> None:
+    for gain in ("12.0", "01.0"):
+        (tmp_path / "mine.py").write_text(f"{MINE}GAIN = {gain}")
+        os.utime(tmp_path / "mine.py", (1e9, 1e9))
+        if gain == "12.0":
+            py_compile.compile(str(tmp_path / "mine.py"))
+    made = code(frozenset({importable(tmp_path / "mine.py").__name__}))
+    assert [name for name in made.sources if name.startswith("mine.py@")]
 
 
 READ = """

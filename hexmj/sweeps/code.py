@@ -3,9 +3,9 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from.  Data files (TOML, XML, JSON) that a module names, with or without a folder, are looked
-for beside it, in the package's `assets` or, for a user's own, in the current folder: they count as they are now and as
-they were when it ran, and so does it that there is none.
+the one module it comes from.  Data files that a module names, with or without a folder, are looked for beside
+it, in the package's `assets` or, for a user's own, in the current folder and in what it names as folders there: they
+count as they are now and as they were when it ran, and so does it that there is none.
 """
 
 import ast
@@ -55,8 +55,8 @@ class Code:
 @dataclass(frozen=True)
 class _Module:
     digest: str
-    data: list[str]
-    """Names of data files."""
+    texts: list[str]
+    """That may name data files and their folders."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -72,18 +72,22 @@ def code(modules: frozenset[str]) -> Code:
     """
     sources, versions, read = _needed(modules)
     data: dict[str, str] = {}
-    for name, file, names in read:
+    for name, file, texts in read:
         content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if content and digest(content) != sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        if names:
-            data |= _data(module_label(name), file, names)
+        if names := as_run.data_names(texts):
+            ours = file.is_relative_to(PACKAGE)
+            folders = [file.parent, _ASSETS] if ours else as_run.data_folders(file)
+            more = {} if ours else as_run.named_folders(file, texts)
+            held = {f"{module_label(name)}, {one}": as_run.data(file, one, folders, more) for one in names}
+            data |= {one: digest for one, digest in held.items() if digest}
     return Code(dict(sorted((sources | data).items())), versions)
 
 
 @cache
 def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], list[tuple[str, Path, list[str]]]]:
-    """Digests of sources, versions, and of each module its name, its file and the data files that it names."""
+    """Digests of sources, versions, and of each module its name, its file and texts that may name data files."""
     followed = {PACKAGE.name} | {name.partition(".")[0] for name in modules}
     waiting, seen = [(name, "") for name in modules], set[_Wanted]()
     sources, installed, read = {}, set[str](), []
@@ -101,7 +105,7 @@ def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], li
         if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
             sources[module_label(name)] = module.digest
-            read.append((name, file, module.data))
+            read.append((name, file, module.texts))
             ours = top == PACKAGE.name
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
@@ -180,7 +184,7 @@ def _read(name: str, file: Path) -> _Module:
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), as_run.data_names(nodes), package == name, imports, bound)
+    return _Module(digest(content), as_run.texts(nodes), package == name, imports, bound)
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
@@ -200,14 +204,6 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
 def _stamp(module: str) -> str:
     """The version of a loaded file that is meant."""
     return module.partition("@")[2]
-
-
-def _data(module: str, file: Path, names: list[str]) -> Iterator[tuple[str, str]]:
-    """Digests of the data files that a module names."""
-    folders = [file.parent, _ASSETS] if file.is_relative_to(PACKAGE) else as_run.data_folders(file)
-    for name in names:
-        if held := as_run.data(file, name, folders):
-            yield f"{module}, {name}", held
 
 
 @cache
