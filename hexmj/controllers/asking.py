@@ -124,7 +124,8 @@ def check_repeats(
         InputError: it is one.
     """
     plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
-    check_same(*(advanced(plan, REPEATED) for plan in plans), controller.name)
+    one, other = (advanced(plan, REPEATED) for plan in plans)
+    check_same(one, other, controller.name)
 
 
 def check_same(one: PlannedWalk, other: PlannedWalk, whose: str) -> None:
