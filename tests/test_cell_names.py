@@ -1,10 +1,13 @@
 """What a kept cell is named by: its settings, and the code within reach."""
 
+import base64
 import importlib
 import json
+import os
 import subprocess
 import sys
 import zipfile
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +121,34 @@ def test_a_data_file_counts_whatever_its_name(tmp_path: Path, text: str, name: s
     (tmp_path / name).write_text("")
     made = code(frozenset({(module := importable(tmp_path / "mine.py").__name__)}))
     assert f"{module_label(module)}, {name}" in made.sources
+
+
+VERSIONS = """
+import json
+from hexmj.loaded import importable
+from hexmj.sweeps.code import code
+print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
+"""
+
+
+def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("import my_helper\nimport numpy")
+    found = []
+    for i, (text, where) in enumerate((("GAIN = 1", "a"), ("GAIN = 1", "b"), ("GAIN = 2", "b"))):
+        told = (folder := tmp_path / str(i) / "site-packages") / "my_helper-1.0.dist-info"
+        told.mkdir(parents=True)
+        (folder / "my_helper.py").write_text(text)
+        (told / "METADATA").write_text("Metadata-Version: 2.1\nName: my-helper\nVersion: 1.0\n")
+        (told / "direct_url.json").write_text(where)
+        rows = {"my_helper.py": text, "my_helper-1.0.dist-info/direct_url.json": where, "../bin/my_helper": where}
+        sums = {name: base64.urlsafe_b64encode(sha256(held.encode()).digest()) for name, held in rows.items()}
+        (told / "RECORD").write_text("".join(f"{name},sha256={sums[name].decode()},8\n" for name in rows))
+        environment = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(folder)])}
+        command = [sys.executable, "-c", VERSIONS.format(mine=tmp_path / "mine.py")]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        found.append(json.loads(done.stdout or done.stderr))
+    assert found[0] == found[1] != found[2]
+    assert found[0]["numpy"] == np.__version__ and found[0]["my_helper"].startswith("1.0@")
 
 
 JOINED = {

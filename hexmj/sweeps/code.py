@@ -133,8 +133,10 @@ def _follow(modules: frozenset[str]) -> _Needed:
             if file is None and top in installed:
                 missing |= {name, f"{name}.{attribute}" if attribute else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())
+    from hexmj.sweeps.packages import version
+
     versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    return _Needed(sources, versions | {name: _version(name) for name in sorted(names)}, read, missing)
+    return _Needed(sources, versions | {name: version(name) for name in sorted(names)}, read, missing)
 
 
 def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:
@@ -225,13 +227,3 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
 def _stamp(module: str) -> str:
     """The version of a loaded file that is meant."""
     return module.partition("@")[2]
-
-
-@cache
-def _version(name: str) -> str:
-    from importlib.metadata import PackageNotFoundError, packages_distributions, version
-
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return " ".join(sorted({version(one) for one in packages_distributions().get(name, ())})) or "unknown"
