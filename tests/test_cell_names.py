@@ -218,6 +218,12 @@ def test_a_script_of_any_name_counts_what_it_imports(toy: Path) -> None:
     assert {"script", "helper"} <= set(json.loads(done.stdout)["sources"]), done.stderr
 
 
+@pytest.mark.parametrize("text", ["importlib.import_module('helper')", "__import__('helper')"])
+def test_a_module_that_a_call_imports_counts(toy: Path, text: str) -> None:
+    (toy / "mine.py").write_text(f"def steps(): return {text}\n" + MINE)
+    assert "helper" in json.loads(toy_record(toy))["sources"]
+
+
 def test_the_package_knows_its_own_reach() -> None:
     made = code(frozenset({"hexmj.stability"}))
     assert {"hexmj.stability", "hexmj.legs"} <= set(made.sources)

@@ -12,6 +12,7 @@ import ast
 import sys
 import sysconfig
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
@@ -206,6 +207,8 @@ def _read(name: str, file: Path) -> _Module:
     types = {inner for one in guarded for statement in one.body for inner in ast.walk(statement)}
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
+    if not file.is_relative_to(PACKAGE):
+        imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
     return _Module(digest(content), as_run.texts(nodes), package == name, imports, bound)
 
@@ -222,6 +225,15 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
             return
         for alias in one.names:
             yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
+
+
+def _called(one: ast.AST, package: str) -> Iterator[_Wanted]:
+    """The module that is imported by a call, such as `importlib.import_module("helper")`."""
+    if isinstance(one, ast.Call) and ast.unparse(one.func).rpartition(".")[2] in ("import_module", "__import__"):
+        match one.args:
+            case [ast.Constant(value=str(name)), *_] if name.strip("."):
+                with suppress(ImportError):
+                    yield resolve_name(name, package), ""
 
 
 def _stamp(module: str) -> str:
