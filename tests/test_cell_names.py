@@ -1,10 +1,13 @@
 """What a kept cell is named by: its settings, and the code within reach."""
 
+import base64
 import importlib
 import json
+import os
 import subprocess
 import sys
 import zipfile
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +123,34 @@ def test_a_data_file_counts_whatever_its_name(tmp_path: Path, text: str, name: s
     assert f"{module_label(module)}, {name}" in made.sources
 
 
+VERSIONS = """
+import json
+from hexmj.loaded import importable
+from hexmj.sweeps.code import code
+print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
+"""
+
+
+def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("import my_helper\nimport numpy")
+    found = []
+    for i, (text, where) in enumerate((("GAIN = 1", "a"), ("GAIN = 1", "b"), ("GAIN = 2", "b"))):
+        told = (folder := tmp_path / str(i) / "site-packages") / "my_helper-1.0.dist-info"
+        told.mkdir(parents=True)
+        (folder / "my_helper.py").write_text(text)
+        (told / "METADATA").write_text("Metadata-Version: 2.1\nName: my-helper\nVersion: 1.0\n")
+        (told / "direct_url.json").write_text(where)
+        rows = {"my_helper.py": text, "my_helper-1.0.dist-info/direct_url.json": where, "../bin/my_helper": where}
+        sums = {name: base64.urlsafe_b64encode(sha256(held.encode()).digest()) for name, held in rows.items()}
+        (told / "RECORD").write_text("".join(f"{name},sha256={sums[name].decode()},8\n" for name in rows))
+        environment = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(folder)])}
+        command = [sys.executable, "-c", VERSIONS.format(mine=tmp_path / "mine.py")]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        found.append(json.loads(done.stdout or done.stderr))
+    assert found[0] == found[1] != found[2]
+    assert found[0]["numpy"] == np.__version__ and found[0]["my_helper"].startswith("1.0@")
+
+
 JOINED = {
     "Path(__file__).parent / 'data' / 'sub' / 'g.json'": "code/data/sub/g.json",
     "os.path.join(os.path.dirname(__file__), 'data', 'g.JSON')": "code/data/g.JSON",
@@ -185,6 +216,12 @@ def test_a_script_of_any_name_counts_what_it_imports(toy: Path) -> None:
     (toy / "script").write_text("import helper\n" + MINE + "\n" + PRINT_MAIN)
     done = subprocess.run([sys.executable, "script"], cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
     assert {"script", "helper"} <= set(json.loads(done.stdout)["sources"]), done.stderr
+
+
+@pytest.mark.parametrize("text", ["importlib.import_module('helper')", "__import__('helper')"])
+def test_a_module_that_a_call_imports_counts(toy: Path, text: str) -> None:
+    (toy / "mine.py").write_text(f"def steps(): return {text}\n" + MINE)
+    assert "helper" in json.loads(toy_record(toy))["sources"]
 
 
 def test_the_package_knows_its_own_reach() -> None:

@@ -85,6 +85,28 @@ def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: P
     assert not list(tmp_path.rglob("*.nc"))
 
 
+FOUND_LATE = """
+from pathlib import Path
+from hexmj.sweeps import Cell, run
+import late_cells
+run([Cell("late", late_cells.cell, {})], Path("kept"))
+"""
+
+
+def test_a_module_that_is_found_only_as_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
+    """No name that was made before can tell what it holds."""
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "helper.py").write_text("GAIN = 1.0")
+    (tmp_path / "late_cells.py").write_text(
+        "import sys\nimport xarray as xr\n"
+        "def cell():\n    sys.path.insert(0, 'lib')\n    import helper\n    return xr.Dataset({'a': helper.GAIN})\n"
+    )
+    command = [sys.executable, "-c", FOUND_LATE]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert "late: helper of sources has changed while it was in use" in done.stderr
+    assert not list(tmp_path.rglob("*.nc"))
+
+
 STALE = """
 import sys
 if sys.argv[1] == "before": import stale

@@ -12,11 +12,13 @@ import ast
 import sys
 import sysconfig
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
+from typing import NamedTuple
 
 from hexmj import as_run
 from hexmj.errors import InputError
@@ -64,17 +66,29 @@ class _Module:
     """Name -> the import it comes from, those for types included."""
 
 
+class _Needed(NamedTuple):
+    sources: dict[str, str]
+    versions: dict[str, str]
+    read: list[tuple[str, Path, list[str]]]
+    """Of each module its name, its file and texts that may name data files."""
+    missing: set[str]
+    """Modules without a file."""
+
+
+_KNOWN: dict[frozenset[str], _Needed] = {}
+_FILES: dict[str, Path] = {}
+
+
 def code(modules: frozenset[str]) -> Code:
     """All that some modules need, and they themselves: sources as they ran, data files as they are and were.
 
     Raises:
         InputError: one has no source, or a source is not what this program ran.
     """
-    sources, versions, read = _needed(modules)
-    data: dict[str, str] = {}
-    for name, file, texts in read:
+    needed, data = _needed(modules), dict[str, str]()
+    for name, file, texts in needed.read:
         content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
-        if content and digest(content) != sources[module_label(name)]:
+        if content and digest(content) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         if names := as_run.data_names(texts):
             ours = file.is_relative_to(PACKAGE)
@@ -82,15 +96,20 @@ def code(modules: frozenset[str]) -> Code:
             more = {} if ours else as_run.named_folders(file, texts)
             held = {f"{module_label(name)}, {one}": as_run.data(file, one, folders, more) for one in names}
             data |= {one: digest for one, digest in held.items() if digest}
-    return Code(dict(sorted((sources | data).items())), versions)
+    return Code(dict(sorted((needed.sources | data).items())), needed.versions)
 
 
-@cache
-def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], list[tuple[str, Path, list[str]]]]:
-    """Digests of sources, versions, and of each module its name, its file and texts that may name data files."""
+def _needed(modules: frozenset[str]) -> _Needed:
+    """As it was, unless a module has been found since that was not then."""
+    if modules not in _KNOWN or any(map(_file, _KNOWN[modules].missing)):
+        _KNOWN[modules] = _follow(modules)
+    return _KNOWN[modules]
+
+
+def _follow(modules: frozenset[str]) -> _Needed:
     followed = {PACKAGE.name} | {name.partition(".")[0] for name in modules}
     waiting, seen = [(name, "") for name in modules], set[_Wanted]()
-    sources, installed, read = {}, set[str](), []
+    sources, installed, read, missing = {}, set[str](), [], set[str]()
     while waiting:
         wanted = name, attribute = waiting.pop()
         if wanted in seen:
@@ -112,9 +131,13 @@ def _needed(modules: frozenset[str]) -> tuple[dict[str, str], dict[str, str], li
             waiting += inner
         else:
             installed |= {top} - sys.stdlib_module_names
+            if file is None and top in installed:
+                missing |= {name, f"{name}.{attribute}" if attribute else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())
+    from hexmj.sweeps.packages import version
+
     versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    return sources, versions | {name: _version(name) for name in sorted(names)}, read
+    return _Needed(sources, versions | {name: version(name) for name in sorted(names)}, read, missing)
 
 
 def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:
@@ -134,10 +157,11 @@ def _above(name: str) -> list[_Wanted]:
     return [(above, "")] if above and _file(above) else []
 
 
-@cache
 def _file(module: str) -> Path | None:
-    """The file of a module, found without running anything; None of what has none, and of the standard library's."""
-    file = _found(module)
+    """The file of a module, found without running anything; None of what has none yet or is Python's own."""
+    if module not in _FILES and (file := _found(module)):
+        _FILES[module] = file
+    file = _FILES.get(module)
     of_python = file and file.is_relative_to(_STANDARD) and not _is_installed(file)
     return None if of_python else file
 
@@ -183,6 +207,8 @@ def _read(name: str, file: Path) -> _Module:
     types = {inner for one in guarded for statement in one.body for inner in ast.walk(statement)}
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
+    if not file.is_relative_to(PACKAGE):
+        imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
     return _Module(digest(content), as_run.texts(nodes), package == name, imports, bound)
 
@@ -201,16 +227,15 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
             yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
 
 
+def _called(one: ast.AST, package: str) -> Iterator[_Wanted]:
+    """The module that is imported by a call, such as `importlib.import_module("helper")`."""
+    if isinstance(one, ast.Call) and ast.unparse(one.func).rpartition(".")[2] in ("import_module", "__import__"):
+        match one.args:
+            case [ast.Constant(value=str(name)), *_] if name.strip("."):
+                with suppress(ImportError):
+                    yield resolve_name(name, package), ""
+
+
 def _stamp(module: str) -> str:
     """The version of a loaded file that is meant."""
     return module.partition("@")[2]
-
-
-@cache
-def _version(name: str) -> str:
-    from importlib.metadata import PackageNotFoundError, packages_distributions, version
-
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return " ".join(sorted({version(one) for one in packages_distributions().get(name, ())})) or "unknown"
