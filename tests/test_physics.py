@@ -100,13 +100,18 @@ def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
 
 
 def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
-    first, second = unlogged(), unlogged()
-    first.__enter__()
-    second.__enter__()
-    first.__exit__(None, None, None)
-    assert mujoco.get_mju_user_warning() is not None
-    second.__exit__(None, None, None)
-    assert mujoco.get_mju_user_warning() is None
+    others = mujoco.get_mju_user_warning()  # dm_control sets one, if it was imported
+    mujoco.set_mju_user_warning(None)
+    try:
+        first, second = unlogged(), unlogged()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert mujoco.get_mju_user_warning() is not None
+        second.__exit__(None, None, None)
+        assert mujoco.get_mju_user_warning() is None
+    finally:
+        mujoco.set_mju_user_warning(others)
 
 
 def test_a_clock_of_the_users_own_goes_on(settled):
