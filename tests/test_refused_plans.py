@@ -8,7 +8,7 @@ import pytest
 import hexmj
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.asking import advanced
-from hexmj.measures.physical import physical_walk_of_plan
+from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.walks import PLANNED, part_of
@@ -147,6 +147,26 @@ class Restless:
 def test_a_controller_that_plans_otherwise_when_it_begins_again_is_refused(measured):
     with pytest.raises(hexmj.InputError, match="plans another walk when it begins again: x is"):
         measured(hexmj.draw_starts(2, 0))
+
+
+@dataclass(frozen=True)
+class Ended:
+    """LDVS by plans that have five steps."""
+
+    name: str = "ended"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        plan = LDVS.begin(starts, velocity, stride, acceleration)
+        endless = plan.advance
+        plan.advance = lambda steps: endless(min(steps, 5 - plan.done))
+        return plan
+
+
+def test_no_more_steps_are_asked_for_than_the_walk_has(settled):
+    assert len(physical_outcomes(settled, Ended(), 0.5, 0.5).fall) == 2
+    with pytest.raises(hexmj.InputError, match="asked for"):
+        physical_outcomes(settled, Ended(), 0.5, 0.6)
 
 
 def test_a_plan_that_goes_on_by_other_steps_is_refused():

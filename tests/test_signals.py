@@ -60,41 +60,30 @@ def test_while_it_is_imported(by, module):
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 
-def test_while_a_pool_of_processes_is_made(tmp_path):
-    """Its semaphores are left to nobody, who would be told of them."""
-    script = (
-        "import os\n"
-        "from multiprocessing import resource_tracker\n"
-        "usual = resource_tracker.register\n"
-        "def register(*one):\n"
-        "    usual(*one)\n"
-        "    os.kill(os.getpid(), 2)\n"
-        "resource_tracker.register = register\n"
-        "from hexmj.__main__ import main\n"
-        "main()"
-    )
-    words = [sys.executable, "-c", script, "flss", "--starts", "9", "--processes", "2", "--out", str(tmp_path)]
-    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
-    assert done.returncode == 130, done.stderr
-    assert done.stderr.strip() == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
-
-
-def test_while_a_pool_of_processes_is_left(tmp_path):
-    script = (
-        "import os\n"
+POOLS = {
+    "is made": (
+        "from multiprocessing import resource_tracker as tracker\n"
+        "usual = tracker.register\n"
+        "tracker.register = lambda *one: (usual(*one), os.kill(os.getpid(), 2))\n"
+    ),
+    "is left": (
         "from concurrent.futures import ProcessPoolExecutor as Pool\n"
         "usual = Pool.shutdown\n"
-        "def shutdown(*some, **more):\n"
-        "    os.kill(os.getpid(), 2)\n"
-        "    usual(*some, **more)\n"
-        "Pool.shutdown = shutdown\n"
-        "from hexmj.__main__ import main\n"
-        "main()"
-    )
+        "Pool.shutdown = lambda *some, **more: (os.kill(os.getpid(), 2), usual(*some, **more))\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("when", POOLS)
+def test_while_a_pool_of_processes(when, tmp_path):
+    """Its semaphores are left to nobody, who would be told of them."""
+    script = f"import os\n{POOLS[when]}from hexmj.__main__ import main\nmain()"
     words = [sys.executable, "-c", script, "flss", "--starts", "9", "--processes", "2", "--out", str(tmp_path)]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, timeout=60)
+    progress, last = done.stderr.splitlines()[:-1], done.stderr.splitlines()[-1]
     assert done.returncode == 130, done.stderr
-    assert done.stderr.splitlines()[-1] == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
+    assert all(b"%" in line for line in progress)
+    assert last == b"hexmj: stopped; what is finished is kept. Repeat the command to go on"
 
 
 def test_while_c_code_calls_back():

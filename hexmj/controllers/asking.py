@@ -25,7 +25,7 @@ KEPT = 400
 """Memory that a step of a start takes while it is planned [bytes]."""
 
 REPEATED = 20
-"""Steps by which two plans are told apart: every leg that lifts in two time units shows."""
+"""Steps by which two plans are told apart, of longer walks: every leg that lifts in two time units shows."""
 
 
 def begin(
@@ -115,21 +115,35 @@ def check_repeats(
     controller: Controller,
     starts: np.ndarray,
     velocity: ArrayLike,
+    steps: int,
     stride: Stride,
     acceleration: Acceleration | None = None,
 ) -> None:
     """Refuse a controller whose first steps are others when it begins again, as by random numbers without a seed.
 
+    Args:
+        controller: plans the walks.
+        starts: tips at time 0, (start, leg) [mm].
+        velocity: V_r, or its final value; one number or (start,).
+        steps: of the walk, which may be shorter than `REPEATED`.
+        stride: of the plan.
+        acceleration: Eq. 11.
+
     Raises:
         InputError: it is one.
     """
     plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
-    one, other = (advanced(plan, REPEATED) for plan in plans)
+    one, other = (advanced(plan, min(steps, REPEATED)) for plan in plans)
     check_same(one, other, controller.name)
 
 
 def check_same(one: PlannedWalk, other: PlannedWalk, whose: str) -> None:
     """Refuse two plans that ought to be the same and are not: what is told of one is not of the other.
+
+    Args:
+        one: some steps of starts.
+        other: the same steps of the same starts.
+        whose: plans them, for a sentence.
 
     Raises:
         InputError: they differ.

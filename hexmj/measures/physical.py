@@ -17,7 +17,7 @@ from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, meas
 from hexmj.physics.settling import Settled, settle
 from hexmj.progress import Progress, shown
 from hexmj.stability import loss_time
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, extent, joined, part_of
 
 
@@ -87,7 +87,7 @@ def physical_outcomes(
     """
     duration = typed("duration", duration, float)
     how: Any = {"stride": settled.stride, "acceleration": acceleration}
-    check_repeats(controller, settled.starts, velocity, **how)
+    check_repeats(controller, settled.starts, velocity, int(steps_within(duration, settled.stride)), **how)
     plan = begin(controller, settled.starts, velocity, **how, threads=1)
     planned_loss = first_loss(settled.starts, controller, velocity, duration, **how, threads=threads)
     return outcomes_of_plan(settled, plan, duration, planned_loss, threads=threads, progress=progress)
