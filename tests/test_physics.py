@@ -1,16 +1,11 @@
 """Laws of the physical walks: they do not depend on threads or batch, and tend to the plan as V_p falls."""
 
 import re
-from collections.abc import Generator
-from contextlib import chdir, nullcontext
-from time import perf_counter, sleep
-from typing import cast
+from contextlib import chdir
 
 import mujoco
 import numpy as np
 import pytest
-from numba import cfunc
-from numpy.testing import assert_allclose
 
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
@@ -23,9 +18,8 @@ from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics.backend import Diverged, MujocoBatch
-from hexmj.physics.callbacks import CHANGING, stopped_clock, unlogged
 from hexmj.physics.divergence import replay, save_state, walk_error
-from hexmj.physics.drive import Push, drive
+from hexmj.physics.drive import drive
 from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
@@ -90,56 +84,6 @@ def test_measured_tips_follow_the_plan(walked):
     assert walked.outcomes.saturation.max() < 0.02
 
 
-def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
-    assert mujoco.get_mjcb_time() is None
-    with stopped_clock():
-        assert mujoco.get_mjcb_time() is not None
-    assert mujoco.get_mjcb_time() is None
-    list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
-    assert mujoco.get_mjcb_time() is None
-
-
-def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
-    others = mujoco.get_mju_user_warning()  # dm_control sets one, if it was imported
-    mujoco.set_mju_user_warning(None)
-    try:
-        first, second = unlogged(), unlogged()
-        first.__enter__()
-        second.__enter__()
-        first.__exit__(None, None, None)
-        assert mujoco.get_mju_user_warning() is not None
-        second.__exit__(None, None, None)
-        assert mujoco.get_mju_user_warning() is None
-    finally:
-        mujoco.set_mju_user_warning(others)
-
-
-def test_a_clock_of_the_users_own_goes_on(settled):
-    mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
-    try:
-        for _ in drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0):
-            assert mujoco.get_mjcb_time() is ours
-        assert mujoco.get_mjcb_time() is ours
-    finally:
-        mujoco.set_mjcb_time(None)
-
-
-@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
-@pytest.mark.parametrize("waits", [False, True], ids=["closes it", "keeps it"])
-def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller, waits):
-    """After the first chunk; the one that is being stepped meanwhile ends, and nothing goes on."""
-    walking = drive(settled, begin(controller, settled.starts, 0.3, settled.stride), 40.0)
-    next(walking)
-    if waits:
-        give_up, running = perf_counter() + 20.0, 0
-        while running < 100:  # a chunk is stepped in several batches, and the clock runs between them
-            running = 0 if mujoco.get_mjcb_time() else running + 1
-            assert perf_counter() < give_up
-            sleep(0.005)
-    cast(Generator, walking).close()
-    assert mujoco.get_mjcb_time() is None
-
-
 @pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
 def test_progress_is_the_share_of_the_substeps(settled, controller):
     told: list[float] = []
@@ -158,74 +102,6 @@ def test_progress_is_done_where_all_have_fallen():
     assert last.fell.all()
     assert sum(told[:-1]) < 0.1
     assert sum(told) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("vp", [80.0, 400.0])
-def test_a_push_gives_the_momentum_asked_for(vp):
-    """Without friction the ground holds nothing back: the whole insect moves aside by impulse over mass."""
-    settled = settle(draw_starts(3, 0), Conditions.of(friction=0.0, vp=vp))
-    speed = []
-    for impulse in (0.0, 30.0):
-        push = Push(np.array([impulse, -impulse, 0.0]), np.full(3, 2.0))
-        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
-        centre = settled.compiled.columns.centre_of_mass
-        y = np.concatenate(
-            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * vp, push=push)], axis=1
-        )
-        speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
-    assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
-    assert speed[1][2] == speed[0][2]
-
-
-@pytest.mark.parametrize("time", [-1.0, 5.0, 1e9])
-def test_a_push_beside_the_walk_is_refused(time):
-    settled = settle(draw_starts(2, 0))
-    for impulse, refused in ((0.0, False), (100.0, True)):
-        push = Push(np.array([0.0, impulse]), np.array([0.0, time]))
-        chunks = drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.0, push=push)
-        said = pytest.raises(InputError, match=r"the push of start 1 is at .*; expected 0 to below 5")
-        with said if refused else nullcontext():
-            list(chunks)
-
-
-@pytest.mark.parametrize("name", ["impulse", "time"])
-def test_a_push_is_finite(name):
-    for wrong in (np.nan, np.inf):
-        with pytest.raises(InputError, match=f"a push's {name} = {wrong}; expected a finite number"):
-            Push(**{"impulse": np.zeros(2), "time": np.zeros(2), name: np.array([0.0, wrong])})
-
-
-@pytest.mark.parametrize("wrong", [np.ones(1), np.array(1.0), [1.0, 2.0], "hard"], ids=repr)
-def test_a_push_is_of_all_starts(settled, wrong):
-    n_starts = len(settled.starts)
-    words = "a push's impulse (has the shape|= 'hard'; expected numbers)"
-    with pytest.raises(InputError, match=words):
-        push = Push(wrong, np.zeros(n_starts))
-        list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0, push=push))
-
-
-@pytest.mark.parametrize("name", CHANGING)
-def test_callbacks_that_would_change_the_physics_are_refused(name):
-    change = getattr(mujoco, f"set_mjcb_{name}")
-    change(lambda *_: 0)
-    try:
-        with pytest.raises(InputError, match=f"mjcb_{name} is set, .*; expected none: mujoco.set_mjcb_{name}.None."):
-            settle(draw_starts(1, 0))
-    finally:
-        change(None)
-    settle(draw_starts(1, 0))
-
-
-def test_a_push_lasts_as_long_whatever_the_physics_step():
-    """So standing insects slide as far, by 30 mm; a quarter of the step changes that by 3 %, so by less than 5."""
-    slid = []
-    for longest in (0.625, 0.15625):
-        settled = settle(draw_starts(3, 0), Conditions.of(longest_substep=longest))
-        push = Push(np.full(3, 800.0), np.full(3, 2.0))
-        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
-        *_, last = drive(settled, plan, 8.0, push=push)
-        slid.append(last.qpos[:, -1, 1])
-    assert_allclose(slid[1], slid[0], rtol=0.05)
 
 
 def test_every_bounce_counts_without_a_contact_gap():

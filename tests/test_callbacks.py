@@ -1,0 +1,85 @@
+"""MuJoCo's callbacks: ours while a batch steps, the user's own otherwise, and none that changes the physics."""
+
+from collections.abc import Generator
+from time import perf_counter, sleep
+from typing import cast
+
+import mujoco
+import pytest
+from numba import cfunc
+
+from hexmj.controllers.asking import begin
+from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.errors import InputError
+from hexmj.physics.callbacks import CHANGING, stopped_clock, unlogged
+from hexmj.physics.drive import drive
+from hexmj.physics.settling import settle
+from hexmj.starts import draw_starts
+
+
+@pytest.fixture(scope="module")
+def settled():
+    return settle(draw_starts(24, 0))
+
+
+def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
+    assert mujoco.get_mjcb_time() is None
+    with stopped_clock():
+        assert mujoco.get_mjcb_time() is not None
+    assert mujoco.get_mjcb_time() is None
+    list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
+    assert mujoco.get_mjcb_time() is None
+
+
+def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
+    others = mujoco.get_mju_user_warning()  # dm_control sets one, if it was imported
+    mujoco.set_mju_user_warning(None)
+    try:
+        first, second = unlogged(), unlogged()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert mujoco.get_mju_user_warning() is not None
+        second.__exit__(None, None, None)
+        assert mujoco.get_mju_user_warning() is None
+    finally:
+        mujoco.set_mju_user_warning(others)
+
+
+def test_a_clock_of_the_users_own_goes_on(settled):
+    mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
+    try:
+        for _ in drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0):
+            assert mujoco.get_mjcb_time() is ours
+        assert mujoco.get_mjcb_time() is ours
+    finally:
+        mujoco.set_mjcb_time(None)
+
+
+@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
+@pytest.mark.parametrize("waits", [False, True], ids=["closes it", "keeps it"])
+def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller, waits):
+    """After the first chunk; the one that is being stepped meanwhile ends, and nothing goes on."""
+    walking = drive(settled, begin(controller, settled.starts, 0.3, settled.stride), 40.0)
+    next(walking)
+    if waits:
+        give_up, running = perf_counter() + 20.0, 0
+        while running < 100:  # a chunk is stepped in several batches, and the clock runs between them
+            running = 0 if mujoco.get_mjcb_time() else running + 1
+            assert perf_counter() < give_up
+            sleep(0.005)
+    cast(Generator, walking).close()
+    assert mujoco.get_mjcb_time() is None
+
+
+@pytest.mark.parametrize("name", CHANGING)
+def test_callbacks_that_would_change_the_physics_are_refused(name):
+    change = getattr(mujoco, f"set_mjcb_{name}")
+    change(lambda *_: 0)
+    try:
+        with pytest.raises(InputError, match=f"mjcb_{name} is set, .*; expected none: mujoco.set_mjcb_{name}.None."):
+            settle(draw_starts(1, 0))
+    finally:
+        change(None)
+    settle(draw_starts(1, 0))

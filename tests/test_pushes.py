@@ -1,0 +1,77 @@
+"""Pushes from the side give the momentum asked for, to starts that walk then."""
+
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.conditions import Conditions
+from hexmj.controllers.asking import begin
+from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
+from hexmj.errors import InputError
+from hexmj.physics.drive import Push, drive
+from hexmj.physics.settling import settle
+from hexmj.starts import draw_starts
+
+
+@pytest.fixture(scope="module")
+def settled():
+    return settle(draw_starts(24, 0))
+
+
+@pytest.mark.parametrize("vp", [80.0, 400.0])
+def test_a_push_gives_the_momentum_asked_for(vp):
+    """Without friction the ground holds nothing back: the whole insect moves aside by impulse over mass."""
+    settled = settle(draw_starts(3, 0), Conditions.of(friction=0.0, vp=vp))
+    speed = []
+    for impulse in (0.0, 30.0):
+        push = Push(np.array([impulse, -impulse, 0.0]), np.full(3, 2.0))
+        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
+        centre = settled.compiled.columns.centre_of_mass
+        y = np.concatenate(
+            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * vp, push=push)], axis=1
+        )
+        speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
+    assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
+    assert speed[1][2] == speed[0][2]
+
+
+@pytest.mark.parametrize("time", [-1.0, 5.0, 1e9])
+def test_a_push_beside_the_walk_is_refused(time):
+    settled = settle(draw_starts(2, 0))
+    for impulse, refused in ((0.0, False), (100.0, True)):
+        push = Push(np.array([0.0, impulse]), np.array([0.0, time]))
+        chunks = drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.0, push=push)
+        said = pytest.raises(InputError, match=r"the push of start 1 is at .*; expected 0 to below 5")
+        with said if refused else nullcontext():
+            list(chunks)
+
+
+@pytest.mark.parametrize("name", ["impulse", "time"])
+def test_a_push_is_finite(name):
+    for wrong in (np.nan, np.inf):
+        with pytest.raises(InputError, match=f"a push's {name} = {wrong}; expected a finite number"):
+            Push(**{"impulse": np.zeros(2), "time": np.zeros(2), name: np.array([0.0, wrong])})
+
+
+@pytest.mark.parametrize("wrong", [np.ones(1), np.array(1.0), [1.0, 2.0], "hard"], ids=repr)
+def test_a_push_is_of_all_starts(settled, wrong):
+    n_starts = len(settled.starts)
+    words = "a push's impulse (has the shape|= 'hard'; expected numbers)"
+    with pytest.raises(InputError, match=words):
+        push = Push(wrong, np.zeros(n_starts))
+        list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0, push=push))
+
+
+def test_a_push_lasts_as_long_whatever_the_physics_step():
+    """So standing insects slide as far, by 30 mm; a quarter of the step changes that by 3 %, so by less than 5."""
+    slid = []
+    for longest in (0.625, 0.15625):
+        settled = settle(draw_starts(3, 0), Conditions.of(longest_substep=longest))
+        push = Push(np.full(3, 800.0), np.full(3, 2.0))
+        plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
+        *_, last = drive(settled, plan, 8.0, push=push)
+        slid.append(last.qpos[:, -1, 1])
+    assert_allclose(slid[1], slid[0], rtol=0.05)
