@@ -43,7 +43,7 @@ def typed(name: str, value: Any, wanted: Any) -> Any:
     try:
         return _fitted(value, wanted)
     except TypeError:
-        raise InputError(f"{name} = {_shown(value)}; {_expected(wanted)}") from None
+        raise InputError(f"{name} = {short(value)}; {_expected(wanted)}") from None
 
 
 def given(name: str, value: Of | None, usual: Callable[[], Of]) -> Of:
@@ -65,7 +65,7 @@ def whole(name: str, value: Any, least: int, most: float = math.inf, more: str =
         if least <= (number := _fitted(value, int)) <= most:
             return number
     bounds = f"at least {least}" + (f" and at most {most}" if most < math.inf else "")
-    raise InputError(f"{name} = {_shown(value)}; expected a whole number of {bounds}{more}")
+    raise InputError(f"{name} = {short(value)}; expected a whole number of {bounds}{more}")
 
 
 def numbers(name: str, values: ArrayLike) -> np.ndarray:
@@ -78,7 +78,7 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
         array = np.asarray(values)
         if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
             return np.array(array, dtype=float)
-    raise InputError(f"{name} = {_shown(values)}; expected numbers")
+    raise InputError(f"{name} = {short(values)}; expected numbers")
 
 
 def path_of(path: Path | str) -> Path:
@@ -101,7 +101,7 @@ def printable(name: str, value: Any) -> str:
         InputError: it is none.
     """
     if not (0 < len(typed(name, value, str)) <= LABEL and value.isprintable()):
-        raise InputError(f"{name} = {_shown(value)}; expected 1 to {LABEL} printable characters")
+        raise InputError(f"{name} = {short(value)}; expected 1 to {LABEL} printable characters")
     return value
 
 
@@ -116,7 +116,7 @@ def states(name: str, values: ArrayLike) -> np.ndarray:
         known = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.isin(array, (0, 1)).all())
         if known and not np.ma.is_masked(values):
             return np.array(array, dtype=bool, order="C")
-    raise InputError(f"{name} = {_shown(values)}; expected True and False")
+    raise InputError(f"{name} = {short(values)}; expected True and False")
 
 
 def check_types(thing: Any) -> None:
@@ -189,5 +189,6 @@ def _kind(wanted: Any) -> str:
     return _NAMES.get(origin or wanted, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
-def _shown(value: Any) -> str:
+def short(value: Any) -> str:
+    """A value as sentences show it: on one line, its beginning."""
     return f"{' '.join(repr(value).split()):.80}"

@@ -27,6 +27,9 @@ OBEYED: dict[GroundKind, tuple[str, ...]] = {
 }
 """Kind of ground -> the fields of `Ground` that it obeys."""
 
+ROUNDING = 1e-9
+"""Share by which a physics step may be longer than the longest one, for the last bits of divisions."""
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -176,7 +179,7 @@ class Conditions:
 
     @classmethod
     def of(cls, **values: Any) -> "Conditions":
-        """The usual conditions but for these, each by its own name: ``Conditions.of(vp=20.0, load=1.0)``.
+        """The usual conditions but for these, by name, `body` among them: ``Conditions.of(vp=20.0, load=1.0)``.
 
         Raises:
             InputError: no such condition, or a value that makes no sense.
@@ -184,18 +187,19 @@ class Conditions:
         return cls().but(**values)
 
     def but(self, **values: Any) -> "Conditions":
-        """These conditions but for some, each by its own name.
+        """These conditions but for some, by name, `body` among them.
 
         Raises:
             InputError: no such condition, or a value that makes no sense.
         """
-        if unknown := set(values) - set(self.flat()):
-            raise InputError(f"condition {min(unknown)!r}; valid names: {', '.join(self.flat())}")
+        valid = (*self.flat(), "body")
+        if unknown := set(values) - set(valid):
+            raise InputError(f"condition {min(unknown)!r}; valid names: {', '.join(valid)}")
         parts = {
             name: replace(part, **{key: value for key, value in values.items() if key in vars(part)})
             for name, part in self._parts().items()
         }
-        return replace(self, **parts)
+        return replace(self, **parts, body=values.get("body", self.body))
 
     def flat(self) -> dict[str, Any]:
         """Every condition by its own name."""
@@ -211,7 +215,7 @@ class Conditions:
 
     def substeps(self, stride: Stride) -> int:
         """Physics steps in one step of a plan."""
-        return math.ceil(1000.0 * self.time.seconds(stride) / self.numerics.longest_substep - 1e-9)
+        return math.ceil(1000.0 * self.time.seconds(stride) / self.numerics.longest_substep - ROUNDING)
 
     def timestep(self, stride: Stride) -> float:
         """The physics step [s]."""

@@ -18,7 +18,7 @@ NAMES = ("name", "text", "paths", "nnames", "nbuffer")
 
 def conditions(body: Body = STICK_INSECT, **values: Any) -> Conditions:
     """The usual conditions of a body but for some."""
-    return Conditions(body=body).but(**values)
+    return Conditions.of(body=body, **values)
 
 
 def arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:

@@ -122,14 +122,17 @@ def test_conditions_change_only_what_they_are_about(insect: CompiledBody):
 
 
 @pytest.mark.parametrize(("ground", "pieces"), [("step", 2), ("gap", 3), ("hurdle", 2), ("rough", 136)])
-def test_all_ground_is_touched_alike(insect: CompiledBody, ground: str, pieces: int):
-    """Feet and trunk each touch every piece, by the contact settings of the MJCF."""
-    model = compile_body(conditions(ground=ground)).model
-    assert insect.model.npair == 11
+def test_all_ground_is_touched_alike(tmp_path: Path, ground: str, pieces: int):
+    """Feet and trunk each touch every piece, by the contact settings of their own pair with the plane."""
+    own = 'name="L1_foot" condim="6" friction="1 1 20 2 2" solimp="0.9 0.95" solref="0.002 1"'
+    body = changed_body(tmp_path, {'<pair name="L1_foot"': f"<pair {own}"})
+    flat, model = compile_body(conditions(body)).model, compile_body(conditions(body, ground=ground)).model
+    assert flat.npair == 11
     assert model.npair == pieces * 11
     for name in ("dim", "solref", "solreffriction", "solimp", "margin", "gap", "friction"):
-        values = getattr(model, f"pair_{name}")
-        assert_array_equal(values, np.broadcast_to(getattr(insect.model, f"pair_{name}")[0], values.shape))
+        plane, values = getattr(flat, f"pair_{name}"), getattr(model, f"pair_{name}")
+        alike = dict(zip(flat.pair_geom2, plane.tolist(), strict=True))  # the plane is geom1
+        assert_array_equal(values, [alike[touching] for touching in model.pair_geom2 - (model.ngeom - flat.ngeom)])
 
 
 @pytest.mark.parametrize("ground", ["flat", "step", "gap", "hurdle", "rough"])
@@ -171,6 +174,7 @@ GROUND = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
         ({'<pair condim="3"': '<pair condim="1"', "<pair name": '<pair condim="3" name'}, {"ground": "rough"}),
         ({'forcerange="-4e5 4e5"': 'forcelimited="false"'}, {}),
         ({'inheritrange="1"': 'inheritrange="1" ctrllimited="false"'}, {}),
+        ({'<position name="L1_thorax_coxa"': '<intvelocity name="L1_thorax_coxa" actrange="0 1"'}, {}),
         ({' integrator="implicitfast"': ""}, {}),
         ({'<site type="sphere" size="0.44"': '<site type="box" size="0.1 0.005 0.005"'}, {}),
         ({' autolimits="true"/>': ' autolimits="true" inertiafromgeom="true"/>'}, {"load": 1.0}),
@@ -180,6 +184,14 @@ GROUND = '<geom name="ground" type="plane" size="0 0 50" material="ground"'
 def test_what_an_mjcf_tells_otherwise_is_made_as_ever(tmp_path: Path, changes: dict[str, str], under: dict[str, Any]):
     changed = compile_body(conditions(changed_body(tmp_path, changes), **under), looks=False)
     assert differences(changed.model, compile_body(conditions(**under), looks=False).model) == []
+
+
+def test_the_inertia_of_a_geared_motor_is_the_joint_s(insect: CompiledBody, tmp_path: Path):
+    geared = {'<joint armature="1"': "<joint", "<position name": '<position armature="0.01" gear="10" name'}
+    changed = compile_body(conditions(changed_body(tmp_path, geared)))
+    names = differences(changed.model, insect.model)
+    assert {name.partition("_")[2] for name in names} == {"armature", "actuatorid"}  # where it is told
+    assert_array_equal(changed.model.actuator_armature, 18 * [1.0])
 
 
 def test_a_mass_beside_the_body_moves_nothing(tmp_path: Path):

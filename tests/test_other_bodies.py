@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -29,7 +30,7 @@ from hexmj.physics.outcomes import Outcomes
 from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
-from hexmj.replay.recording import load_recording, record, record_plan, save_recording
+from hexmj.replay.recording import load_recording, record, record_plan, recorded_conditions, save_recording
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 from other_bodies import any_hexapod, found, renamed
@@ -180,3 +181,24 @@ def test_usual_places_of_obstacles_hold_no_body_back_where_the_ground_is_flat(tm
             Conditions(body=long, ground=Ground(ground))
     with pytest.raises(InputError, match="ground_at = 51"):
         Conditions(body=long, ground=Ground(ground_at=51.0))
+
+
+def test_a_body_that_the_usual_conditions_do_not_fit_walks_under_its_own():
+    lengths = replace(STICK_INSECT.lengths, highest_lift=7.0, fastest_swing=60.0)
+    body = replace(STICK_INSECT, name="fine", longest_step=0.0005, lengths=lengths)
+    own: dict[str, Any] = {"vp": 40.0, "step_height": 6.0, "longest_substep": 0.5}
+    for lacking in own:
+        with pytest.raises(InputError, match=f"{lacking} = .*; expected above"):
+            Conditions.of(body=body, **{name: value for name, value in own.items() if name != lacking})
+    conditions = Conditions.of(body=body, **own)
+    assert conditions == Conditions().but(body=body, **own)
+    walked = physical_walk(draw_starts(1, 0), LDVS, 0.5, 5.0, conditions=conditions)
+    assert recorded_conditions(record(walked), body) == conditions
+
+
+@pytest.mark.parametrize(("vp", "dt"), [(80.0, 0.55), (3.0, 0.27), (96.0, 0.54), (144.0, 0.81)])
+def test_time_steps_that_are_the_longest_but_for_the_last_bit_are_taken(vp: float, dt: float):
+    conditions = Conditions.of(vp=vp)
+    step = conditions.timestep(Stride(dt=dt))
+    assert step == pytest.approx(STICK_INSECT.longest_step, rel=1e-12)
+    assert compile_body(conditions, step).model.opt.timestep == step

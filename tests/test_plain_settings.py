@@ -2,10 +2,13 @@
 
 import json
 import sys
+from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.sweeps import Cell
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain import classes, plain
 from hexmj.timing import Stride
 from small_cells import Wave, odd_bits
 
@@ -37,8 +40,35 @@ def test_settings_become_plain_json() -> None:
     assert json.loads(json.dumps(plain(settings))) == plain(settings)
 
 
+class Rule(NamedTuple):
+    """With a method, as users write rules."""
+
+    far: float = 10.0
+
+    def pep(self, velocity: float) -> float:
+        return -self.far - 15.0 * velocity
+
+
+class Other(Rule):
+    pass
+
+
+class Pair(tuple[int, ...]):
+    pass
+
+
+def test_a_named_tuple_is_its_class_too() -> None:
+    told = [plain({"rule": rule})["rule"] for rule in (Rule(), Other())]
+    assert told == [{"class": f"test_plain_settings.{name}", "far": 10.0} for name in ("Rule", "Other")]
+    assert list(classes([Rule(), {"in": (Other(), 1)}])) == [Rule, Other]
+
+
 @pytest.mark.parametrize(
-    "value", [{1, 2}, object(), np.float32(1.0), np.array([object()]), {1: 2}, len, Wave, 1j, Path()]
+    "value",
+    [
+        *({1, 2}, object(), np.float32(1.0), np.array([object()]), {1: 2}, len, Wave, 1j, Path()),
+        *(Pair((1, 2)), OrderedDict(a=1), MappingProxyType({"a": 1}), np.ma.masked_array([1.0])),
+    ],
 )
 def test_what_is_no_setting_is_refused_in_one_sentence(value: object) -> None:
     with pytest.raises(InputError, match="is no setting; expected") as raised:

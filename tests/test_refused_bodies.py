@@ -207,6 +207,7 @@ def root_joint(attribute: str) -> dict[str, str]:
         ({OPTION: '<option actuatorgroupdisable="1" '}, "actuatorgroupdisable = 2; expected none"),
         ({WORLD: f'<body name="ball"><freejoint name="b"/><geom size="3"/></body>{WORLD}'}, "joint 'b' is no leg's"),
         ({SITE: f'<body><joint name="spur"/><geom size="0.1" mass="1e-6"/></body>{SITE}'}, "joint 'spur' is no leg's"),
+        ({JOINT: f'{JOINT} margin="0.5" '}, r"margin = 0\.5 of the joint 'L1_thorax_coxa'; expected 0"),
         ({JOINT: f'{JOINT} actuatorfrcrange="-9 9" '}, "actuatorfrclimited = True of the joint 'L1_thorax_coxa'"),
         ({SERVO: '<position nsample="20" delay="0.01" name'}, r"nsample, interp = \[20, 0\] of the actuator"),
         ({WORLD: f'<geom name="wall" type="box" size="3 9 9" contype="1"/>{WORLD}'}, "geom 'wall' beside the body"),

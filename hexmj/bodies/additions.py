@@ -81,9 +81,11 @@ def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gain
             pair.condim, pair.solref = 3, [2 * body.longest_step, 1.0]
     for servo in _servos(spec, body):
         servo.set_to_position(kp=gains.stiffness, dampratio=gains.damping_ratio)
+        servo.armature *= servo.gear[0] ** 2  # the inertia that the joint has of it
         servo.forcerange, servo.gear = [-gains.torque, gains.torque], [1.0] + 5 * [0.0]
         servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
         servo.forcelimited = servo.ctrllimited = True
+        servo.actrange, servo.actlimited = [0.0, 0.0], False
     for group in sensor_groups(body).values():
         if group.find(plain) is None:
             _add_sensors(spec, group)

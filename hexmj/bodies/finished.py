@@ -75,6 +75,7 @@ RULES = (
     Rule("armature", "dof_armature", ROOT_DOFS, 0, 0, FREE),
     Rule("stiffness", "jnt_stiffness", ROOT, 0, 0, FREE),
     Rule("stiffness", "jnt_stiffnesspoly", ROOT, 0, 0, FREE),
+    Rule("margin", "jnt_margin", JOINT, 0, 0, "0: a joint is free up to the ends of its range"),
     Rule("actuatorfrclimited", "jnt_actfrclimited", JOINT, 0, 0, "no limit but the servo's"),
     Rule("nsample, interp", "actuator_history", ACTUATOR, 0, 0, SERVO),
     Rule("delay", "actuator_delay", ACTUATOR, 0, 0, SERVO),

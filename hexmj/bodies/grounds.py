@@ -16,7 +16,7 @@ BUMPS = (15, 9)
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
 
-CONTACT = ("condim", "solref", "solimp")
+CONTACT = ("condim", "friction", "solref", "solimp")
 """Of what touches the ground: it touches what lies ahead alike."""
 
 

@@ -15,7 +15,7 @@ from hexmj.bodies.finished import check_finished
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
 from hexmj.bodies.reading import posed
-from hexmj.conditions import Conditions, Masses
+from hexmj.conditions import ROUNDING, Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.sweeps.plain import content
@@ -38,13 +38,12 @@ def compile_body(conditions: Conditions, timestep: float | None = None, *, looks
     """
     body = conditions.body
     timestep = body.longest_step if timestep is None else timestep
-    if not 0 < timestep <= body.longest_step:
+    if not 0 < timestep <= body.longest_step * (1.0 + ROUNDING):
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
-    made_of = {"masses": conditions.masses, "contact": conditions.contact, "ground": conditions.ground}
-    compiled = _compiled(Conditions(**made_of, body=body), looks, content(body.mjcf))
+    compiled = _compiled(conditions, looks, content(body.mjcf))
     model = copy.copy(compiled.model)
     model.opt.timestep = timestep
-    return replace(compiled, model=model, conditions=conditions)
+    return replace(compiled, model=model)
 
 
 def plain_model(body: Body) -> mujoco.MjModel:

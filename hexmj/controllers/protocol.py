@@ -5,14 +5,14 @@ the tips shall be; on paper nothing comes back, in physics a plan that has a met
 what a robot would know.
 """
 
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from hexmj.checks import printable
 from hexmj.errors import InputError
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain import field_names, plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
@@ -200,4 +200,13 @@ def settings_of(controller: Controller) -> dict[str, Any]:
         InputError: no controller, or a field that is no plain data.
     """
     check_controller_type(controller)
-    return plain(asdict(controller))  # pyright: ignore[reportArgumentType]
+    return plain(_bare(controller))
+
+
+def _bare(value: Any) -> Any:
+    """A setting without the names of its classes."""
+    if (names := field_names(value)) is not None:
+        return {name: _bare(getattr(value, name)) for name in names}
+    if type(value) is dict:
+        return {key: _bare(item) for key, item in value.items()}
+    return [_bare(item) for item in value] if type(value) in (list, tuple) else value

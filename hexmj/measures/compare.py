@@ -10,7 +10,7 @@ import numpy as np
 from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
@@ -62,7 +62,7 @@ class Comparison:
             raise InputError("no controller was given; expected at least one")
         for name, controller in self.controllers.items():
             printable("a controller's name", name)
-            check_controller_type(controller)
+            settings_of(controller)  # now, not after the work
         check_draw(self.n_starts, self.seed)
         _ = self.observed
 

@@ -88,7 +88,7 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
         with np.load(io.BytesIO(content)) as file:
             saved = dict(file)
         conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
-        compiled = compile_body(Conditions(body=body).but(**conditions), float(saved["timestep"]))
+        compiled = compile_body(Conditions.of(body=body, **conditions), float(saved["timestep"]))
         compiled.model.pair_solref[:, 0] = saved["contact"]
         data = mujoco.MjData(compiled.model)
         for name in STATE:

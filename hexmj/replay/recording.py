@@ -145,8 +145,8 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
     if (found := recording.sizes["position"]) != (expected := ROOT_QPOS + len(body.joints)):
         raise InputError(f"the recording has {found} positions; expected {expected} of the body {name!r}")
     check_settings(recording)
-    usual = Conditions(body=body)
-    return usual.but(**{name: type(value)(recording.attrs[name]) for name, value in usual.flat().items()})
+    told = {name: type(value)(recording.attrs[name]) for name, value in Conditions().flat().items()}
+    return Conditions.of(body=body, **told)
 
 
 def _check(recording: xr.Dataset) -> None:

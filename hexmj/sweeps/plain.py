@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hexmj import as_run
+from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.files import digest, read_bytes
 
@@ -23,9 +24,12 @@ NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2"
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
+PATH = type(Path())
+"""The class of paths on this system."""
+
 
 def plain(value: Any, folders: Mapping[Path, str] | None = None) -> Any:
-    """A setting as JSON can hold it: a frozen dataclass with the name of its class, an array as a list.
+    """A setting as JSON can hold it: a frozen dataclass or named tuple with the name of its class, an array as a list.
 
     A file is its name and a digest of its content, wherever it lies; so is a text with a dot that names one.  A field
     of a user's own class may name one without a dot, and beside the class's module or those of its bases as well, or in
@@ -40,26 +44,25 @@ def plain(value: Any, folders: Mapping[Path, str] | None = None) -> Any:
         InputError: it is none of the things that a setting can be.
     """
     folders = folders or {}
-    if _frozen(value):
-        _check_fields(value)
+    if (names := field_names(value)) is not None:
+        _check_fields(value, names)
         of_class = {**folders, **_folders(type(value))}
-        told = {one.name: plain(getattr(value, one.name), of_class) for one in fields(value)}
-        return {"class": label(type(value))} | told
-    if isinstance(value, np.ndarray | np.generic) and value.dtype in (np.bool_, np.int64, np.float64):
+        return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class) for name in names}
+    if (type(value) is np.ndarray or isinstance(value, np.generic)) and value.dtype in (np.bool_, np.int64, np.float64):
         return value.tolist()
     if type(value) is str and (folders or "." in value) and (held := _held(value, folders)):
         return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
         return value
-    if isinstance(value, list | tuple):
+    if type(value) in (list, tuple):
         return [plain(item, folders) for item in value]
-    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+    if type(value) is dict and all(isinstance(key, str) for key in value):
         return {key: plain(item, folders) for key, item in value.items()}
-    if isinstance(value, Path) and not value.is_dir():
+    if type(value) is PATH and not value.is_dir():
         return f"{value.name}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
-        f"{value!r:.80} is no setting; expected a number, text, path of a file, frozen dataclass, or a tuple, dict or"
-        " array (float64, int64, bool) of these"
+        f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"
+        " tuple, dict or array (float64, int64, bool) of these"
     )
 
 
@@ -84,15 +87,15 @@ def module_label(module: str) -> str:
 
 
 def classes(value: Any) -> Iterator[type]:
-    """Those of all dataclasses in a setting."""
-    if isinstance(value, Mapping):
-        value = tuple(value.values())
-    if isinstance(value, list | tuple):
+    """Those of all dataclasses and named tuples in a setting."""
+    if (names := field_names(value)) is not None:
+        yield type(value)
+        yield from classes([getattr(value, name) for name in names])
+    elif isinstance(value, Mapping):
+        yield from classes(list(value.values()))
+    elif isinstance(value, list | tuple):
         for item in value:
             yield from classes(item)
-    elif _frozen(value):
-        yield type(value)
-        yield from classes([getattr(value, one.name) for one in fields(value)])
 
 
 def content(path: Path) -> bytes:
@@ -136,14 +139,17 @@ def _folders(kind: type) -> dict[Path, str]:
     return beside | {folder: way for way, folder in named.items() if folder not in beside}
 
 
-def _check_fields(value: Any) -> None:
-    """Refuse a dataclass that keeps anything, but what it computes once, where no name and no file would tell it."""
-    kind, known = type(value), {one.name for one in fields(value)}
-    beside = set(getattr(value, "__dict__", ())) - known
+def _check_fields(value: Any, names: tuple[str, ...]) -> None:
+    """Refuse what keeps anything else, but what it computes once, where no name and no file would tell it."""
+    kind = type(value)
+    beside = set(getattr(value, "__dict__", ())) - set(names)
     if hidden := {name for name in beside if not isinstance(getattr_static(kind, name, None), cached_property)}:
         raise InputError(f"{label(kind)} keeps {min(hidden)!r} beside its fields; expected all settings as fields")
 
 
-def _frozen(value: Any) -> bool:
+def field_names(value: Any) -> tuple[str, ...] | None:
+    """Names of the fields of a frozen dataclass or of a named tuple; none of anything else."""
     parameters = getattr(type(value), "__dataclass_params__", None)
-    return parameters is not None and parameters.frozen
+    if parameters is not None and parameters.frozen:
+        return tuple(one.name for one in fields(value))
+    return getattr(value, "_fields", None) if isinstance(value, tuple) else None

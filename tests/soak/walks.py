@@ -62,7 +62,7 @@ def tried(seed: int, n_starts: int = STARTS) -> Account:
     values, factor = _conditions(rng), float(rng.choice([0.0, 0.0, 0.9, 0.95, 1.05, 1.15]))
     account = Account(Counter(drawn=n_starts), process=os.getpid())
     try:
-        conditions = hexmj.Conditions(body=_body(factor)).but(**values) if factor else hexmj.Conditions.of(**values)
+        conditions = hexmj.Conditions.of(body=_body(factor), **values) if factor else hexmj.Conditions.of(**values)
         settled = settle(hexmj.draw_starts(n_starts, seed), conditions, threads=1)
         impulse = rng.uniform(-80.0, 80.0, n_starts) * conditions.body.mass * conditions.time.vp
         push = Push(impulse, rng.uniform(0.0, duration, n_starts)) if rng.random() < 0.2 else None
