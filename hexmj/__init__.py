@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import hexmj.as_run  # from now on
+import hexmj.reads
 
 if TYPE_CHECKING:
     from hexmj import environments as environments

@@ -76,6 +76,11 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
     return meant[0]
 
 
+def is_users(file: str) -> bool:
+    """Whether a file is a user's own: neither of Python, nor installed, nor of this package."""
+    return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
+
+
 def texts(nodes: Iterable[ast.AST]) -> list[str]:
     """Texts in the nodes of a source that may name a file or folder, alone or after a folder in a formatted one."""
     whole = [one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)]
@@ -145,10 +150,9 @@ def _digest_if_any(path: Path) -> str:
 
 def _note(file: Any, runs: CodeType | None = None) -> None:
     """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
-    if not isinstance(file, str) or file.endswith(COMPILED) or file.startswith(_NOT_ITS_USERS):
+    if not isinstance(file, str) or file.endswith(COMPILED) or not is_users(file):
         return
-    if not INSTALLED.isdisjoint((path := Path(file)).parts):
-        return
+    path = Path(file)
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
         if (source := path.read_bytes()) not in (versions := _RUN.setdefault(file, [])):
             versions.append(source)

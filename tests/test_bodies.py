@@ -186,6 +186,18 @@ def test_what_an_mjcf_tells_otherwise_is_made_as_ever(tmp_path: Path, changes: d
     assert differences(changed.model, compile_body(conditions(**under), looks=False).model) == []
 
 
+def test_the_inertial_of_a_part_without_geoms_stays(tmp_path: Path):
+    pack = '<body name="pack"><inertial pos="0 0 8" mass="0.3" diaginertia="1 1 1"/></body>'
+    models = []
+    for inferred in ("", ' inertiafromgeom="true"'):
+        loaded = {
+            '<body name="L1_coxa"': f'{pack}<body name="L1_coxa"',
+            ' autolimits="true"': f' autolimits="true"{inferred}',
+        }
+        models.append(compile_body(conditions(replace(changed_body(tmp_path, loaded), mass=1.3)), looks=False).model)
+    assert differences(*models) == []
+
+
 def test_the_inertia_of_a_geared_motor_is_the_joint_s(insect: CompiledBody, tmp_path: Path):
     geared = {'<joint armature="1"': "<joint", "<position name": '<position armature="0.01" gear="10" name'}
     changed = compile_body(conditions(changed_body(tmp_path, geared)))

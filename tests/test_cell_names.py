@@ -131,8 +131,18 @@ print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
 """
 
 
+def version_of_my_helper(mine: Path, folder: Path) -> tuple[str, str]:
+    """Of `my_helper` in a folder of installed packages, and of NumPy, as a cell's name tells them."""
+    mine.write_text("import my_helper\nimport numpy")
+    environment = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(folder)])}
+    command = [sys.executable, "-c", VERSIONS.format(mine=mine)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    found = json.loads(done.stdout or done.stderr)
+    return found["my_helper"], found["numpy"]
+
+
 def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text("import my_helper\nimport numpy")
+    """Installed anew from elsewhere, installed anew with other content, and edited where it lies."""
     found = []
     for i, (text, where) in enumerate((("GAIN = 1", "a"), ("GAIN = 1", "b"), ("GAIN = 2", "b"))):
         told = (folder := tmp_path / str(i) / "site-packages") / "my_helper-1.0.dist-info"
@@ -143,12 +153,25 @@ def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_pa
         rows = {"my_helper.py": text, "my_helper-1.0.dist-info/direct_url.json": where, "../bin/my_helper": where}
         sums = {name: base64.urlsafe_b64encode(sha256(held.encode()).digest()) for name, held in rows.items()}
         (told / "RECORD").write_text("".join(f"{name},sha256={sums[name].decode()},8\n" for name in rows))
-        environment = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(folder)])}
-        command = [sys.executable, "-c", VERSIONS.format(mine=tmp_path / "mine.py")]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True)
-        found.append(json.loads(done.stdout or done.stderr))
-    assert found[0] == found[1] != found[2]
-    assert found[0]["numpy"] == np.__version__ and found[0]["my_helper"].startswith("1.0@")
+        found.append(version_of_my_helper(tmp_path / "mine.py", folder))
+    (tmp_path / "0" / "site-packages" / "my_helper.py").write_text("GAIN = 3")
+    edited = version_of_my_helper(tmp_path / "mine.py", tmp_path / "0" / "site-packages")
+    assert found[0] == found[1] and len({*found, edited}) == 3
+    assert found[0][1] == np.__version__ and found[0][0].startswith("1.0@")
+
+
+@pytest.mark.parametrize("name", ["my_helper.py", "my_helper/__init__.py", "my_helper/inner/gains.py"])
+def test_an_installed_helper_of_no_package_counts_by_its_files(tmp_path: Path, name: str) -> None:
+    """One that was copied there."""
+    file = (folder := tmp_path / "site-packages") / name
+    file.parent.mkdir(parents=True)
+    if "inner" in name:
+        (folder / "my_helper" / "__init__.py").write_text("from my_helper.inner.gains import GAIN")
+    found = []
+    for text in ("GAIN = 1", "GAIN = 2"):
+        file.write_text(text)
+        found.append(version_of_my_helper(tmp_path / "mine.py", folder)[0])
+    assert found[0] != found[1] and all(one.startswith("unknown@") for one in found)
 
 
 JOINED = {

@@ -13,7 +13,18 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = (
     ("attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf", "parsing"),
-    ("as_run", "field_docs", "pictures", "progress", "results", "rotations", "same_numbers", "signals", "threads"),
+    (
+        "as_run",
+        "field_docs",
+        "pictures",
+        "progress",
+        "reads",
+        "results",
+        "rotations",
+        "same_numbers",
+        "signals",
+        "threads",
+    ),
     ("sweeps",),  # knows nothing of walking
     ("diagrams", "timing"),
     ("stability", "walks"),

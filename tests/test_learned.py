@@ -18,6 +18,7 @@ from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
 from hexmj.errors import InputError
 from hexmj.loaded import importable
+from hexmj.view.live import LiveWalk
 
 ROOT = Path(__file__).parents[1]
 
@@ -60,6 +61,19 @@ def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
         for one in (WithOffsets(still, conditions=conditions), hexmj.LDVS)
     ]
     np.testing.assert_allclose(walks[0].qpos, walks[1].qpos, rtol=0, atol=0.02)
+
+
+def test_a_policy_around_another_is_of_its_conditions(example):
+    policy = example("train_cma").Reflexes()
+    outer = WithOffsets(policy, controller=WithOffsets(policy), conditions=Conditions.of(vp=40.0))
+    with pytest.raises(InputError, match=r"the plan is made for vp = 80\.0; .* 40\.0"):
+        hexmj.physical_walk(hexmj.draw_starts(1, 3), outer, 0.3, 1.0, conditions=outer.conditions)
+    live = LiveWalk(outer.controller, 0.3, hexmj.draw_starts(1, 3)[0])
+    live.advance(0.1)
+    before = live.moment
+    with pytest.raises(InputError, match=r"the plan is made for vp = 80\.0; .* 40\.0"):
+        live.begin(conditions=outer.conditions)
+    assert live.moment is before and live.advance(0.1).seconds > before.seconds
 
 
 @pytest.mark.parametrize(

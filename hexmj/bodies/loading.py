@@ -145,7 +145,7 @@ def _spec(body: Body) -> mujoco.MjSpec:
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         # The same by other words, under which geoms that are only to look at may be discarded.
         spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-        for part in spec.bodies:
+        for part in (one for one in spec.bodies if one.geoms):
             part.explicitinertial, part.ipos = False, 3 * [np.nan]
     return spec
 

@@ -15,6 +15,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
 from hexmj.physics.foot_path import TipTargets, standing_tips
+from hexmj.physics.orders import check_made_for
 from hexmj.rotations import lean
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, joined
@@ -76,8 +77,13 @@ class WithOffsets:
         acceleration: Acceleration | None = None,
         threads: int | None = None,
     ) -> "OffsetPlan":
-        """See `protocol.Controller.begin`."""
+        """See `protocol.Controller.begin`.
+
+        Raises:
+            InputError: the controller was itself made for other conditions.
+        """
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+        check_made_for(plan, self.conditions)
         return OffsetPlan(plan, self.policy, self.conditions)
 
 

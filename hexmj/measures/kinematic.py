@@ -14,7 +14,7 @@ from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, typed, whole
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
 from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
@@ -114,7 +114,7 @@ class KinematicFlss:
 
     def __post_init__(self) -> None:
         check_types(self)
-        check_controller_type(self.controller)
+        settings_of(self.controller)  # now, not after the work
         check_draw(self.n_starts, self.seed)
         whole("range_of", self.range_of, math.ceil(self.n_starts / MOST_RANGES), MOST_STARTS)
         _ = self.observed
@@ -149,7 +149,8 @@ class KinematicFlss:
             losses[i, begin : begin + one.sizes["sample"]] += one.losses.values
         told = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         made = settings({self.controller.name: self.controller}, *told)
-        return frequency_table(losses, self.n_starts, *self.observed).assign_attrs(attributes({"study": "flss"} | made))
+        table = frequency_table(losses, self.n_starts, *self.observed).assign_coords(controller=self.controller.name)
+        return table.assign_attrs(attributes({"study": "flss"} | made))
 
 
 def losses_of_range(

@@ -51,7 +51,8 @@ class Outcomes:
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touched first, -1 for none."""
     clearance: np.ndarray
-    """(start,) least height of the trunk's lowest point [mm]; below 0 by how far it sinks in on contact."""
+    """(start,) least height of the trunk's lowest point above z = 0 [mm], whatever lies ahead; below it by how far it
+    sinks in on contact."""
     tilt: np.ndarray
     """(start,) greatest angle between the trunk's vertical and the world's [rad]."""
     speed: np.ndarray

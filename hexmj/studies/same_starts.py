@@ -2,17 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexmj.attributes import attributes
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import settings
 from hexmj.starts import check_draw
 from hexmj.sweeps import Cell
 from hexmj.timing import Acceleration, Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class SameStarts:
     """The accelerating procedure of Eq. 11."""
 
     def __post_init__(self) -> None:
-        check_controller_type(self.controller)
+        settings_of(self.controller)  # now, not after the work
         check_types(self)
         check_draw(self.n_starts, self.seed)
         given, usual = self.conditions.flat(), Conditions().flat()
@@ -61,9 +64,10 @@ class SameStarts:
         same = "controller", "n_starts", "seed", "stride", "acceleration"
         return Cell(name, function, {name: getattr(self, name) for name in same} | own, work)
 
-    def attributes(self, study: str, **own: Any) -> dict[str, Any]:
-        """All that is needed to run the study again: what all studies have, and its own; conditions but for lists."""
+    def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
+        """A result with its controller's name and all that is needed to run the study again: what all studies have, and
+        its own; conditions but for lists."""
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         conditions = {name: value for name, value in self.conditions.settings().items() if name not in self.lists}
         told = settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
-        return attributes({"study": study} | told)
+        return table.assign_attrs(attributes({"study": study} | told)).assign_coords(controller=self.controller.name)

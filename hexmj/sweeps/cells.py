@@ -3,16 +3,20 @@
 import json
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
+from hexmj.as_run import is_users
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.files import digest
-from hexmj.sweeps.code import code
+from hexmj.reads import changed, reads
+from hexmj.sweeps.code import code, source_files
 from hexmj.sweeps.plain import classes, label, plain
 
 EXECUTION = ("threads", "progress")
@@ -55,7 +59,7 @@ class Cell:
             InputError: a setting, or the function, is nothing that can be written down.
         """
         told = self._told()
-        made = code(frozenset(one.__module__ for one in (self.function, *classes([self.settings, self._owner]))))
+        made = code(frozenset(self._modules()))
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
     def settings_now(self) -> str:
@@ -63,6 +67,22 @@ class Cell:
         with suppress(InputError):
             return json.dumps(self._told(), sort_keys=True)
         return ""
+
+    def reads(self) -> str:
+        """What its code has read so far in this process, as JSON; see `reads.reads`."""
+        return json.dumps(reads(source_files(frozenset(self._modules())), self._homes()), sort_keys=True)
+
+    def edited(self, told: str) -> str:
+        """The first file or folder of `reads` that holds something else by now; empty if none does."""
+        return changed(json.loads(told), self._homes())
+
+    def _homes(self) -> list[Path]:
+        """Folders that a user's own modules lie in, and the current one."""
+        files = [getattr(sys.modules.get(module), "__file__", None) for module in self._modules()]
+        return [*dict.fromkeys(Path(file).absolute().parent for file in files if file and is_users(file)), Path.cwd()]
+
+    def _modules(self) -> list[str]:
+        return [one.__module__ for one in (self.function, *classes([self.settings, self._owner]))]
 
     def _told(self) -> dict[str, Any]:
         if not hasattr(self.function, "__qualname__"):

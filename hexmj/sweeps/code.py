@@ -28,7 +28,8 @@ from hexmj.sweeps.plain import PACKAGE, module_label
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
-    *("hexmj.as_run", "hexmj.field_docs", "hexmj.files", "hexmj.netcdf", "hexmj.progress", "hexmj.sweeps"),
+    *("hexmj.as_run", "hexmj.field_docs", "hexmj.files", "hexmj.netcdf", "hexmj.progress"),
+    *("hexmj.reads", "hexmj.sweeps"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 
@@ -97,6 +98,11 @@ def code(modules: frozenset[str]) -> Code:
             held = {f"{module_label(name)}, {one}": as_run.data(file, one, folders, more) for one in names}
             data |= {one: digest for one, digest in held.items() if digest}
     return Code(dict(sorted((needed.sources | data).items())), needed.versions)
+
+
+def source_files(modules: frozenset[str]) -> set[str]:
+    """The files of all sources that some modules need."""
+    return {str(file) for _, file, _ in _needed(modules).read}
 
 
 def _needed(modules: frozenset[str]) -> _Needed:

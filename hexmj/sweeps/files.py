@@ -1,43 +1,68 @@
-"""Kept cells: data and the record of all that they depend on, believed only if nothing is amiss."""
+"""Kept cells: data and the record of all that they depend on, believed only if nothing is amiss.
 
+What a cell's code reads is known only once it is computed, so its file tells that, too: where something has changed
+since, the cell is made anew and kept beside.
+"""
+
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexmj import netcdf
 from hexmj.errors import InputError
-from hexmj.files import read_sealed, sealed, write_whole
+from hexmj.files import digest, read_sealed, sealed, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hexmj.sweeps.cells import Cell
+
 RECORD = "cell"
 """Attribute of the file: what the cell depends on, as JSON."""
 
+READ = "read"
+"""Attribute of the file: what was read as it was made, as JSON; see `Cell.reads`."""
 
-def write(path: Path, record: str, data: "xr.Dataset") -> "xr.Dataset":
-    """Keep a cell with the record of what it depends on, and give its data as they will be read.
+
+def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> "xr.Dataset":
+    """Keep a cell with the record of what it depends on and with what it read, and give its data as they will be read.
+
+    Args:
+        path: of the file, unless it is taken by the same cell of other reads.
+        cell: that was computed.
+        record: of it.
+        data: that it gave.
 
     Raises:
         InputError: it cannot be written, or the sweep's folder is no longer there.
     """
     if not path.parent.is_dir():
         raise InputError(f"{path.parent} was removed or renamed while it was in use; nothing more is written there")
-    content = netcdf.encode(data.assign_attrs({RECORD: record}))
+    told = cell.reads()
+    if path.exists() and _decode(path, read_sealed(path), record)[1] != told:
+        path = path.with_name(f"{path.stem}.{digest(told.encode())}.nc")
+    content = netcdf.encode(data.assign_attrs({RECORD: record, READ: told}))
     write_whole(path, sealed(content))
-    return _decode(content, record, path)
+    return _decode(path, content, record)[0]
 
 
-def read(path: Path, record: str) -> "xr.Dataset":
-    """The data of a kept cell.
+def find(path: Path, cell: "Cell", record: str) -> "xr.Dataset | None":
+    """The data of a kept cell, if there is one, and all that it read is as it was; arguments as of `write`.
 
     Raises:
         InputError: it cannot be read, is damaged, or has another record.
     """
-    return _decode(read_sealed(path), record, path)
+    if path.exists():
+        for one in (path, *sorted(path.parent.glob(f"{escape(path.stem)}.*.nc"))):
+            data, told = _decode(one, read_sealed(one), record)
+            if not cell.edited(told):
+                return data
+    return None
 
 
-def _decode(content: bytes | None, record: str, path: Path) -> "xr.Dataset":
+def _decode(path: Path, content: bytes | None, record: str) -> tuple["xr.Dataset", str]:
+    """The data, and what was read for them."""
     data = netcdf.decode(content, f"{path} is damaged, or no cell of a sweep; delete it, and it is made anew")
     if data.attrs.pop(RECORD, None) != record:
         raise InputError(f"{path} is another cell than its name says; delete it, and it is made anew")
-    return data
+    return data, data.attrs.pop(READ, "{}")

@@ -17,7 +17,7 @@ from hexmj.errors import InputError
 from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
-from hexmj.sweeps.files import read, write
+from hexmj.sweeps.files import find, write
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,8 +107,8 @@ def finish(
     else:
         waiting = list[int]()
         for i, path in enumerate(paths):
-            if path and path.exists():
-                yield finished(i, read(path, records[i]))
+            if path and (kept := find(path, cells[i], records[i])):
+                yield finished(i, kept)
             else:
                 waiting.append(i)
         parcels = [
@@ -143,12 +143,12 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
-    if path and path.exists():
-        return read(path, record)
+    if path and (kept := find(path, cell, record)):
+        return kept
     before = record if path else cell.settings_now()
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    return write(path, record, data) if path else data
+    return write(path, cell, record, data) if path else data
 
 
 @dataclass(frozen=True)

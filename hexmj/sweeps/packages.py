@@ -1,33 +1,56 @@
 """Installed packages as a cell's name tells them: by versions, and by files where these may change alone."""
 
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import Distribution, PackageNotFoundError, packages_distributions, requires
+from importlib.util import find_spec
+from pathlib import Path
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from hexmj.files import digest
+from hexmj.files import digest, digest_of
 
 
 @cache
 def version(module: str) -> str:
     """Of the distributions that a module comes from, each with a digest of its files unless this package requires it: a
-    helper of a user's own may be installed anew with the same version."""
+    helper of a user's own may be installed anew, or edited where it lies, with the same version.  Of a module of none,
+    that of its own files.
+    """
     try:
         found = [Distribution.from_name(module)]
     except PackageNotFoundError:
         found = [Distribution.from_name(one) for one in {*packages_distributions().get(module, ())}]
-    return " ".join(sorted(f"{one.version}{_files(one)}" for one in found)) or "unknown"
+    return " ".join(sorted(f"{one.version}{_files(one)}" for one in found)) or _of_no_distribution(module)
 
 
 def _files(distribution: Distribution) -> str:
-    """A digest of all that was installed beside metadata and scripts, which tell where it lies."""
+    """A digest of all that was installed beside metadata and scripts, which tell where it lies: of Python's files as
+    they are, of others as they were installed."""
     if canonicalize_name(distribution.name) in _required():
         return ""
     files = [one for one in distribution.files or () if ".." not in one.parts and ".dist-info" not in one.parts[0]]
-    told = sorted(f"{one} {one.hash.value}" for one in files if one.hash)
-    return f"@{digest(repr(told).encode())}" if told else ""
+    return _digest((str(one), _now(Path(str(one.locate()))) or one.hash.value) for one in files if one.hash)
+
+
+def _of_no_distribution(module: str) -> str:
+    spec = find_spec(module)
+    folders = [Path(one) for one in (spec and spec.submodule_search_locations) or ()]
+    alone = [Path(spec.origin)] if spec and spec.has_location and spec.origin and not folders else []
+    places = [(one, one.parent) for one in alone] + [(one, folder) for folder in folders for one in folder.rglob("*")]
+    return f"unknown{_digest((one.relative_to(folder).as_posix(), _now(one)) for one, folder in places)}"
+
+
+def _now(file: Path) -> str:
+    """A digest of a file of Python; none of others."""
+    return digest_of(file) if file.suffix == ".py" and file.is_file() else ""
+
+
+def _digest(told: Iterable[tuple[str, str]]) -> str:
+    held = sorted(one for one in told if one[1])
+    return f"@{digest(repr(held).encode())}" if held else ""
 
 
 @cache

@@ -24,9 +24,6 @@ NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2"
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
-PATH = type(Path())
-"""The class of paths on this system."""
-
 
 def plain(value: Any, folders: Mapping[Path, str] | None = None) -> Any:
     """A setting as JSON can hold it: a frozen dataclass or named tuple with the name of its class, an array as a list.
@@ -54,11 +51,11 @@ def plain(value: Any, folders: Mapping[Path, str] | None = None) -> Any:
         return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
         return value
-    if type(value) in (list, tuple):
+    if type(value) is list or type(value) is tuple:
         return [plain(item, folders) for item in value]
     if type(value) is dict and all(isinstance(key, str) for key in value):
         return {key: plain(item, folders) for key, item in value.items()}
-    if type(value) is PATH and not value.is_dir():
+    if isinstance(value, Path) and not value.is_dir():
         return f"{value.name}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"

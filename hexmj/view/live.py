@@ -78,6 +78,11 @@ class Steered:
         """Whether the plan wants to be told of the legs before each step."""
         return isinstance(self._plan, ReadingPlan)
 
+    @property
+    def made_for(self) -> object:
+        """The conditions that the plan is made for, if it tells them; see `protocol.Plan`."""
+        return getattr(self._plan, "made_for", None)
+
     def sense(self, sensed: Sensed) -> None:
         """Hand on what is known."""
         if isinstance(self._plan, ReadingPlan):
@@ -141,13 +146,17 @@ class LiveWalk:
         self.begin()
 
     def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
-        """Begin again, at another start or under other conditions where these are given."""
+        """Begin again, at another start or under other conditions where these are given.
+
+        Raises:
+            InputError: the insect cannot walk so; the walk goes on as it was.
+        """
         start, conditions = self.start if start is None else start, conditions or self.conditions
         settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
-        self._plan = Steered(self.controller, settled.starts, self.velocity, self.stride)
-        self._push = Push(np.zeros(1), np.zeros(1))
+        plan = Steered(self.controller, settled.starts, self.velocity, self.stride)
+        orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
+        self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
         self._insects = Insects(settled, self._push, threads=1)
-        self._orders = OrdersFromPlan(settled, self._plan, MOST_STEPS * self.stride.dt)
         self.start, self.conditions, self.settled = start, conditions, settled
         self.trace, self.fell_on = [], ""
         self._before: PlannedWalk | None = None

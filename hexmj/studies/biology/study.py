@@ -83,7 +83,7 @@ class Biology(SameStarts):
         measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
         units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
         told = {name: ("row", values, {"units": units[name]}) for name, values in columns.items()}
-        return table.assign(told).assign_attrs(self.attributes("biology", periods=self.periods, speeds=list(SPEEDS)))
+        return self.labelled(table.assign(told), "biology", periods=self.periods, speeds=list(SPEEDS))
 
 
 def _mean(values: np.ndarray) -> tuple[float, float, float]:

@@ -117,6 +117,4 @@ class DisturbedWalks(SameStarts):
         )
         drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
         own = {"recovery": asdict(self.recovery), "adhesion": self.adhesion, "physical": self.physical}
-        return with_flss_after(table.assign(drawn=drawn)).assign_attrs(
-            self.attributes("disturb", grid=self.grid, **own)
-        )
+        return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=self.grid, **own)

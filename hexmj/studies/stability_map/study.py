@@ -123,7 +123,7 @@ class StabilityMap(SameStarts):
         reference = usual if usual in self.chosen else self.chosen[0]
         numbers = np.array([froude(one, self.observed[0]) for one in self.varied])
         table = with_differences(table, reference).assign(froude=(("value", "velocity"), numbers, {"units": "1"}))
-        return table.assign_attrs(self.attributes("map", over=self.over, reference=reference))
+        return self.labelled(table, "map", over=self.over, reference=reference)
 
     def _over_values(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """What happened to the starts that stand at every value, over (value, velocity, start)."""

@@ -97,6 +97,4 @@ class StaticLimit(SameStarts):
             same = (table[LOSSES[measure]] < np.inf) == lost
             told = {"units": "1", "long_name": f"kinematic and {measure} answer agree"}
             table[f"agreement_{measure}"] = same.mean("start").assign_attrs(told)
-        return with_flss(table, LOSSES).assign_attrs(
-            self.attributes("converge", velocity=self.velocity, duration=self.duration)
-        )
+        return self.labelled(with_flss(table, LOSSES), "converge", velocity=self.velocity, duration=self.duration)

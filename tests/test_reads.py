@@ -1,0 +1,153 @@
+"""What a user's code reads as a cell is computed counts, though no source and no setting names it."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from hexmj.errors import InputError
+from hexmj.loaded import importable
+from hexmj.sweeps import Cell, KeptValues, run
+
+READER = """
+import json, os
+from glob import glob
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+def cell(at):
+    with open("calls", "a") as file:
+        file.write(".")
+    return xr.Dataset({{"gain": {gain}}})
+
+def tried(path):
+    try:
+        return float(Path(path).read_text())
+    except OSError:
+        return 0.0
+
+def value(rows, at):
+    return rows[:, 0] * float(Path(at, "gain").read_text())
+"""
+
+
+def write_all(gain: str, at: str = "one") -> None:
+    """Into every file of the folder."""
+    Path(at, "gain").write_text(gain)
+    Path(at, "gain.json").write_text(gain)
+    np.save(Path(at, "gain.npy"), float(gain))
+
+
+@pytest.fixture
+def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[float, int]]:
+    """The gain that a cell reads in `at`, by a piece of Python, and how often cells were computed so far."""
+    monkeypatch.chdir(tmp_path)
+    for at, gain in (("one", "1.0"), ("two", "2.0")):
+        (tmp_path / at).mkdir()
+        write_all(gain, at)
+
+    def computed(gain: str, at: str = "one", **how: object) -> tuple[float, int]:
+        (tmp_path / "reader.py").write_text(READER.format(gain=gain))
+        data = run([Cell("reader", importable("reader.py").cell, {"at": at})], Path("kept"), **how)[0]  # pyright: ignore
+        return float(data.gain), os.stat("calls").st_size
+
+    return computed
+
+
+@pytest.mark.parametrize(
+    "gain",
+    [
+        'float(np.load(f"{at}/gain.npy"))',
+        'float(Path(at, "gain").read_text())',
+        'np.loadtxt(os.path.join(at, "gain"))',
+        'float(os.read(os.open(f"{at}/gain".encode(), os.O_RDONLY), 9))',
+        'json.loads(Path(max(glob(f"{at}/*.js*"))).read_text())',
+        'len(os.listdir(at)) + json.loads(Path(at, "gain" + ".json").read_text())',
+        'eval(compile(Path(at + "/gain").read_bytes(), "<text>", "eval"))',
+    ],
+)
+def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tuple[float, int]], gain: str) -> None:
+    (first, _), (again, once) = computed(gain), computed(gain)
+    assert (again, once) == (first, 1)
+    write_all("7.0")
+    assert [computed(gain), computed(gain)] == 2 * [(first + 6.0, 2)]
+    write_all("1.0")
+    assert computed(gain) == (first, 2)
+    assert len(list(Path("kept").glob("*.nc"))) == 2
+
+
+def test_what_joins_a_folder_counts_if_it_is_data(computed: Callable[..., tuple[float, int]]) -> None:
+    listed = "len(glob(f'{at}/*.json'))"
+    assert computed(listed) == (1.0, 1)
+    (Path("one") / "joins.json").write_text("0")
+    assert computed(listed) == (2.0, 2)
+    (Path("one") / "notes~").write_text("no data")
+    assert computed(listed) == (2.0, 2)
+
+
+def test_a_file_that_was_missing_counts(computed: Callable[..., tuple[float, int]]) -> None:
+    assert computed("tried('new')") == (0.0, 1)
+    Path("new").write_text("5.0")
+    assert computed("tried('new')") == (5.0, 2)
+
+
+def test_what_it_writes_itself_and_what_others_read_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    scratch = "float(Path('scratch').write_text(str(np.random.random())) and len(Path('scratch').read_text()) > 0)"
+    assert [computed(scratch), computed(scratch)] == 2 * [(1.0, 1)]
+    text = "def read():\n    with open('one/gain') as file:\n        return xarray.Dataset({'gain': file.read()})"
+    Path("other.py").write_text(f"import xarray\n{text}")
+    run([Cell("other", importable("other.py").read, {})], Path("others"))
+    assert '"0:one/gain"' in next(Path("others").iterdir()).read_bytes().decode(errors="replace")
+    assert computed("2.0") == (2.0, 2)
+    Path("one/gain").write_text("7.0")
+    assert [computed(scratch), computed("2.0")] == [(1.0, 2), (2.0, 2)]
+
+
+def test_workers_tell_what_they_read(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = 'float(Path(at + "/gain").read_text())'
+    with ProcessPoolExecutor(1) as pool:
+        assert computed(gain, executor=pool) == (1.0, 1)
+        Path("one/gain").write_text("7.0")
+        assert [computed(gain, executor=pool), computed(gain)] == 2 * [(7.0, 2)]
+
+
+def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:
+    gain = 'float(Path(__file__).with_name("one").joinpath("gain").read_text())'
+    assert computed(gain, "elsewhere") == (1.0, 1)
+    moved = tmp_path / "moved"
+    for name in ("one", "kept", "reader.py", "calls"):
+        shutil.copytree(name, moved / name) if Path(name).is_dir() else shutil.copy(name, moved / name)
+    shutil.rmtree("one")
+    os.chdir(moved)
+    data = run([Cell("reader", importable("reader.py").cell, {"at": "elsewhere"})], Path("kept"))[0]
+    assert (float(data.gain), os.stat("calls").st_size) == (1.0, 1)
+
+
+def test_kept_values_of_what_has_changed_are_refused(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("1.0")
+    cell, rows = Cell("values", importable("reader.py").value, {"at": "one"}), np.ones((2, 1))
+    for known in (0, 1):
+        values = KeptValues(cell, Path("kept"))
+        assert values.known == known and values(rows).tolist() == [1.0, 1.0]
+    Path("one/gain").write_text("7.0")
+    with pytest.raises(
+        InputError, match=r"was made of .*one.gain as it was; delete values-.*\.jsonl, and it is made a"
+    ):
+        KeptValues(cell, Path("kept"))
+    Path("one/gain").write_text("1.0")
+    assert KeptValues(cell, Path("kept")).known == 1
+
+
+def test_a_kept_cell_tells_what_it_read(computed: Callable[..., tuple[float, int]]) -> None:
+    computed('float(Path(at + "/gain").read_text())', "two")
+    (file,) = Path("kept").glob("*.nc")
+    with xr.open_dataset(file, engine="h5netcdf") as data:
+        assert json.loads(data.attrs["read"]).keys() == {"0:two/gain"}
