@@ -250,6 +250,7 @@ def test_a_halted_start_holds_on_to_where_its_tips_were_seen():
 FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "window": 30.0}
 
 
+@pytest.mark.slow
 def test_disturbed_walks_can_read_their_legs():
     halted: dict[str, Any] = FEW | {
         "disturbances": ["halt"],

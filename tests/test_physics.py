@@ -136,6 +136,7 @@ def test_speed_keeps_to_the_command(hundred):
     assert ((speed > 0.95) & (speed < 1.05)).all()
 
 
+@pytest.mark.slow
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
     result = compare(LDVS, [0.5], n_starts=100, conditions=Conditions.of(vp=20.0))

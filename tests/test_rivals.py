@@ -17,8 +17,10 @@ from hexmj.measures.kinematic import walk
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED
 
+SLOW = "walknet-load", "walknet-reacog"
 
-@pytest.mark.parametrize("name", RIVALS)
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] if one in SLOW else []) for one in RIVALS])
 def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
     assert hexmj.load_controller(name) is RIVALS[name]
     check_controller(RIVALS[name])

@@ -41,7 +41,9 @@ def test_threads_of_numba_that_are_none(threads: str):
     assert f"NUMBA_NUM_THREADS = {threads}; expected a whole number" in done.stderr
 
 
-@pytest.mark.parametrize("wish", ["nonsense", "osmesa", "off"])
+@pytest.mark.parametrize(
+    "wish", ["off", *(pytest.param(one, marks=pytest.mark.slow) for one in ("nonsense", "osmesa"))]
+)
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
     done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
     assert done.returncode == 0, done.stderr
