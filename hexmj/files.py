@@ -6,6 +6,7 @@ A sealed file ends with a checksum of all that stands before it: 80 bytes that r
 import hashlib
 import os
 import stat
+import time
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -25,8 +26,17 @@ SEAL = len(MARK) + 64
 WRITTEN: dict[Path, str] = {}
 """File -> SHA-256 of what this process wrote to it last, whatever another one has put there since."""
 
+_DIGESTS: dict[tuple[int, ...], str] = {}
+"""A file by device, inode, size and times of its last changes -> digest."""
+
 WRITING: set[Path] = set()
 """What this process is writing at this moment."""
+
+DIGEST = 12
+"""Digits of a digest."""
+
+SETTLED = 2_000_000_000
+"""Age of a file's last change from which on its times tell whether it was touched, whatever their resolution [ns]."""
 
 PART = ".part-"
 """Begins the names of files that are being written; a killed process leaves them, the next run removes them."""
@@ -150,17 +160,24 @@ def read_bytes(path: Path) -> bytes:
 
 
 def digest_of(path: Path) -> str:
-    """Of a file as it is now.
+    """Of a file as it is now; one that has not been touched since is not read again.
 
     Raises:
         InputError: it cannot be read.
     """
-    return digest(read_bytes(path))
+    with opened(path) as file:
+        now = os.fstat(file.fileno())
+        known = now.st_dev, now.st_ino, now.st_size, now.st_mtime_ns, now.st_ctime_ns
+        if (found := _DIGESTS.get(known)) is None:
+            found = hashlib.file_digest(file, "sha256").hexdigest()[:DIGEST]  # pyright: ignore[reportArgumentType]
+            if time.time_ns() - max(now.st_mtime_ns, now.st_ctime_ns) > SETTLED:
+                _DIGESTS[known] = found
+    return found
 
 
 def digest(content: bytes) -> str:
-    """Of some bytes: the first 12 digits of their SHA-256."""
-    return hashlib.sha256(content).hexdigest()[:12]
+    """Of some bytes: the first digits of their SHA-256."""
+    return hashlib.sha256(content).hexdigest()[:DIGEST]
 
 
 def read_text(path: Path, most: int = 1_000_000) -> str:

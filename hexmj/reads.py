@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,13 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
         homes: folders that may lie elsewhere another time.
 
     Returns:
-        File or folder, told from the first of `homes` that it lies in -> digests of what it held.
+        File or folder, told from the first of `homes` that it lies in -> digests of what it held.  What has gone
+        meanwhile is left out: it was made on the way.
     """
     own = {path: [held for by, held in list(heard.items()) if by & sources] for path, heard in list(_HEARD.items())}
-    return {_place(path, homes): held[-1] for path, held in own.items() if held}
+    return {
+        _place(path, homes): held[-1] for path, held in own.items() if held and (os.path.exists(path) or not held[-1])
+    }
 
 
 def changed(read: Mapping[str, str], homes: Sequence[Path]) -> str:
@@ -71,15 +75,16 @@ def _held(path: str) -> str:
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event not in ("open", "os.listdir", "os.scandir") or isinstance(arguments[0], int):
         return
-    path = os.path.abspath(os.fsdecode(arguments[0] or "."))
-    if path.startswith(_SYSTEMS) or not as_run.is_users(path) or "__pycache__" in path or not (by := _by()):
-        return
-    if event == "open" and _writes(*arguments[1:]):
-        _WRITTEN.add(path)
-    elif path not in _WRITTEN:
-        heard = _HEARD.setdefault(path, {})
-        heard.pop(by, None)
-        heard[by] = _held(path)
+    with suppress(Exception):  # of whoever opens something, wherever in the process
+        path = os.path.abspath(os.fsdecode(arguments[0] or "."))
+        if path.startswith(_SYSTEMS) or "__pycache__" in path or not as_run.is_users(path) or not (by := _by()):
+            return
+        if event == "open" and _writes(*arguments[1:]):
+            _WRITTEN.add(path)
+        elif path not in _WRITTEN:
+            heard = _HEARD.setdefault(path, {})
+            heard.pop(by, None)
+            heard[by] = _held(path)
 
 
 def _writes(mode: str | None, flags: int) -> bool:
@@ -93,14 +98,26 @@ def _by() -> frozenset[str]:
     frame, users = sys._getframe(2), set[str]()
     while frame is not None:
         file = frame.f_code.co_filename
-        if file.startswith(_OURS) or (not users and file.startswith("<frozen importlib")):
+        whose = _whose(file)
+        if whose == "ours" or (whose == "import's" and not users):
             return frozenset(users)
-        if os.path.isabs(file) and as_run.is_users(file):
+        if whose == "user's":
             users.add(file)
-            if frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] not in ("__main__", "__mp_main__"):
+            name = frame.f_globals.get("__name__") if frame.f_code.co_name == "<module>" else None
+            if name not in (None, "__main__", "__mp_main__"):
                 return frozenset(users)
         frame = frame.f_back
     return frozenset()
+
+
+@lru_cache(maxsize=10_000)
+def _whose(file: str) -> str:
+    """Whose the code of a file is."""
+    if file.startswith(_OURS):
+        return "ours"
+    if file.startswith("<frozen importlib"):
+        return "import's"
+    return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
 
 
 sys.addaudithook(_hear)

@@ -111,6 +111,18 @@ def test_what_it_writes_itself_and_what_others_read_does_not_count(computed: Cal
     assert [computed(scratch), computed("2.0")] == [(1.0, 2), (2.0, 2)]
 
 
+def test_what_is_gone_in_the_end_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[os.system('echo 3.0 > made'), float(Path('made').read_text()), os.remove('made')][1]"
+    assert [computed(gain), computed(gain)] == 2 * [(3.0, 1)]
+
+
+def test_whoever_else_opens_files_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("held")
+    namespace = {}
+    exec(compile(f"with open({str(tmp_path / 'text')!r}) as file: held = file.read()", "/mine.py", "exec"), namespace)
+    assert namespace["held"] == "held"
+
+
 def test_workers_tell_what_they_read(computed: Callable[..., tuple[float, int]]) -> None:
     gain = 'float(Path(at + "/gain").read_text())'
     with ProcessPoolExecutor(1) as pool:
