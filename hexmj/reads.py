@@ -18,6 +18,9 @@ from hexmj.files import digest, digest_of
 _OURS = f"{Path(__file__).parent}{os.sep}"
 _SYSTEMS = ("/dev/", "/proc/", "/sys/")
 
+SCRIPTS = "__main__", "__mp_main__"
+"""Names of the module of a script."""
+
 _HEARD: dict[str, dict[frozenset[str], str]] = {}
 """File or folder -> files of the code that read it -> what it held when they last did, the latest at the end."""
 
@@ -93,8 +96,9 @@ def _writes(mode: str | None, flags: int) -> bool:
 
 
 def _by() -> frozenset[str]:
-    """Files of the user's code that does what happens, with its libraries, within a call of this package's or as one of
-    its modules is imported; none if others do it, or Python's import itself, which sources tell."""
+    """Files of the user's code that does what happens, with its libraries, within a call of this package's, as one of
+    its modules is imported or at the top level of its script; none if others do it, or Python's import itself, which
+    sources tell."""
     frame, users = sys._getframe(2), set[str]()
     while frame is not None:
         file = frame.f_code.co_filename
@@ -102,9 +106,9 @@ def _by() -> frozenset[str]:
         if whose == "ours" or (whose == "import's" and not users):
             return frozenset(users)
         if whose == "user's":
+            first, name = not users, frame.f_globals.get("__name__")
             users.add(file)
-            name = frame.f_globals.get("__name__") if frame.f_code.co_name == "<module>" else None
-            if name not in (None, "__main__", "__mp_main__"):
+            if frame.f_code.co_name == "<module>" and (first if name in SCRIPTS else name):
                 return frozenset(users)
         frame = frame.f_back
     return frozenset()

@@ -186,8 +186,9 @@ def test_what_an_mjcf_tells_otherwise_is_made_as_ever(tmp_path: Path, changes: d
     assert differences(changed.model, compile_body(conditions(**under), looks=False).model) == []
 
 
-def test_the_inertial_of_a_part_without_geoms_stays(tmp_path: Path):
-    pack = '<body name="pack"><inertial pos="0 0 8" mass="0.3" diaginertia="1 1 1"/></body>'
+@pytest.mark.parametrize("geom", ["", '<geom class="eye" size="1" type="sphere" mass="0"/>'])
+def test_the_inertial_of_a_part_without_geoms_of_mass_stays(tmp_path: Path, geom: str):
+    pack = f'<body name="pack"><inertial pos="0 0 8" mass="0.3" diaginertia="1 2 2"/>{geom}</body>'
     models = []
     for inferred in ("", ' inertiafromgeom="true"'):
         loaded = {

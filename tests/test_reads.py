@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -14,6 +16,7 @@ import xarray as xr
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.sweeps import Cell, KeptValues, run
+from small_cells import ENVIRONMENT
 
 READER = """
 import json, os
@@ -114,6 +117,26 @@ def test_what_it_writes_itself_and_what_others_read_does_not_count(computed: Cal
 def test_what_is_gone_in_the_end_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
     gain = "[os.system('echo 3.0 > made'), float(Path('made').read_text()), os.remove('made')][1]"
     assert [computed(gain), computed(gain)] == 2 * [(3.0, 1)]
+
+
+SCRIPT = """
+from hexmj.sweeps import Cell, run
+from pathlib import Path
+import xarray as xr
+GAIN = float(Path("ga" + "in").read_text())
+def cell():
+    return xr.Dataset({"gain": GAIN})
+if __name__ == "__main__":
+    print(run([Cell("script", cell, {})], Path("kept"))[0].gain.item())
+"""
+
+
+def test_what_a_script_reads_at_its_top_level_counts(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT)
+    for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2), (1.0, 2)):
+        (tmp_path / "gain").write_text(str(gain))
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
 
 
 def test_whoever_else_opens_files_is_left_alone(tmp_path: Path) -> None:

@@ -144,9 +144,12 @@ def _spec(body: Body) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_file(str(body.mjcf))
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         # The same by other words, under which geoms that are only to look at may be discarded.
+        model = spec.compile()
         spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-        for part in (one for one in spec.bodies if one.geoms):
-            part.explicitinertial, part.ipos = False, 3 * [np.nan]
+        for part in spec.bodies[1:]:
+            part.mass, part.ipos = model.body_mass[part.id], model.body_ipos[part.id]
+            part.iquat, part.inertia = model.body_iquat[part.id], model.body_inertia[part.id]
+            part.explicitinertial = True
     return spec
 
 

@@ -67,8 +67,7 @@ def _shown(result: "xr.Dataset", told: Mapping[str, Any]) -> dict[str, Any]:
     names = result[axis].values.ravel().tolist()
     if (lies := result[axis].dims) not in ((), (axis,)):
         raise InputError(
-            f"a result of {', '.join(dict.fromkeys(names)):.200} along {', '.join(map(str, lies))}; expected one"
-            f" {axis}, or an axis of its own, as xr.concat(results, {axis!r}) gives it"
+            f"a result of {', '.join(dict.fromkeys(names)):.200} along {', '.join(map(str, lies))}; expected one {axis}"
         )
     known = told.get("controllers", dict.fromkeys(names))
     if unknown := [name for name in names if name not in known]:
