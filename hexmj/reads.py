@@ -5,8 +5,8 @@ No source has to name them: they are noted as they are opened, from the first im
 
 import os
 import sys
-from collections.abc import Mapping, Sequence, Set
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,20 @@ _HEARD: dict[str, dict[frozenset[str], str]] = {}
 
 _WRITTEN: set[str] = set()
 """Files that the user's code writes itself while this package calls it."""
+
+
+_COMPUTING: list[None] = []
+"""One for each cell that is being computed."""
+
+
+@contextmanager
+def computing() -> Iterator[None]:
+    """Meanwhile threads of the user's own count as called by this package."""
+    _COMPUTING.append(None)
+    try:
+        yield
+    finally:
+        _COMPUTING.pop()
 
 
 def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
@@ -111,7 +125,7 @@ def _by() -> frozenset[str]:
             if frame.f_code.co_name == "<module>" and (first if name in SCRIPTS else name):
                 return frozenset(users)
         frame = frame.f_back
-    return frozenset()
+    return frozenset(users if _COMPUTING else ())
 
 
 @lru_cache(maxsize=10_000)

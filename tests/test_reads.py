@@ -20,6 +20,7 @@ from small_cells import ENVIRONMENT
 
 READER = """
 import json, os
+from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 from pathlib import Path
 
@@ -74,6 +75,7 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
         'float(os.read(os.open(f"{at}/gain".encode(), os.O_RDONLY), 9))',
         'json.loads(Path(max(glob(f"{at}/*.js*"))).read_text())',
         'len(os.listdir(at)) + json.loads(Path(at, "gain" + ".json").read_text())',
+        'ThreadPoolExecutor(1).submit(lambda: float(Path(at, "gain").read_text())).result()',
         'eval(compile(Path(at + "/gain").read_bytes(), "<text>", "eval"))',
     ],
 )

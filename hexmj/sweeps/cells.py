@@ -15,7 +15,7 @@ from hexmj.as_run import is_users
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.files import digest
-from hexmj.reads import changed, reads
+from hexmj.reads import changed, computing, reads
 from hexmj.sweeps.code import code, source_files
 from hexmj.sweeps.plain import classes, label, plain
 
@@ -50,7 +50,8 @@ class Cell:
     def compute(self, *first: Any, **execution: Any) -> Any:
         """What the function gives, told how to compute it as far as it asks."""
         asked = signature(self.function).parameters
-        return self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
+        with computing():
+            return self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
 
     def record(self) -> str:
         """All that the cell depends on, as JSON: function, settings, sources and versions.
