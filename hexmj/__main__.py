@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import suppress
 
 from hexmj.signals import hear_stops, ignore_stops, of_stop
 
@@ -23,6 +24,9 @@ def main() -> None:
             raise
         if not (isinstance(error, SystemExit) and error.code == 130):  # that one is told already
             print("hexmj: stopped", file=sys.stderr, flush=True)
+        if util := sys.modules.get("multiprocessing.util"):
+            with suppress(Exception):
+                util._run_finalizers(0)  # semaphores; somebody would be told that they leaked
         os._exit(130)  # half-imported modules may not survive the interpreter's own end
 
 

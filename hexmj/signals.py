@@ -37,15 +37,16 @@ def of_stop(error: BaseException) -> bool:
 
 
 @contextmanager
-def unheard_by_children() -> Iterator[None]:
-    """Programs that are started meanwhile take no Ctrl-C, where the system has such masks; this one does afterwards.
+def unheard_by_children(*stops: int) -> Iterator[None]:
+    """Programs that are started meanwhile take no Ctrl-C, or none of `stops`, where the system has such masks; this one
+    does afterwards.
 
-    Ctrl-C reaches every program of a terminal.
+    Ctrl-C reaches every program of a terminal, and so does its closing.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    usual = signal.pthread_sigmask(signal.SIG_BLOCK, stops or {signal.SIGINT})
     try:
         yield
     finally:

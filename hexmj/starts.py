@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import given, numbers, typed, whole
+from hexmj.checks import given, numbers, short, typed, whole
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 
@@ -75,7 +75,9 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
     """A copy of V_r for each start, (start,), if it lies in [0, 1[ and an acceleration can reach it."""
     v = numbers("velocity", velocity)
     if not ((v >= 0) & (v < 1)).all():
-        raise InputError(f"velocity = {velocity}; expected 0 <= V < 1, a fraction of the protraction velocity V_p")
+        raise InputError(
+            f"velocity = {short(velocity)}; expected 0 <= V < 1, a fraction of the protraction velocity V_p"
+        )
     typed("acceleration", acceleration, Acceleration | None)
     if acceleration and not (v >= acceleration.start).all():
         raise InputError(f"velocity = {velocity}; expected at least V_r(0) = {acceleration.start} when accelerating")

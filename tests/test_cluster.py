@@ -310,6 +310,13 @@ def test_a_relative_folder_is_one_place_for_all(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.slow
+def test_an_executor_that_has_lost_its_scheduler_is_refused_at_once(tmp_path: Path) -> None:
+    with scheduler(tmp_path) as (address, _), workers_of(address) as executor:
+        pass
+    with pytest.raises(InputError, match=r"^executor = .* has lost its scheduler; expected one of a client that has"):
+        flss(LDVS, [0.5], n_starts=2, executor=executor)
+
+
 def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path: Path) -> None:
     """Nobody is there; or somebody is who says nothing."""
     from socket import create_server

@@ -147,6 +147,21 @@ def test_controllers_of_one_each_are_not_drawn_as_one():
             hexmj.plot(joined(hexmj.HWS, velocity))
 
 
+def test_kinematic_and_physical_flss_are_not_drawn_as_one():
+    results = [measure(hexmj.LDVS, [0.5], n_starts=2, window=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
+    for both in (results, results[::-1]):
+        for told in ("override", "drop_conflicts"):
+            with pytest.raises(InputError, match=r"^a result of kinematic and of physical FLSS; expected one of them$"):
+                hexmj.plot(xr.concat(both, "velocity", combine_attrs=told))
+
+
+def test_a_label_that_is_there_twice_is_a_sentence():
+    walked = hexmj.physical_walk(hexmj.draw_starts(1, seed=0), hexmj.LDVS, 0.5, 5.0)
+    twice = hexmj.record(walked).isel(leg=[0, 0, 1, 2, 3, 4, 5])
+    with pytest.raises(InputError, match=r" cannot be drawn of this part of a result, .*leg 7"):
+        hexmj.plot(twice)
+
+
 def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
     """Title, row and column of each cell of a map's panels, and what it says in words and as a colour."""
     found, figure = [], hexmj.plot(result)

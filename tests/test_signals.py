@@ -149,12 +149,16 @@ def test_while_a_film_is_written(tmp_path, by, group):
     assert [path.name for path in tmp_path.iterdir()] == ["ldvs-V-0.3-1.nc"]
 
 
+GROUPS = [(signal.SIGTERM, False), *((one, True) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("by", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True)], ids=["SIGTERM", "ctrl-c"])
-def test_while_processes_compute_cells(tmp_path, by, group):
-    """They end at once, too; their cells may be long."""
+@pytest.mark.parametrize("wait", [1.5, 4.0])
+@pytest.mark.parametrize(("by", "group"), GROUPS, ids=["SIGTERM", "ctrl-c", "timeout", "terminal"])
+def test_while_processes_compute_cells(tmp_path, by, group, wait):
+    """They end at once, too, whoever is told first; their cells may be long."""
     words = ("compare", "--velocities", "0.1", "0.5", "--starts", "60", "--no-video", "--processes", "2")
-    stopped(started(*words, "--out", str(tmp_path / "out"), wait=4.0), by, group)
+    stopped(started(*words, "--out", str(tmp_path / "out"), wait=wait), by, group)
     assert not list(tmp_path.rglob("manifest.json"))
 
 

@@ -145,6 +145,8 @@ def main() -> None:
         sys.exit(141)
     except OSError as error:
         _drop_output()
+        if is_of_numbas_cache(error):
+            sys.exit(_complain(f"{NUMBA} ({error.strerror or error})", 2))
         where = error.filename or ("the system" if error.errno in SHORT else "standard output")
         sys.exit(_complain(f"{where}: {error.strerror or error}", 2))
     except Exception as error:

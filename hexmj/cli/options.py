@@ -25,7 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.signals import of_stop, stops_wait, unheard_by_children
+from hexmj.signals import STOPS, of_stop, stops_wait, unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -212,11 +212,11 @@ class Sweepers:
         from hexmj.sweeps.workers import end_with_parent
 
         with ExitStack() as ended:
-            with stops_wait():  # else semaphores might be left behind
+            with stops_wait(), unheard_by_children(*STOPS):  # else semaphores might be left behind
                 pool = ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent)
                 executor = ended.enter_context(pool)
             try:
-                with unheard_by_children():
+                with unheard_by_children(*STOPS):
                     for _ in range(self.processes):
                         executor.submit(os.getpid)  # begins one
                 yield executor

@@ -90,7 +90,11 @@ def show(*parts: Any) -> None:
     from rich.console import Console
     from rich.padding import Padding
 
-    console = Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
+    class Told(Console):
+        def on_broken_pipe(self) -> None:  # where `main` says how it ends
+            raise BrokenPipeError
+
+    console = Told(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
         console.print(literal(part) if isinstance(part, str) else Padding(part, (1, 0), expand=False))
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.attributes import settings
+from hexmj.errors import InputError
 from hexmj.literal import in_figure
 from hexmj.measures.captions import caption, conditions
 from hexmj.measures.parts import check_starts
@@ -73,6 +74,8 @@ def flss_figure(table: "xr.Dataset") -> "Picture":
     check_starts(table)
     figure, told = picture(6.4, 4.2), settings(table)
     kind = "physical" if conditions(told) else "kinematic"
+    if ("fall" in table) != (kind == "physical") or (kind == "physical" and table.fall.isnull().any()):
+        raise InputError("a result of kinematic and of physical FLSS; expected one of them")
     axes = figure.subplots()
     style = {"color": MEASURE_COLOURS[kind]} | MEASURE_STYLES[kind]
     _with_intervals(axes, table.velocity, table.low, table.flss, table.high, **style)

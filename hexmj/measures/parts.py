@@ -73,7 +73,9 @@ def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
     """
     try:
         yield
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
+    except InputError:
+        raise
+    except Exception as error:
         sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
         raise InputError(
             f"{cannot} of this part of a result, {sizes} ({error!r:.200}); expected the result as it was computed"

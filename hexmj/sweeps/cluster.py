@@ -47,6 +47,12 @@ def workers_of(address: str) -> Iterator[Executor]:
                 client.close(timeout=PATIENCE)
 
 
+def has_given_up(executor: Executor) -> bool:
+    """Whether it is of a Dask client that has lost its scheduler for good, and would wait for ever."""
+    client: Any = getattr(executor, "_client", None)
+    return getattr(client, "status", "") in ("closed", "closing")
+
+
 def _found(address: str) -> dict[str, Any]:
     """What a scheduler tells of itself; one that does not answer is not waited for, as a client would."""
     expected = "a scheduler's, such as tcp://127.0.0.1:8786"

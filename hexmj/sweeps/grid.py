@@ -17,6 +17,7 @@ from hexmj.errors import InputError
 from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
+from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.files import find, write
 
 if TYPE_CHECKING:
@@ -214,6 +215,8 @@ def _by_others(
 
 
 def _submitted(executor: Executor, parcel: _Parcel) -> "Future[xr.Dataset]":
+    if has_given_up(executor):
+        raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:
         return executor.submit(parcel.compute)
     except BrokenExecutor:

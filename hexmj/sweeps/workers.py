@@ -3,18 +3,34 @@
 import os
 import signal
 import sys
+import time
 from contextlib import suppress
 from multiprocessing import parent_process
 from threading import Thread
 
 from hexmj.files import WRITING
 
+LEAVES = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+"""Signals that end a process of a pool."""
+
+GRACE = 0.5
+"""Time after one of them [s]."""
+
 
 def end_with_parent() -> None:
     """Initializer of a pool's processes, which would wait for cells for ever if their parent was killed."""
-    signal.signal(signal.SIGTERM, _leave)
+    for one in LEAVES:
+        signal.signal(one, _leave_later)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # by which the parent ends it
     sys.stdout = sys.stderr  # what a user's code prints is no answer of the command
     Thread(target=_watch, daemon=True).start()
+
+
+def _leave_later(*_: object) -> None:
+    """A stop of the whole group is heard by the parent meanwhile, which then waits for nobody."""
+    time.sleep(GRACE)
+    _leave()
 
 
 def _leave(*_: object) -> None:
