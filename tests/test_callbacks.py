@@ -11,8 +11,10 @@ from numba import cfunc
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.environments.gym import StickInsect
+from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
-from hexmj.physics.callbacks import CHANGING, stopped_clock, unlogged
+from hexmj.physics.callbacks import CHANGING, STOPPED_CLOCK, UNLOGGED
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.starts import draw_starts
@@ -25,7 +27,7 @@ def settled():
 
 def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
     assert mujoco.get_mjcb_time() is None
-    with stopped_clock():
+    with STOPPED_CLOCK:
         assert mujoco.get_mjcb_time() is not None
     assert mujoco.get_mjcb_time() is None
     list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
@@ -36,22 +38,24 @@ def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
     others = mujoco.get_mju_user_warning()  # dm_control sets one, if it was imported
     mujoco.set_mju_user_warning(None)
     try:
-        first, second = unlogged(), unlogged()
-        first.__enter__()
-        second.__enter__()
-        first.__exit__(None, None, None)
+        UNLOGGED.__enter__()
+        with UNLOGGED:
+            assert mujoco.get_mju_user_warning() is not None
         assert mujoco.get_mju_user_warning() is not None
-        second.__exit__(None, None, None)
+        UNLOGGED.__exit__(None, None, None)
         assert mujoco.get_mju_user_warning() is None
     finally:
         mujoco.set_mju_user_warning(others)
 
 
-def test_a_clock_of_the_users_own_goes_on(settled):
-    mujoco.set_mjcb_time(ours := cfunc("float64()")(lambda: 1.0).ctypes)
+@pytest.mark.parametrize("ours", [perf_counter, cfunc("float64()")(lambda: 1.0).ctypes], ids=["Python", "C"])
+def test_a_clock_of_the_users_own_goes_on_after_walks_and_resets(settled, ours):
+    walking = StickInsect()
+    walking.reset()
+    mujoco.set_mjcb_time(ours)
     try:
-        for _ in drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0):
-            assert mujoco.get_mjcb_time() is ours
+        walking.reset()
+        list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0))
         assert mujoco.get_mjcb_time() is ours
     finally:
         mujoco.set_mjcb_time(None)
@@ -75,11 +79,14 @@ def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller,
 
 @pytest.mark.parametrize("name", CHANGING)
 def test_callbacks_that_would_change_the_physics_are_refused(name):
+    walking = StickInsects(1)
+    walking.reset()
     change = getattr(mujoco, f"set_mjcb_{name}")
     change(lambda *_: 0)
     try:
-        with pytest.raises(InputError, match=f"mjcb_{name} is set, .*; expected none: mujoco.set_mjcb_{name}.None."):
-            settle(draw_starts(1, 0))
+        for stepping in (walking.reset, lambda: settle(draw_starts(1, 0))):
+            with pytest.raises(InputError, match=f"mjcb_{name} is set, .*; expected none: mujoco.set_mjcb_{name}.None"):
+                stepping()
     finally:
         change(None)
     settle(draw_starts(1, 0))
