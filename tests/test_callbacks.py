@@ -2,15 +2,17 @@
 
 from collections.abc import Generator
 from time import perf_counter, sleep
-from typing import cast
+from typing import Any, cast
 
 import mujoco
+import numpy as np
 import pytest
 from numba import cfunc
 
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
@@ -90,3 +92,19 @@ def test_callbacks_that_would_change_the_physics_are_refused(name):
     finally:
         change(None)
     settle(draw_starts(1, 0))
+
+
+@pytest.mark.parametrize("walking", [StickInsect(actions="tips"), dm.load(actions="tips")], ids=["gym", "dm"])
+def test_an_insect_alone_does_not_step_under_them_either(walking: Any):
+    """Nor goes on with a step that was planned and never taken."""
+    walking.reset()
+    mujoco.set_mjcb_passive(lambda *_: None)
+    try:
+        with pytest.raises(InputError, match="mjcb_passive is set"):
+            walking.step(np.zeros(18))
+    finally:
+        mujoco.set_mjcb_passive(None)
+    with pytest.raises(InputError, match="after a step or a reset that failed"):
+        walking.step(np.zeros(18))
+    walking.reset()
+    walking.step(np.zeros(18))

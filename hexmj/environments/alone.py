@@ -7,6 +7,7 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.backend import AFTER, STATE, Diverged, Rolled
+from hexmj.physics.callbacks import check_no_callbacks
 from hexmj.physics.fine_steps import FineSteps, Shown, allowed_depth, strikes
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -42,7 +43,12 @@ class Alone:
         mujoco.mj_step1(self.model, self.data)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
+        """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes.
+
+        Raises:
+            InputError: a callback is set that changes the physics.
+        """
+        check_no_callbacks()
         substeps = control.shape[1]
         mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
         feet, sensors, force = self._roll(control[0], self.model)

@@ -162,11 +162,13 @@ class Walking(control.Task):
         if self._acted.terminated or self._acted.truncated:
             return
         self._walkers.look(physics.alone)
+        self._walkers.begun = False  # until the step is done
         physics.set_control(self._walkers.control(action[np.newaxis])[0])
 
     def after_step(self, physics: InsectPhysics) -> None:
         """Judge the step."""
         self._acted = self._walkers.judge(physics.shown)
+        self._walkers.begun = True
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Bounds of an action; the names of its numbers are joined by tabs."""
