@@ -15,7 +15,7 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
-from hexmj.errors import InputError
+from hexmj.errors import InputError, SimulationError
 from hexmj.physics.callbacks import CHANGING, STOPPED_CLOCK, UNLOGGED
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
@@ -36,18 +36,36 @@ def test_mujocos_clock_stops_only_while_a_batch_steps(settled):
     assert mujoco.get_mjcb_time() is None
 
 
-def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
+@pytest.fixture
+def unheard():
     others = mujoco.get_mju_user_warning()  # dm_control sets one, if it was imported
     mujoco.set_mju_user_warning(None)
-    try:
-        UNLOGGED.__enter__()
-        with UNLOGGED:
-            assert mujoco.get_mju_user_warning() is not None
+    yield
+    mujoco.set_mju_user_warning(others)
+
+
+@pytest.mark.usefixtures("unheard")
+def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
+    UNLOGGED.__enter__()
+    with UNLOGGED:
         assert mujoco.get_mju_user_warning() is not None
-        UNLOGGED.__exit__(None, None, None)
-        assert mujoco.get_mju_user_warning() is None
-    finally:
-        mujoco.set_mju_user_warning(others)
+    assert mujoco.get_mju_user_warning() is not None
+    UNLOGGED.__exit__(None, None, None)
+    assert mujoco.get_mju_user_warning() is None
+
+
+@pytest.mark.usefixtures("unheard")
+@pytest.mark.parametrize("walking", [StickInsect(actions="tips"), StickInsects(1, actions="tips")], ids=["one", "many"])
+def test_one_that_diverges_writes_nothing_and_says_what_happened(walking: Any, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    walking.reset()
+    walking._walkers.bodies.qvel[0, 0] = 1e12
+    with pytest.raises(SimulationError, match=r"acting, at 0 time units: mjWARN_BADQ[A-Z]+$"):
+        walking.step(np.zeros(walking.action_space.shape))
+    assert not list(tmp_path.iterdir())
+    assert capfd.readouterr().err == ""
+    walking.reset()
+    walking.step(np.zeros(walking.action_space.shape))
 
 
 @pytest.mark.parametrize("ours", [perf_counter, cfunc("float64()")(lambda: 1.0).ctypes], ids=["Python", "C"])
