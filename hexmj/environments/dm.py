@@ -142,6 +142,11 @@ class Walking(control.Task):
         """Draw the starts of `draw_starts` by the seed."""
         self._random = np.random.default_rng(check_draw(1, self.seed)[1])
 
+    @property
+    def random(self) -> np.random.Generator:
+        """What the starts are drawn from, as dm_control's suite shows it; its wrapper `action_noise` draws, too."""
+        return self._random
+
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
