@@ -12,7 +12,7 @@ from hexmj import LDVS, ReadsLegs, compare, draw_starts
 from hexmj.controllers.asking import begin
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.backend import STATE
-from hexmj.physics.callbacks import stopped_clock
+from hexmj.physics.callbacks import STOPPED_CLOCK
 from hexmj.physics.foot_path import TipTargets
 from hexmj.physics.settling import Settled, settle
 
@@ -50,7 +50,7 @@ def test_steps(measure, settled, who):
             batch.step()
 
     def without_clock() -> None:
-        with stopped_clock():
+        with STOPPED_CLOCK:
             bare()
 
     def ours() -> None:

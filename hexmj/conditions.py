@@ -28,7 +28,7 @@ OBEYED: dict[GroundKind, tuple[str, ...]] = {
 """Kind of ground -> the fields of `Ground` that it obeys."""
 
 ROUNDING = 1e-9
-"""Share by which a physics step may be longer than the longest one, for the last bits of divisions."""
+"""Share by which physics steps may be longer than what they are to fit into, for the last bits of divisions."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import unittest
 import numpy as np
 import pytest
 from dm_control.rl import control
+from dm_control.suite.wrappers import action_noise
 from dm_control.viewer.runtime import Runtime, State
 from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
@@ -211,6 +212,14 @@ def test_the_viewers_runtime_runs_it(policy):
     runtime.tick(0.02, paused=False)
     assert runtime.state is State.RUNNING
     assert not errors
+
+
+def test_the_suites_action_noise_wraps_it():
+    plain, noisy = (dm.load(actions="tips", seed=3) for _ in range(2))
+    wrapped = action_noise.Wrapper(noisy, scale=0.01)
+    first = [one.reset().observation["tips"] for one in (plain, wrapped)]
+    then = [one.step(ZEROS).observation["tips"] for one in (plain, wrapped)]
+    assert np.array_equal(*first) and not np.array_equal(*then)
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")

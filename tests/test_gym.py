@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -70,6 +71,20 @@ def test_it_is_rendered():
     np.testing.assert_array_equal(first, frame)
     assert (second != frame).any()
     many.close()
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+def test_one_thread_draws_all_frames():
+    walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
+    walking.reset()
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(walking.render).result()
+        with pytest.raises(InputError, match="another thread has drawn this environment"):
+            walking.render()
+        pool.submit(walking.render).result()
+    walking.close()
+    walking.render()
+    walking.close()
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")

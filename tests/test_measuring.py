@@ -38,6 +38,18 @@ def test_a_foot_stands_for_the_gap_after_it_was_last_carried(gap, stands):
     assert not senses.standing(np.array([0])).any()
 
 
+@pytest.mark.parametrize(
+    ("conditions", "substeps"),
+    [({"contact_gap": 15.0, "vp": 120.0}, 36), ({"contact_gap": 15.0, "longest_substep": 0.5}, 36)],
+)
+def test_a_gap_of_whole_physics_steps_lasts_for_all_of_them(conditions, substeps):
+    settled = settle(draw_starts(1, 0), Conditions.of(**conditions))
+    touch = np.zeros((1, substeps + 9, 6))
+    touch[:, 0] = 0.1
+    standing = Senses(settled).feel(np.array([0]), sensors(settled, touch), np.zeros((1, 1, settled.compiled.joints)))
+    assert standing[0, :, 0].sum() == 1 + substeps
+
+
 def test_what_is_felt_last_is_what_is_known(settled):
     rng, ids = np.random.default_rng(0), np.array([2, 0])
     touch, force = rng.uniform(1, 2, (2, 4, 6)), rng.uniform(-1, 1, (2, 4, settled.compiled.joints))

@@ -120,6 +120,15 @@ def test_what_is_drawn_at_one_velocity_is_seen():
         hexmj.plot(recording.isel(step=slice(0)))
 
 
+@pytest.mark.parametrize(
+    "part", [[0, 1, 2, 4, 6], [0, 1, 5, 6], slice(None, None, -1), [0, 0]], ids=["thinned", "cut", "back", "twice"]
+)
+def test_a_recordings_steps_are_drawn_in_even_order_only(part):
+    with pytest.raises(InputError, match=r"has steps of .*; expected one step after the other, all of one length"):
+        hexmj.plot(recorded().isel(step=part))
+    hexmj.plot(recorded().isel(step=slice(None, None, 5)))
+
+
 def test_a_recordings_legs_stand_in_their_order_however_they_are_sorted():
     recording = recorded()
     assert pixels(recording.isel(leg=slice(None, None, -1)), "walk") == pixels(recording, "walk")

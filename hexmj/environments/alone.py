@@ -7,10 +7,14 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.backend import AFTER, STATE, Diverged, Rolled
+from hexmj.physics.callbacks import check_no_callbacks
 from hexmj.physics.fine_steps import FineSteps, Shown, allowed_depth, strikes
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that a step goes on from, the time included."""
+
+NEVER, ONCE = (np.full(mujoco.mjtWarning.mjNWARNING.value, count, np.int32).tobytes() for count in (0, 1))
+"""How often MuJoCo has warned of each kind; to compare bytes takes less time."""
 
 
 class Alone:
@@ -42,7 +46,12 @@ class Alone:
         mujoco.mj_step1(self.model, self.data)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes."""
+        """One step of the plan; see `fine_steps.FineSteps.take`, which is asked only where a foot strikes.
+
+        Raises:
+            InputError: a callback is set that changes the physics.
+        """
+        check_no_callbacks()
         substeps = control.shape[1]
         mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
         feet, sensors, force = self._roll(control[0], self.model)
@@ -68,15 +77,23 @@ class Alone:
 
     def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""
-        count, data, now, pulled = len(control), self.data, self._sensors, self._force
+        count, data, now, pulled, warned = len(control), self.data, self._sensors, self._force, self._warned
         sensors, force = np.empty((1, count + 1, len(now))), np.empty((1, count, len(pulled)))
-        for k in range(count):
-            self._control[:] = control[k]
-            (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
-            sensors[0, k], force[0, k] = now, pulled  # those of places as the step began
-        mujoco.mj_step1(model, data)
+        try:
+            if warned.tobytes() == NEVER:
+                warned.fill(1)  # MuJoCo writes to the terminal and to a file the first of a kind only
+            for k in range(count):
+                self._control[:] = control[k]
+                (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
+                sensors[0, k], force[0, k] = now, pulled  # those of places as the step began
+            mujoco.mj_step1(model, data)
+        finally:
+            if well := warned.tobytes() == ONCE:
+                warned.fill(0)
+            else:
+                warned -= warned.min()  # 0 where MuJoCo has put the body back, as it does if it diverges
         sensors[0, count] = now
-        if np.count_nonzero(self._warned):  # what is not finite is seen as the next step begins
+        if not well:  # what is not finite is seen as the next step begins
             raise self._diverged(control, model)
         return sensors[:, :, self._foot].reshape(1, count + 1, 6, 3), sensors[:, :count], force
 

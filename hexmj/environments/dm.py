@@ -142,6 +142,11 @@ class Walking(control.Task):
         """Draw the starts of `draw_starts` by the seed."""
         self._random = np.random.default_rng(check_draw(1, self.seed)[1])
 
+    @property
+    def random(self) -> np.random.Generator:
+        """What the starts are drawn from, as dm_control's suite shows it; its wrapper `action_noise` draws, too."""
+        return self._random
+
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
@@ -162,11 +167,13 @@ class Walking(control.Task):
         if self._acted.terminated or self._acted.truncated:
             return
         self._walkers.look(physics.alone)
+        self._walkers.begun = False  # until the step is done
         physics.set_control(self._walkers.control(action[np.newaxis])[0])
 
     def after_step(self, physics: InsectPhysics) -> None:
         """Judge the step."""
         self._acted = self._walkers.judge(physics.shown)
+        self._walkers.begun = True
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Bounds of an action; the names of its numbers are joined by tabs."""

@@ -4,6 +4,7 @@ The body is compiled at once, so that files edited later do not change what is s
 """
 
 import atexit
+from threading import get_ident
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -11,6 +12,7 @@ import numpy as np
 
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
+from hexmj.errors import InputError
 from hexmj.replay.film import gl
 
 if TYPE_CHECKING:
@@ -29,7 +31,11 @@ class Frames:
         self._model = compile_body(conditions).model
 
     def draw(self, qpos: np.ndarray) -> np.ndarray:
-        """The body at some `qpos`, (height, width, 3) of uint8."""
+        """The body at some `qpos`, (height, width, 3) of uint8.
+
+        Raises:
+            InputError: another thread has drawn before, to which the GL belongs until it is freed.
+        """
         renderer = self._begun()
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(renderer.model, self._data)
@@ -49,4 +55,7 @@ class Frames:
         if self._renderer is None:
             self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
             atexit.register(self._renderer.close)  # before the GL goes, though nobody closes the environment
+            self._thread = get_ident()
+        if self._thread != get_ident():
+            raise InputError("another thread has drawn this environment; expected one that draws all of its frames")
         return self._renderer

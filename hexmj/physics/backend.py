@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.physics.callbacks import check_no_callbacks, stopped_clock, unlogged
+from hexmj.physics.callbacks import batched
 from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
@@ -101,7 +101,8 @@ class MujocoBatch:
     def reset(self) -> None:
         """All bodies as they were at first; nothing remains of those that diverged."""
         self._batch.warning[:] = 0
-        self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        with batched():
+            self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
 
     def states(self, ids: np.ndarray) -> np.ndarray:
         """What some bodies go on from, (n, state)."""
@@ -124,7 +125,8 @@ class MujocoBatch:
         """
         self._batch.warning[ids] = 0
         self.put(ids, states)
-        self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+        with batched():
+            self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
 
     def rest(self, control: np.ndarray, steps: int) -> None:
         """Step all bodies with one control, (start, actuator), and make everything that they show current.
@@ -133,24 +135,22 @@ class MujocoBatch:
             Diverged: see `Engine.roll`.
             InputError: a callback is set that changes the physics.
         """
-        check_no_callbacks()
         ids = np.arange(len(control))
         before = self.replayed(ids)
         self._batch.bind("ctrl")[:] = control
-        with stopped_clock(), unlogged():
+        with batched():
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
         self._check(ids, before, control[:, np.newaxis])
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
-        check_no_callbacks()
         model, before = self._model, self.replayed(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
         record = (AFTER, "sensordata", "actuator_force")
         try:
-            with stopped_clock(), unlogged():
+            with batched():
                 seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
                 self._check(ids, before, control)
                 self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)  # for the feet at the end

@@ -1,13 +1,12 @@
-"""What MuJoCo calls for the whole process, while batches step: its clock is stopped, its warnings are not logged, and
-nothing that would change the physics may be set.
+"""What MuJoCo calls for the whole process, while bodies step: its warnings are not logged, in batches its clock is
+stopped, and nothing that would change the physics may be set.
 
 MuJoCo's Python package times every part of every step for `mjData.timer`.  Nobody reads that while thousands of
 insects walk, and without it they walk 5 % faster (measured), to the same bits.
 """
 
-from collections import Counter
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
@@ -19,8 +18,7 @@ from hexmj.errors import InputError
 CHANGING = "control", "passive", "contactfilter", "sensor", "act_dyn", "act_gain", "act_bias"
 """Callbacks of MuJoCo's that change the physics."""
 
-_ONE, _WITHIN = Lock(), Counter[str]()
-"""How many threads need each callback of ours."""
+_CHANGING = tuple(getattr(mujoco, f"get_mjcb_{name}") for name in CHANGING)
 
 
 def check_no_callbacks() -> None:
@@ -29,39 +27,36 @@ def check_no_callbacks() -> None:
     Raises:
         InputError: one is set.
     """
-    for name in CHANGING:
-        if getattr(mujoco, f"get_mjcb_{name}")() is not None:
+    for callback in _CHANGING:
+        if callback() is not None:
+            name = callback.__name__.removeprefix("get_")
             raise InputError(
-                f"MuJoCo's callback mjcb_{name} is set, which changes the physics; expected none:"
-                f" mujoco.set_mjcb_{name}(None)"
+                f"MuJoCo's callback {name} is set, which changes the physics; expected none: mujoco.set_{name}(None)"
             )
 
 
-def stopped_clock() -> AbstractContextManager[None]:
-    """Meanwhile `mjData.timer` stands still in the whole process; a clock that the user has set is left alone."""
-    return _meanwhile("mjcb_time", _midnight.ctypes)
+class Meanwhile:
+    """A callback of the whole process is ours until the last thread has left; then it is the user's again."""
 
+    def __init__(self, callback: str, ours: Any, over: bool) -> None:
+        """By its name; `over` says whether one that the user has set is put aside, or stays."""
+        self._get, self._put = getattr(mujoco, f"get_{callback}"), getattr(mujoco, f"set_{callback}")
+        self._ours, self._over, self._users = ours, over, None
+        self._one, self._within = Lock(), 0
 
-def unlogged() -> AbstractContextManager[None]:
-    """Meanwhile MuJoCo writes no warning to the terminal, nor a log file; those who step read what happened."""
-    return _meanwhile("mju_user_warning", _unheard)
+    def __enter__(self) -> None:
+        with self._one:
+            self._within += 1
+            now = self._get()
+            if now is None or (self._over and now is not self._ours):
+                self._users = now
+                self._put(self._ours)
 
-
-@contextmanager
-def _meanwhile(callback: str, ours: Any) -> Iterator[None]:
-    """A callback of the whole process is ours until the last thread has left; one that the user has set stays."""
-    get, put = getattr(mujoco, f"get_{callback}"), getattr(mujoco, f"set_{callback}")
-    with _ONE:
-        _WITHIN[callback] += 1
-        if get() is None:
-            put(ours)
-    try:
-        yield
-    finally:
-        with _ONE:
-            _WITHIN[callback] -= 1
-            if not _WITHIN[callback] and get() is ours:  # another thread may have set one meanwhile
-                put(None)
+    def __exit__(self, *_: object) -> None:
+        with self._one:
+            self._within -= 1
+            if not self._within and self._get() is self._ours:  # another thread may have set one meanwhile
+                self._put(self._users)
 
 
 def _unheard(warning: str) -> None:
@@ -71,3 +66,22 @@ def _unheard(warning: str) -> None:
 @cfunc("float64()", cache=True)
 def _midnight() -> float:
     return 0.0
+
+
+STOPPED_CLOCK = Meanwhile("mjcb_time", _midnight.ctypes, over=True)
+"""Meanwhile `mjData.timer` stands still in the whole process; batches take no clock in Python."""
+
+UNLOGGED = Meanwhile("mju_user_warning", _unheard, over=False)
+"""Meanwhile MuJoCo writes no warning to the terminal, nor a log file; those who step read what happened."""
+
+
+@contextmanager
+def batched() -> Iterator[None]:
+    """Meanwhile batches may step.
+
+    Raises:
+        InputError: a callback is set that changes the physics.
+    """
+    check_no_callbacks()
+    with STOPPED_CLOCK, UNLOGGED:
+        yield

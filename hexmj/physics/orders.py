@@ -108,7 +108,7 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
         for name in (*vars(conditions.time), *vars(conditions.path), "body"):
             if here[name] != there[name]:
                 raise InputError(
-                    f"the plan is made for {name} = {there[name]}; expected {here[name]}, under which it is to walk"
+                    f"the plan is made for {name} = {there[name]}; expected that of the conditions, {here[name]}"
                 )
 
 

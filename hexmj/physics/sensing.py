@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.conditions import ROUNDING
 from hexmj.controllers.protocol import Sensed
 from hexmj.physics.settling import Settled
 from hexmj.rotations import heading, lean, turned
@@ -20,7 +21,7 @@ class Senses:
         self._compiled = settled.compiled
         self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
         gap = settled.conditions.numerics.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
-        self._longest_gap = math.floor(gap)  # substeps
+        self._longest_gap = math.floor(gap * (1.0 + ROUNDING))  # substeps
         self._before = np.ones(settled.starts.shape, dtype=bool)
         self._load, self._torques = settled.load.copy(), settled.torques.copy()
 

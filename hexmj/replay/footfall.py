@@ -9,6 +9,7 @@ from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.literal import in_figure
 from hexmj.measures.figures import MEASURE_COLOURS
+from hexmj.replay.schema import ROUNDING
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,14 +18,23 @@ if TYPE_CHECKING:
 
 
 def walk_figure(recording: "xr.Dataset") -> "Picture":
-    """Footfall diagram and stability margin over time, from a recording.
+    """Footfall diagram and stability margin over time, from a recording or an even share of its steps.
 
     The bars are those of its film: a foot off the ground, or a protraction where a puppet shows the plan.
+
+    Raises:
+        InputError: no steps, or some that do not follow one another evenly.
     """
     from hexmj.pictures import picture
 
     if not recording.sizes["step"]:
         raise InputError(f"the recording {recording.attrs['title']!r} holds no steps; expected at least one")
+    steps = np.diff(recording.time.values)
+    if not (np.allclose(steps, steps[:1], ROUNDING, 0.0) and (steps > 0).all()):
+        raise InputError(
+            f"the recording {recording.attrs['title']!r} has steps of {steps.min():g} to {steps.max():g} time units;"
+            " expected one step after the other, all of one length"
+        )
     recording = recording.sel(leg=list(LEGS))
     figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
