@@ -16,30 +16,30 @@ from hexmj.errors import InputError
 from hexmj.files import digest, digest_of
 
 _OURS = f"{Path(__file__).parent}{os.sep}"
-_SYSTEMS = ("/dev/", "/proc/", "/sys/")
-
-SCRIPTS = "__main__", "__mp_main__"
-"""Names of the module of a script."""
+_SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
+_SYSTEMS += "/proc/", "/sys/"
 
 _HEARD: dict[str, dict[frozenset[str], str]] = {}
-"""File or folder -> files of the code that read it -> what it held when they last did, the latest at the end."""
+"""File or folder, relative to the current one if it was asked for so -> files of the code that read it -> what it held
+when they last did, the latest at the end."""
 
 _WRITTEN: set[str] = set()
 """Files that the user's code writes itself while this package calls it."""
 
 
-_COMPUTING: list[None] = []
-"""One for each cell that is being computed."""
+_COMPUTING: list[dict[str, set[str]]] = []
+"""For each cell that is being computed: file -> what it held whenever it was read meanwhile."""
 
 
 @contextmanager
-def computing() -> Iterator[None]:
-    """Meanwhile threads of the user's own count as called by this package."""
-    _COMPUTING.append(None)
+def computing() -> Iterator[dict[str, set[str]]]:
+    """Meanwhile threads of the user's own count as called by this package; gives what each file held as it was read."""
+    held: dict[str, set[str]] = {}
+    _COMPUTING.append(held)
     try:
-        yield
+        yield held
     finally:
-        _COMPUTING.pop()
+        _COMPUTING[:] = [one for one in _COMPUTING if one is not held]
 
 
 def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
@@ -50,8 +50,9 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
         homes: folders that may lie elsewhere another time.
 
     Returns:
-        File or folder, told from the first of `homes` that it lies in -> digests of what it held.  What has gone
-        meanwhile is left out: it was made on the way.
+        File or folder -> digests of what it held.  It is told from the current folder where it was asked for so, else
+        from the first of `homes` that lies beside it or above, but for the system's root.  What has gone meanwhile is
+        left out: it was made on the way.
     """
     own = {path: [held for by, held in list(heard.items()) if by & sources] for path, heard in list(_HEARD.items())}
     return {
@@ -66,16 +67,17 @@ def changed(read: Mapping[str, str], homes: Sequence[Path]) -> str:
 
 
 def _place(path: str, homes: Sequence[Path]) -> str:
-    for i, home in enumerate(homes):
-        if Path(path).is_relative_to(home):
-            return f"{i}:{os.path.relpath(path, home)}"
+    for i, home in enumerate(homes if os.path.isabs(path) else ()):
+        with suppress(ValueError):  # of another drive
+            if os.path.commonpath([path, home]) != os.path.join(home.anchor):
+                return f"{i}:{os.path.relpath(path, home)}"
     return path
 
 
 def _path(place: str, homes: Sequence[Path]) -> str:
-    if os.path.isabs(place):
+    number, colon, within = place.partition(":")
+    if not (colon and number.isdecimal()):
         return place
-    number, _, within = place.partition(":")
     return os.path.normpath(os.path.join(*homes[int(number) :][:1], within))
 
 
@@ -93,39 +95,47 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event not in ("open", "os.listdir", "os.scandir") or isinstance(arguments[0], int):
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
-        path = os.path.abspath(os.fsdecode(arguments[0] or "."))
-        if path.startswith(_SYSTEMS) or "__pycache__" in path or not as_run.is_users(path) or not (by := _by()):
+        path = os.path.normpath(os.fsdecode(arguments[0] or "."))
+        whole = os.path.abspath(path)
+        if whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
             return
+        by, called = _by(event)
         if event == "open" and _writes(*arguments[1:]):
-            _WRITTEN.add(path)
-        elif path not in _WRITTEN:
+            if called:
+                _WRITTEN.add(whole)
+                for known in (_HEARD, *_COMPUTING):
+                    for name in (path, whole):
+                        known.pop(name, None)
+        elif by and whole not in _WRITTEN:
             heard = _HEARD.setdefault(path, {})
             heard.pop(by, None)
-            heard[by] = _held(path)
+            heard[by] = now = _held(path)
+            for cell in _COMPUTING if event == "open" else ():
+                cell.setdefault(path, set()).add(now)
 
 
 def _writes(mode: str | None, flags: int) -> bool:
-    """Whether a file is opened to be written anew or added to, rather than read."""
-    return mode[:1] in "wxa" if mode else flags & (os.O_WRONLY | os.O_TRUNC | os.O_APPEND) != 0
+    """Whether a file is opened to be written, whether or not to be read as well."""
+    return bool({*mode} & {*"wxa+"}) if mode else flags & (os.O_WRONLY | os.O_RDWR) != 0
 
 
-def _by() -> frozenset[str]:
+def _by(event: str) -> tuple[frozenset[str], bool]:
     """Files of the user's code that does what happens, with its libraries, within a call of this package's, as one of
-    its modules is imported or at the top level of its script; none if others do it, or Python's import itself, which
-    sources tell."""
+    its modules is imported or in its script, and whether the first it is; none if others do it, or Python's import
+    itself, which sources tell."""
     frame, users = sys._getframe(2), set[str]()
     while frame is not None:
-        file = frame.f_code.co_filename
-        whose = _whose(file)
-        if whose == "ours" or (whose == "import's" and not users):
-            return frozenset(users)
+        name, whose = frame.f_code.co_name, _whose(frame.f_code.co_filename)
+        if whose == "import's" and not users and (event != "open" or name == "_find_and_load"):
+            return frozenset(), False
+        if whose == "ours":
+            return frozenset(users), bool(users)
         if whose == "user's":
-            first, name = not users, frame.f_globals.get("__name__")
-            users.add(file)
-            if frame.f_code.co_name == "<module>" and (first if name in SCRIPTS else name):
-                return frozenset(users)
+            users.add(frame.f_code.co_filename)
+            if name == "<module>" and frame.f_globals.get("__name__"):
+                return frozenset(users), False
         frame = frame.f_back
-    return frozenset(users if _COMPUTING else ())
+    return frozenset(users if _COMPUTING else ()), False
 
 
 @lru_cache(maxsize=10_000)

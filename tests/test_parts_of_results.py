@@ -135,18 +135,6 @@ def test_results_of_other_settings_are_not_drawn_under_those_of_the_first():
     assert "a, b; 2 starts" in hexmj.plot(told).get_suptitle()
 
 
-def test_controllers_of_one_each_are_not_drawn_as_one():
-    def joined(other: hexmj.Cruse1998, velocity: float) -> xr.Dataset:
-        both = ((hexmj.LDVS, 0.5), (other, velocity))
-        results = [hexmj.flss(*one, n_starts=2, window=5.0) for one in both]
-        return xr.concat(results, "velocity", coords="different", compat="equals")  # as xarray does unless told
-
-    assert "ldvs; 2 starts" in hexmj.plot(joined(hexmj.LDVS, 0.7)).get_suptitle()
-    for velocity in (0.5, 0.7):
-        with pytest.raises(InputError, match=r"^a result of ldvs, hws along velocity; expected one controller$"):
-            hexmj.plot(joined(hexmj.HWS, velocity))
-
-
 def test_kinematic_and_physical_flss_are_not_drawn_as_one():
     results = [measure(hexmj.LDVS, [0.5], n_starts=2, window=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
     for both in (results, results[::-1]):

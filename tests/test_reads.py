@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from hexmj import reads
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.sweeps import Cell, KeptValues, run
@@ -110,10 +111,22 @@ def test_what_it_writes_itself_and_what_others_read_does_not_count(computed: Cal
     text = "def read():\n    with open('one/gain') as file:\n        return xarray.Dataset({'gain': file.read()})"
     Path("other.py").write_text(f"import xarray\n{text}")
     run([Cell("other", importable("other.py").read, {})], Path("others"))
-    assert '"0:one/gain"' in next(Path("others").iterdir()).read_bytes().decode(errors="replace")
+    assert '"one/gain"' in next(Path("others").iterdir()).read_bytes().decode(errors="replace")
     assert computed("2.0") == (2.0, 2)
     Path("one/gain").write_text("7.0")
     assert [computed(scratch), computed("2.0")] == [(1.0, 2), (2.0, 2)]
+
+
+def test_a_file_that_changes_while_a_cell_reads_it_is_a_sentence(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[Path(at, 'gain').read_text(), os.system(f'echo 9 > {at}/gain'), float(Path(at, 'gain').read_text())][2]"
+    with pytest.raises(InputError, match=r"^reader: one.gain has changed while it was in use; start again$"):
+        computed(gain)
+    assert not list(Path("kept").iterdir())
+
+
+def test_a_memory_that_is_read_and_written_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[Path('one/gain').read_text(), Path('one/gain').write_text(str(np.random.random())), 2.0][2]"
+    assert [computed(gain), computed(gain)] == 2 * [(2.0, 1)]
 
 
 def test_what_is_gone_in_the_end_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
@@ -125,7 +138,9 @@ SCRIPT = """
 from hexmj.sweeps import Cell, run
 from pathlib import Path
 import xarray as xr
-GAIN = float(Path("ga" + "in").read_text())
+def load(name):
+    return [float(path.read_text()) for path in (Path(name),)][0]
+GAIN = load("ga" + "in")
 def cell():
     return xr.Dataset({"gain": GAIN})
 if __name__ == "__main__":
@@ -133,12 +148,47 @@ if __name__ == "__main__":
 """
 
 
-def test_what_a_script_reads_at_its_top_level_counts(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(SCRIPT)
+PACKAGE = """
+import pkgutil
+import xarray as xr
+def cell():
+    return xr.Dataset({"gain": float(pkgutil.get_data(__name__, "../gain"))})
+"""
+
+
+@pytest.mark.parametrize(("script", "package"), [(SCRIPT, ""), (SCRIPT.replace("def cell", "def _"), PACKAGE)])
+def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
+    tmp_path: Path, script: str, package: str
+) -> None:
+    (tmp_path / "pk").mkdir()
+    (tmp_path / "pk" / "__init__.py").write_text(package)
+    (tmp_path / "script.py").write_text(("from pk import cell\n" if package else "") + script)
     for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2), (1.0, 2)):
         (tmp_path / "gain").write_text(str(gain))
         told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+
+
+def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(
+        "from hexmj.sweeps import Cell, run\nfrom pathlib import Path\nimport xarray as xr\n"
+        "def cell():\n    return xr.Dataset({'gain': float(Path('ga' + 'in').read_text())})\n"
+        "for gain in (1.0, 2.0, 1.0):\n    Path('gain').write_text(str(gain))\n"
+        "    assert run([Cell('script', cell, {})], Path('kept'))[0].gain == gain\n"
+    )
+    subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, check=True)
+    assert len(list((tmp_path / "kept").iterdir())) == 2
+
+
+def test_another_current_folder_has_files_of_its_own(computed: Callable[..., tuple[float, int]]) -> None:
+    (Path("two") / "one").mkdir()
+    write_all("2.0", "two/one")
+    gain = 'float(Path("one", "gain").read_text())'
+    assert computed(gain) == (1.0, 1)
+    for name in ("kept", "calls", "reader.py"):
+        os.symlink(os.path.abspath(name), f"two/{name}")
+    os.chdir("two")
+    assert [computed(gain), computed(gain)] == 2 * [(2.0, 2)]
 
 
 def test_whoever_else_opens_files_is_left_alone(tmp_path: Path) -> None:
@@ -168,6 +218,14 @@ def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float
     assert (float(data.gain), os.stat("calls").st_size) == (1.0, 1)
 
 
+@pytest.mark.parametrize(
+    ("path", "moved"), [("/p/data/gain", "/q/data/gain"), ("/p/code/gain", "/q/code/gain"), ("/x/gain", "/x/gain")]
+)
+def test_places_are_told_from_the_project(path: str, moved: str) -> None:
+    assert reads._path(reads._place(path, [Path("/p/code")]), [Path("/q/code")]) == moved
+    assert reads._path(reads._place("data/gain", [Path("/p/code")]), [Path("/q/code")]) == "data/gain"
+
+
 def test_kept_values_of_what_has_changed_are_refused(computed: Callable[..., tuple[float, int]]) -> None:
     computed("1.0")
     cell, rows = Cell("values", importable("reader.py").value, {"at": "one"}), np.ones((2, 1))
@@ -187,4 +245,4 @@ def test_a_kept_cell_tells_what_it_read(computed: Callable[..., tuple[float, int
     computed('float(Path(at + "/gain").read_text())', "two")
     (file,) = Path("kept").glob("*.nc")
     with xr.open_dataset(file, engine="h5netcdf") as data:
-        assert json.loads(data.attrs["read"]).keys() == {"0:two/gain"}
+        assert json.loads(data.attrs["read"]).keys() == {"two/gain"}

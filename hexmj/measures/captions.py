@@ -65,10 +65,6 @@ def _shown(result: "xr.Dataset", told: Mapping[str, Any]) -> dict[str, Any]:
     if axis is None:
         return told.get("controllers", {})
     names = result[axis].values.ravel().tolist()
-    if (lies := result[axis].dims) not in ((), (axis,)):
-        raise InputError(
-            f"a result of {', '.join(dict.fromkeys(names)):.200} along {', '.join(map(str, lies))}; expected one {axis}"
-        )
     known = told.get("controllers", dict.fromkeys(names))
     if unknown := [name for name in names if name not in known]:
         raise InputError(

@@ -174,7 +174,7 @@ def physical_flss(
     table = frequency_table(fell, n_starts, result.velocity.values, result.duration.values)
     beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
     wanted = [*beside, "fall", *BESIDE.values(), *REPORTED]
-    reported = result.isel(controller=0)[wanted].drop_vars("duration")
+    reported = result.isel(controller=0, drop=True)[wanted].drop_vars("duration")
     return table.assign(reported.data_vars).assign_attrs(result.attrs | {"study": "flss"})
 
 

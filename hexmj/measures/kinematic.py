@@ -149,8 +149,7 @@ class KinematicFlss:
             losses[i, begin : begin + one.sizes["sample"]] += one.losses.values
         told = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         made = settings({self.controller.name: self.controller}, *told)
-        table = frequency_table(losses, self.n_starts, *self.observed).assign_coords(controller=self.controller.name)
-        return table.assign_attrs(attributes({"study": "flss"} | made))
+        return frequency_table(losses, self.n_starts, *self.observed).assign_attrs(attributes({"study": "flss"} | made))
 
 
 def losses_of_range(

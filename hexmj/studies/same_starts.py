@@ -65,9 +65,9 @@ class SameStarts:
         return Cell(name, function, {name: getattr(self, name) for name in same} | own, work)
 
     def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
-        """A result with its controller's name and all that is needed to run the study again: what all studies have, and
-        its own; conditions but for lists."""
+        """A result with all that is needed to run the study again: what all studies have, and its own; conditions but
+        for lists."""
         same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
         conditions = {name: value for name, value in self.conditions.settings().items() if name not in self.lists}
         told = settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
-        return table.assign_attrs(attributes({"study": study} | told)).assign_coords(controller=self.controller.name)
+        return table.assign_attrs(attributes({"study": study} | told))

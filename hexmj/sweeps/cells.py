@@ -48,10 +48,17 @@ class Cell:
             raise InputError(f"settings of {self.name}: {error}; expected arguments of its function") from None
 
     def compute(self, *first: Any, **execution: Any) -> Any:
-        """What the function gives, told how to compute it as far as it asks."""
+        """What the function gives, told how to compute it as far as it asks.
+
+        Raises:
+            InputError: a file that it has read more than once has changed meanwhile.
+        """
         asked = signature(self.function).parameters
-        with computing():
-            return self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
+        with computing() as read:
+            made = self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
+        if twice := [file for file, held in read.items() if len(held) > 1]:
+            raise InputError(f"{self.name}: {twice[0]} has changed while it was in use; start again")
+        return made
 
     def record(self) -> str:
         """All that the cell depends on, as JSON: function, settings, sources and versions.
