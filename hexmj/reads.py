@@ -26,7 +26,6 @@ when they last did, the latest at the end."""
 _WRITTEN: set[str] = set()
 """Files that the user's code writes itself while this package calls it."""
 
-
 _COMPUTING: list[dict[str, set[str]]] = []
 """For each cell that is being computed: file -> what it held whenever it was read meanwhile."""
 
@@ -69,7 +68,7 @@ def changed(read: Mapping[str, str], homes: Sequence[Path]) -> str:
 def _place(path: str, homes: Sequence[Path]) -> str:
     for i, home in enumerate(homes if os.path.isabs(path) else ()):
         with suppress(ValueError):  # of another drive
-            if os.path.commonpath([path, home]) != os.path.join(home.anchor):
+            if os.path.commonpath([path, home]) != home.anchor:
                 return f"{i}:{os.path.relpath(path, home)}"
     return path
 
@@ -120,9 +119,9 @@ def _writes(mode: str | None, flags: int) -> bool:
 
 
 def _by(event: str) -> tuple[frozenset[str], bool]:
-    """Files of the user's code that does what happens, with its libraries, within a call of this package's, as one of
-    its modules is imported or in its script, and whether the first it is; none if others do it, or Python's import
-    itself, which sources tell."""
+    """Files of the user's code that does what happens, with its libraries: within a call of this package's, which is
+    told, too, as one of its modules is imported, or in its script.  None if others do it, or Python's import itself,
+    which sources tell."""
     frame, users = sys._getframe(2), set[str]()
     while frame is not None:
         name, whose = frame.f_code.co_name, _whose(frame.f_code.co_filename)

@@ -149,12 +149,16 @@ def test_while_a_film_is_written(tmp_path, by, group):
     assert [path.name for path in tmp_path.iterdir()] == ["ldvs-V-0.3-1.nc"]
 
 
-GROUPS = [(signal.SIGTERM, False), *((one, True) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))]
+STOPS = [
+    (signal.SIGTERM, False, 4.0),
+    (signal.SIGINT, True, 4.0),
+    (signal.SIGTERM, True, 4.0),
+    (signal.SIGHUP, True, 1.5),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wait", [1.5, 4.0])
-@pytest.mark.parametrize(("by", "group"), GROUPS, ids=["SIGTERM", "ctrl-c", "timeout", "terminal"])
+@pytest.mark.parametrize(("by", "group", "wait"), STOPS, ids=["SIGTERM", "ctrl-c", "timeout", "terminal"])
 def test_while_processes_compute_cells(tmp_path, by, group, wait):
     """They end at once, too, whoever is told first; their cells may be long."""
     words = ("compare", "--velocities", "0.1", "0.5", "--starts", "60", "--no-video", "--processes", "2")
