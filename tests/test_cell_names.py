@@ -160,13 +160,15 @@ def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_pa
     assert found[0][1] == np.__version__ and found[0][0].startswith("1.0@")
 
 
-@pytest.mark.parametrize("name", ["my_helper.py", "my_helper/__init__.py", "my_helper/inner/gains.py"])
+@pytest.mark.parametrize(
+    "name", ["my_helper.py", "my_helper/__init__.py", "my_helper/inner/gains.py", "my_helper/gains.txt"]
+)
 def test_an_installed_helper_of_no_package_counts_by_its_files(tmp_path: Path, name: str) -> None:
     """One that was copied there."""
     file = (folder := tmp_path / "site-packages") / name
     file.parent.mkdir(parents=True)
-    if "inner" in name:
-        (folder / "my_helper" / "__init__.py").write_text("from my_helper.inner.gains import GAIN")
+    if file.parent != folder and file.name != "__init__.py":
+        (folder / "my_helper" / "__init__.py").write_text("")
     found = []
     for text in ("GAIN = 1", "GAIN = 2"):
         file.write_text(text)

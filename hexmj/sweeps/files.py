@@ -21,7 +21,7 @@ RECORD = "cell"
 """Attribute of the file: what the cell depends on, as JSON."""
 
 READ = "read"
-"""Attribute of the file: what was read as it was made, as JSON; see `Cell.reads`."""
+"""Attribute of the file, or first word of a ledger's line: what was read as it was made, as JSON; see `Cell.reads`."""
 
 
 def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> "xr.Dataset":

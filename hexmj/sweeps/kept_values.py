@@ -11,9 +11,7 @@ import numpy as np
 from hexmj.errors import InputError
 from hexmj.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
-
-READ = "read"
-"""Begins the lines that tell what was read, see `Cell.reads`."""
+from hexmj.sweeps.files import READ
 
 
 class KeptValues:

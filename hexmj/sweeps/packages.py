@@ -36,11 +36,13 @@ def _files(distribution: Distribution) -> str:
 
 
 def _of_no_distribution(module: str) -> str:
+    """Without a version, a digest of all files of a module that was copied there."""
     spec = find_spec(module)
     folders = [Path(one) for one in (spec and spec.submodule_search_locations) or ()]
     alone = [Path(spec.origin)] if spec and spec.has_location and spec.origin and not folders else []
     places = [(one, one.parent) for one in alone] + [(one, folder) for folder in folders for one in folder.rglob("*")]
-    return f"unknown{_digest((one.relative_to(folder).as_posix(), _now(one)) for one, folder in places)}"
+    files = [(one, folder) for one, folder in places if one.is_file() and "__pycache__" not in one.parts]
+    return f"unknown{_digest((one.relative_to(folder).as_posix(), digest_of(one)) for one, folder in files)}"
 
 
 def _now(file: Path) -> str:

@@ -9,17 +9,15 @@ from multiprocessing import parent_process
 from threading import Thread
 
 from hexmj.files import WRITING
-
-LEAVES = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
-"""Signals that end a process of a pool."""
+from hexmj.signals import STOPS
 
 GRACE = 0.5
-"""Time after one of them [s]."""
+"""Time from a stop to the end [s]."""
 
 
 def end_with_parent() -> None:
     """Initializer of a pool's processes, which would wait for cells for ever if their parent was killed."""
-    for one in LEAVES:
+    for one in set(STOPS) - {signal.SIGINT}:
         signal.signal(one, _leave_later)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # by which the parent ends it
