@@ -76,7 +76,7 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
     v = numbers("velocity", velocity)
     if not ((v >= 0) & (v < 1)).all():
         raise InputError(
-            f"velocity = {short(velocity)}; expected 0 <= V < 1, a fraction of the protraction velocity V_p"
+            f"velocity = {short(v.tolist())}; expected 0 <= V < 1, a fraction of the protraction velocity V_p"
         )
     typed("acceleration", acceleration, Acceleration | None)
     if acceleration and not (v >= acceleration.start).all():
