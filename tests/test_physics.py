@@ -6,6 +6,8 @@ from contextlib import chdir
 import mujoco
 import numpy as np
 import pytest
+from numpy.random import default_rng
+from scipy.spatial.transform import Rotation
 
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
@@ -17,7 +19,7 @@ from hexmj.legs import MIRROR
 from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
-from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.backend import AFTER, Diverged, MujocoBatch
 from hexmj.physics.divergence import replay, save_state, walk_error
 from hexmj.physics.drive import drive
 from hexmj.physics.orders import OrdersFromPlan
@@ -216,6 +218,23 @@ def test_a_roll_is_mujocos_own_steps(settled):
         mujoco.mj_step(model, data)
         assert np.array_equal(rolled.after[0, n], np.concatenate([data.qpos, data.qvel, data.qacc_warmstart]))
         assert np.array_equal(rolled.sensors[0, n], data.sensordata)
+
+
+def test_what_a_body_shows_where_it_stands_is_mujocos_own(settled):
+    """Feet, centre of mass and contacts of the trunk, whether it is above the ground, at it, or in it."""
+    model, columns, states, rng = settled.compiled.model, settled.compiled.columns, settled.state.copy(), default_rng(0)
+    states[:, 2] += np.linspace(-1.0, 1.0, 24) * settled.conditions.path.standing_height
+    states[:, 3:7] = Rotation.from_euler("xyz", rng.normal(0.0, 0.3, (24, 3))).as_quat(scalar_first=True)
+    batch, data, ids = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model), np.arange(24)
+    batch.stand(ids, states, settled.ctrl)
+    for i in ids:
+        mujoco.mj_setState(model, data, states[i], AFTER)
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_sensorPos(model, data)
+        for shown in (columns.foot, columns.centre_of_mass, columns.trunk):
+            assert np.array_equal(batch.sensors[i, shown], data.sensordata[shown])
+    falls = (batch.sensors[:, columns.trunk] > 0).any(axis=1)
+    assert 4 < falls.sum() < 20
 
 
 @pytest.mark.parametrize("parts", [2, 4])
