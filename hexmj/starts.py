@@ -1,12 +1,14 @@
 """Random starts of walks, all standing (paper, Section 3), and what is checked of starts and velocities."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import given, numbers, short, typed, whole
 from hexmj.errors import InputError
+from hexmj.legs import LEGS
 from hexmj.timing import Acceleration, Stride
 
 SAMPLE = 1000
@@ -62,13 +64,22 @@ def check_draw(n_starts: int, seed: int) -> tuple[int, int]:
 
 
 def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
-    """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0."""
-    x = numbers("starts", starts)
+    """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0; labelled legs may come in
+    any order."""
+    x = numbers("starts", _in_order(starts))
     if x.ndim != 2 or x.shape[1] != 6 or len(x) == 0:
         raise InputError(f"starts have the shape {x.shape}; expected (start, leg) with at least one start and 6 legs")
     if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
         raise InputError(f"a start lies outside the step range, {stride.pep_min} to {stride.aep0} mm")
     return x
+
+
+def _in_order(starts: Any) -> Any:
+    """Starts as (start, leg), the legs as `LEGS` has them where a DataArray or DataFrame labels them."""
+    if "leg" in getattr(starts, "dims", ()):
+        starts = starts.transpose(..., "leg")
+        return starts.sel(leg=[*LEGS]) if "leg" in starts.coords else starts
+    return starts[[*LEGS]] if set(LEGS) == set(getattr(starts, "columns", ())) else starts
 
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:

@@ -74,6 +74,14 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "taller", "height": 4.0}
 
 
+def test_a_field_may_have_a_type_for_type_checkers_alone(mine, tmp_path):
+    only = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from numpy.typing import NDArray\n"
+    text = mine.read_text().replace("height: float = 0.0", "height: float = 0.0\n    table: NDArray | None = None")
+    mine.write_text(f"from __future__ import annotations\n{only}{text}")
+    (tmp_path / "tall.toml").write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0, "table": None}
+
+
 def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
     path = tmp_path / "tall.toml"
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4.0\n')

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import hexmj
 from hexmj.checks import typed
@@ -19,6 +20,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
 from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
+from hexmj.legs import LEGS
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import settle
@@ -298,6 +300,16 @@ def test_numbers_of_numpy_are_numbers():
     assert json.dumps(settings_of(replace(LDVS, weights=hexmj.Symmetric(np.float32(2.0)))))  # pyright: ignore
     assert np.array_equal(first_loss(threads=np.int64(1)), first_loss())
     assert one_start(walk(), np.int64(1)).x.shape == (50, 1, 6)  # pyright: ignore
+
+
+def test_labelled_legs_may_come_in_any_order():
+    starts = hexmj.draw_starts(6, 0)
+    labelled = xr.DataArray(starts, dims=("start", "leg"), coords={"leg": [*LEGS]})
+    shuffled = ["L1", "R1", "L2", "R2", "L3", "R3"]
+    table: Any = labelled.to_pandas()
+    for given in (labelled.sel(leg=shuffled), labelled.T, table[shuffled], labelled.drop_vars("leg").T):
+        assert np.array_equal(walk(given).x, walk(starts).x)
+    assert not np.array_equal(walk(labelled.sel(leg=shuffled).to_numpy()).x, walk(starts).x)
 
 
 def test_states_may_be_given_as_0_and_1():

@@ -3,13 +3,13 @@
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
 from types import ModuleType
-from typing import Any, get_type_hints
+from typing import Any
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
@@ -25,6 +25,9 @@ ENTRY_POINTS = "hexmj.controllers"
 
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
+
+_PLAIN = {name: kind for kind in (bool, int, float, str) for name in (kind, kind.__name__)}
+"""Types of fields that are checked, as themselves or as texts; others may have names for type checkers alone."""
 
 PART = re.compile(r"(-(without|with)-\d)+$")
 """The end of such names."""
@@ -101,9 +104,8 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         )
     found: Any = load_controller(named)
     try:
-        wanted = get_type_hints(type(found))
-        plain = [one for one in values if wanted.get(one) in (bool, int, float, str)]
-        return replace(found, **(values | {name: typed(name, values[name], wanted[name]) for name in plain}))
+        wanted = {one.name: _PLAIN[one.type] for one in fields(found) if one.name in values and one.type in _PLAIN}
+        return replace(found, **(values | {name: typed(name, values[name], kind) for name, kind in wanted.items()}))
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 
