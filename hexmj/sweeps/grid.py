@@ -184,7 +184,10 @@ class _Parcel:
             raise InputError(
                 f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
             )
-        return _made(cell, self.path, record, threads=self.threads)
+        data = _made(cell, self.path, record, threads=self.threads)
+        if file := cell.edited(cell.reads()):
+            raise InputError(f"{cell.name}: {file} has changed since {here} read it; start the worker again")
+        return data
 
 
 def _by_others(
