@@ -27,7 +27,7 @@ DATA = (
 
 _OURS = f"{Path(__file__).parent}{os.sep}"
 _KEEPS = __file__, *(f"{_OURS}sweeps{os.sep}{one}.py" for one in ("cells", "files", "kept_values"))
-"""What opens kept files and names, not for the user's code."""
+"""What names cells and keeps them: it opens nothing for the user's code."""
 
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"
@@ -75,10 +75,10 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
     return {_place(path, homes): held[-1] for path, held in own.items() if held}
 
 
-def changed(read: Mapping[str, str], homes: Sequence[Path]) -> str:
-    """The first file or folder of `reads` that holds something else by now; empty if none does."""
+def changed(read: Mapping[str, str], homes: Sequence[Path]) -> list[str]:
+    """Files and folders of `reads` that hold something else by now."""
     paths = {_path(place, homes): held for place, held in read.items()}
-    return next((path for path, held in paths.items() if _held(path) != held), "")
+    return [path for path, held in paths.items() if _held(path) != held]
 
 
 def _place(path: str, homes: Sequence[Path]) -> str:

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -285,6 +285,16 @@ def test_a_worker_that_remembers_what_has_changed_is_refused(computed: Callable[
             computed(gain, executor=pool)
     with ProcessPoolExecutor(1) as pool:
         assert computed(gain, executor=pool)[0] == 7.0
+
+
+def test_a_worker_that_remembers_what_its_sender_does_is_not_refused(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "globals().get('OURS') or globals().setdefault('OURS', float(Path('one/gain').read_text()))"
+    with ThreadPoolExecutor(1) as threads:
+        for calls in (1, 2):
+            assert computed(gain, executor=threads) == (1.0, calls)
+            Path("one/gain").write_text("7.0")
 
 
 def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:

@@ -70,8 +70,8 @@ class _Module:
 class _Needed(NamedTuple):
     sources: dict[str, str]
     versions: dict[str, str]
-    read: list[tuple[str, Path, list[Path]]]
-    """Of each module its name, its file and its data files."""
+    modules: list[tuple[str, Path, list[Path]]]
+    """Of each its name, its file and its data files."""
     missing: set[str]
     """Modules without a file."""
 
@@ -87,7 +87,7 @@ def code(modules: frozenset[str]) -> Code:
         InputError: one has no source, or a source is not what this program ran.
     """
     needed, data = _needed(modules), dict[str, str]()
-    for name, file, paths in needed.read:
+    for name, file, paths in needed.modules:
         content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if content and digest(content) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
@@ -97,7 +97,7 @@ def code(modules: frozenset[str]) -> Code:
 
 def source_files(modules: frozenset[str]) -> set[str]:
     """The files of all sources that some modules need."""
-    return {str(file) for _, file, _ in _needed(modules).read}
+    return {str(file) for _, file, _ in _needed(modules).modules}
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -217,7 +217,8 @@ def _read(name: str, file: Path) -> _Module:
 
 def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
     """TOML files and MJCFs that a module of this package names, beside it or in its assets."""
-    names = {one.value for one in nodes if isinstance(one, ast.Constant) and str(one.value).endswith((".toml", ".xml"))}
+    texts = {one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)}
+    names = [one for one in texts if one.endswith((".toml", ".xml"))]
     return [path for name in sorted(names) for folder in (file.parent, _ASSETS) if isfile(path := folder / name)]
 
 
