@@ -201,6 +201,7 @@ def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
         (tmp_path / "gain").write_text(str(gain))
         told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+    assert not [file for file in (tmp_path / "kept").iterdir() if b"kept/" in file.read_bytes()]
 
 
 BEFORE = """
