@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import hexmj
+from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
+from hexmj.files import digest_of
 from hexmj.loaded import importable
 from hexmj.sweeps import Cell
 from hexmj.sweeps.code import code
-from hexmj.sweeps.plain import module_label
 from small_cells import ENVIRONMENT, MINE, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
 
@@ -72,13 +74,10 @@ def unedited(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: str) -> None:
     record = json.loads(unedited)
     within = {"toy", "toy.study", "toy.walk", "toy.louder", "toy.inner", "toy.inner.deep", "toy.inner.deeper"} | {
-        *("toy.walk, own.toml", "toy.walk, data/more.toml", "helper", "bare.helper", "bare.deep.other", "fast"),
+        *("helper", "bare.helper", "bare.deep.other", "fast"),
     }
     assert {name for name in record["sources"] if name.startswith(("toy", "helper", "bare", "fast"))} == within
-    assert [name.rpartition("@")[2][12:] for name in record["sources"] if name.startswith("mine.py@")] == [
-        "",
-        ", here.json",
-    ]
+    assert [name.rpartition("@")[2][12:] for name in record["sources"] if name.startswith("mine.py@")] == [""]
     assert set(record["versions"]) == {"python", "numpy", "scipy"}
     for name in ("toy/film.py", "toy/cli.py"):
         (toy / name).write_text(TOY[name] + "\n# edited")
@@ -89,8 +88,7 @@ def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: 
     "name",
     [
         *("toy/__init__.py", "toy/study.py", "toy/louder.py", "toy/inner/__init__.py", "toy/inner/deeper.py"),
-        *("toy/own.toml", "toy/data/more.toml", "here.json", "mine.py", "helper.py"),
-        *("bare/helper.py", "bare/deep/other.py", "fast.pyc"),
+        *("mine.py", "helper.py", "bare/helper.py", "bare/deep/other.py", "fast.pyc"),
     ],
 )
 def test_an_edit_within_reach_is_another_name(toy: Path, unedited: str, name: str) -> None:
@@ -106,21 +104,6 @@ def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
         found.append(json.loads(toy_record(toy))["sources"])
     assert found[0].pop("profile") != found[1].pop("profile")
     assert found[0] == found[1]
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [
-        *((repr(name), name) for name in ("gains_V=0.3.toml", "a (1), 50 %+~@.json", "it's ö.xml", "a/[b] 'c'.toml")),
-        *(("f'{HERE}/gains.toml'", "gains.toml"), ("'a\\x2etoml'", "a.toml")),
-    ],
-)
-def test_a_data_file_counts_whatever_its_name(tmp_path: Path, text: str, name: str) -> None:
-    (tmp_path / "mine.py").write_text(f"HERE = '.'\nNAME = {text}")
-    (tmp_path / name).parent.mkdir(exist_ok=True)
-    (tmp_path / name).write_text("")
-    made = code(frozenset({(module := importable(tmp_path / "mine.py").__name__)}))
-    assert f"{module_label(module)}, {name}" in made.sources
 
 
 VERSIONS = """
@@ -176,53 +159,6 @@ def test_an_installed_helper_of_no_package_counts_by_its_files(tmp_path: Path, n
     assert found[0] != found[1] and all(one.startswith("unknown@") for one in found)
 
 
-JOINED = {
-    "Path(__file__).parent / 'data' / 'sub' / 'g.json'": "code/data/sub/g.json",
-    "os.path.join(os.path.dirname(__file__), 'data', 'g.JSON')": "code/data/g.JSON",
-    "'data/' + 'g.yaml'": "code/data/g.yaml",
-    "importlib.resources.files(__name__) / 'data' / 'g.npz'": "code/data/g.npz",
-    "f'{HERE}/data' + '/g.csv'": "code/data/g.csv",
-    "'data/g.toml'": "code/data/g.toml",
-    "Path(__file__).resolve().parent.joinpath('..', 'data', 'g.txt')": "data/g.txt",
-}
-
-
-@pytest.mark.parametrize("text", JOINED)
-@pytest.mark.parametrize("real", ["", "real"])
-def test_a_data_file_in_a_folder_that_is_joined_to_its_name_counts(tmp_path: Path, text: str, real: str) -> None:
-    """As the same wherever all of it lies, beside the module or what that links to."""
-    found = []
-    for folder, held in (("a", "1"), ("b", "1"), ("c", "2")):
-        mine, file = tmp_path / folder / "code" / "mine.py", tmp_path / folder / real / JOINED[text]
-        written = tmp_path / folder / real / "code" / "mine.py"
-        for one in (mine, written, file):
-            one.parent.mkdir(parents=True, exist_ok=True)
-        written.write_text(f"DATA = lambda: {text}, 'later'")
-        if real:
-            mine.symlink_to(written)
-        file.write_text(held)
-        found.append(code(frozenset({importable(mine).__name__})).sources)
-        (mine.parent / "later").mkdir()
-        found.append(code(frozenset({importable(mine).__name__})).sources)
-    assert found[0] == found[1] == found[2] == found[3] != found[4] == found[5]
-
-
-def test_a_data_file_beside_its_module_and_one_in_the_current_folder_are_two(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    names = set()
-    for folder, beside, here in (("a/code", "1", "2"), ("c/code", "2", "1"), ("d/code", "", "1"), ("e/code", "1", "")):
-        (mine := tmp_path / folder / "mine.py").parent.mkdir(parents=True)
-        (current := tmp_path / folder[0] / "b").mkdir()
-        mine.write_text("NAME = 'gains.toml'")
-        for where, held in ((mine.parent, beside), (current, here)):
-            if held:
-                (where / "gains.toml").write_text(held)
-        monkeypatch.chdir(current)
-        names.add(tuple(code(frozenset({importable(mine).__name__})).sources.values()))
-    assert len(names) == 4
-
-
 PRINT_MAIN = """
 from hexmj.sweeps import Cell
 from toy.study import cell
@@ -254,6 +190,15 @@ def test_the_package_knows_its_own_reach() -> None:
     assert {"hexmj.stability", "hexmj.legs"} <= set(made.sources)
     assert not [name for name in made.sources if "film" in name or "cli" in name or "sweeps" in name]
     assert "numba" in made.versions and "llvmlite" in made.versions and "xarray" not in made.versions
+
+
+@pytest.mark.parametrize(
+    ("module", "file"),
+    [("controllers.cruse1998.presets", presets.OWN), ("bodies.stick_insect", hexmj.STICK_INSECT.mjcf)],
+)
+def test_the_packages_own_data_count(module: str, file: Path) -> None:
+    made = code(frozenset({f"hexmj.{module}"}))
+    assert made.sources[f"hexmj.{module}, {file.name}"] == digest_of(file)
 
 
 @pytest.mark.parametrize("text", ["from hexmj import loss_time", "import hexmj"])

@@ -1,4 +1,4 @@
-"""Sources and data that are edited while a program uses them: they count as they ran, or are refused."""
+"""Sources, and files of settings, that are edited while a program uses them: they count as they ran, or are refused."""
 
 import json
 import os
@@ -163,49 +163,6 @@ def test_stale_bytecode_beside_a_file_that_runs_from_its_source_is_not_refused(t
             py_compile.compile(str(tmp_path / "mine.py"))
     made = code(frozenset({importable(tmp_path / "mine.py").__name__}))
     assert [name for name in made.sources if name.startswith("mine.py@")]
-
-
-READ = """
-import os, sys
-from pathlib import Path
-from hexmj.sweeps import Cell
-import reads
-data, then = Path("gains.toml"), sys.argv[1]
-if then == "vanishes": data.unlink()
-elif then == "moves": Path("inner").mkdir(); os.chdir("inner")
-elif then: data.write_text(then)
-print(Cell("reads", reads.cell, {}).record())
-"""
-
-
-def read_digest(folder: Path, before: str, then: str) -> str | None:
-    """Of a data file that is there when the module that names it runs, or that becomes another one then."""
-    folder.mkdir()
-    (folder / "reads.py").write_text("GAINS = 'gains.toml'\ndef cell(): ...")
-    if before:
-        (folder / "gains.toml").write_text(before)
-    command = [sys.executable, "-c", READ, then]
-    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)["sources"].get("reads, gains.toml")
-
-
-def test_a_data_file_counts_as_it_was_when_its_module_ran_too(tmp_path: Path) -> None:
-    """The module may have read it then, or may read it now; in a new program both are the same."""
-    runs = [
-        *(("", ""), ("g = 1.0", ""), ("g = 9.0", "")),
-        *(("", "g = 9.0"), ("g = 1.0", "g = 9.0"), ("g = 1.0", "vanishes"), ("g = 1.0", "moves")),
-    ]
-    found = [read_digest(tmp_path / str(i), *run) for i, run in enumerate(runs)]
-    assert len(set(found)) == len(runs) and found[0] is None
-
-
-def test_data_files_count_as_they_are_now(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text("DATA = 'gains.toml'")
-    name, found = importable(tmp_path / "mine.py").__name__, []
-    for text in ("a = 1", "a = 2", "a = 1"):
-        (tmp_path / "gains.toml").write_text(text)
-        found.append(code(frozenset({name})).sources)
-    assert found[0] == found[2] != found[1]
 
 
 def edited_rows(rows: np.ndarray, data: str) -> np.ndarray:

@@ -167,20 +167,6 @@ def test_a_field_names_a_file_beside_its_class_its_bases_or_in_the_current_folde
     assert plain(Conditions()) == plain(tabled(inner=(Conditions(),)))["inner"][0]
 
 
-def test_a_field_names_a_file_in_a_folder_that_its_module_names(tmp_path: Path) -> None:
-    found = []
-    for folder, held in (("a", "1"), ("a", "2"), ("b", "2"), ("b", "1")):
-        (tmp_path / folder / "data").mkdir(parents=True, exist_ok=True)
-        (tmp_path / folder / "mine.py").write_text(TABLED.format(kind="str", name="g.txt") + "FOLDER = 'data', 'more'")
-        (tmp_path / folder / "base_of_tabled.py").write_text("class Reads: ...")
-        (tmp_path / folder / "data" / "g.txt").write_text(held)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.syspath_prepend(tmp_path / folder)
-            found.append(plain(importable(tmp_path / folder / "mine.py").Tabled()))
-        (tmp_path / folder / "more").mkdir(exist_ok=True)
-    assert found[0] == found[3] != found[1] == found[2]
-
-
 def test_an_mjcf_is_all_that_it_includes_and_refers_to(tmp_path: Path) -> None:
     body, parts, shape = tmp_path / "body.xml", tmp_path / "parts.mjcf", tmp_path / "shapes" / "leg.stl"
     shape.parent.mkdir()

@@ -6,13 +6,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+import hexmj
 from hexmj import reads
 from hexmj.errors import InputError
 from hexmj.loaded import importable
@@ -25,6 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 from pathlib import Path
 
+import hexmj
 import numpy as np
 import xarray as xr
 
@@ -49,6 +51,7 @@ def write_all(gain: str, at: str = "one") -> None:
     Path(at, "gain").write_text(gain)
     Path(at, "gain.json").write_text(gain)
     np.save(Path(at, "gain.npy"), float(gain))
+    hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
 
 
 @pytest.fixture
@@ -78,6 +81,7 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
         'len(os.listdir(at)) + json.loads(Path(at, "gain" + ".json").read_text())',
         'ThreadPoolExecutor(1).submit(lambda: float(Path(at, "gain").read_text())).result()',
         'eval(compile(Path(at + "/gain").read_bytes(), "<text>", "eval"))',
+        'float(hexmj.load(f"{at}/gain.nc").gain)',
     ],
 )
 def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tuple[float, int]], gain: str) -> None:
@@ -124,14 +128,44 @@ def test_a_file_that_changes_while_a_cell_reads_it_is_a_sentence(computed: Calla
     assert not list(Path("kept").iterdir())
 
 
-def test_a_memory_that_is_read_and_written_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
-    gain = "[Path('one/gain').read_text(), Path('one/gain').write_text(str(np.random.random())), 2.0][2]"
+@pytest.mark.parametrize(
+    "gain",
+    [
+        "[Path('one/gain').read_text(), Path('one/gain').write_text(str(np.random.random())), 2.0][2]",
+        "[hexmj.save(xr.Dataset({'a': np.random.random()}), 'a.nc'), hexmj.load('a.nc'), 2.0][2]",
+        "[Path('a').write_text(str(np.random.random())), os.replace('a', 'b'), Path('b').read_text(), 2.0][3]",
+    ],
+)
+def test_a_memory_that_is_read_and_written_does_not_count(
+    computed: Callable[..., tuple[float, int]], gain: str
+) -> None:
     assert [computed(gain), computed(gain)] == 2 * [(2.0, 1)]
 
 
 def test_what_is_gone_in_the_end_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
     gain = "[os.system('echo 3.0 > made'), float(Path('made').read_text()), os.remove('made')][1]"
     assert [computed(gain), computed(gain)] == 2 * [(3.0, 1)]
+
+
+@pytest.mark.parametrize("then", ["is edited", "vanishes", "is left behind"])
+def test_what_a_module_remembers_of_a_file_counts_whatever_becomes_of_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, then: str
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    text = "GAIN = float(Path('gain').read_text())\ndef cell(): return xr.Dataset({'gain': GAIN})"
+    (tmp_path / "remembers.py").write_text(f"import xarray as xr\nfrom pathlib import Path\n{text}")
+    for gain in (1.0, 2.0):
+        monkeypatch.chdir(tmp_path)
+        Path("gain").write_text(str(gain))
+        remembers = importable("remembers.py")
+        if then == "is edited":
+            Path("gain").write_text("3.0")
+        elif then == "vanishes":
+            Path("gain").unlink()
+        else:
+            monkeypatch.chdir("elsewhere")
+        assert run([Cell("remembers", remembers.cell, {})], tmp_path / "kept")[0].gain == gain
+        monkeypatch.delitem(sys.modules, remembers.__name__)
 
 
 SCRIPT = """
@@ -167,6 +201,41 @@ def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
         (tmp_path / "gain").write_text(str(gain))
         told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+    assert not [file for file in (tmp_path / "kept").iterdir() if b"kept/" in file.read_bytes()]
+
+
+BEFORE = """
+import numpy as np
+from pathlib import Path
+HERE = Path(__file__).parent
+GAIN = np.load(f"{HERE}/data" + "/gain.npy")
+"""
+
+IMPORTS_BEFORE = """
+import numpy as np
+from lib import before
+OWN = np.load("own.npy")
+from hexmj.sweeps import Cell, run
+from pathlib import Path
+import xarray as xr
+def cell():
+    Path("calls").open("a").write(".")
+    return xr.Dataset({"gain": before.GAIN + OWN})
+if __name__ == "__main__":
+    print(run([Cell("before", cell, {})], Path("kept"))[0].gain.item())
+    np.save("written.npy", np.random.random())
+"""
+
+
+def test_what_was_read_before_the_package_was_imported_counts_if_it_is_named(tmp_path: Path) -> None:
+    (data := tmp_path / "lib" / "data").mkdir(parents=True)
+    (tmp_path / "lib" / "before.py").write_text(BEFORE)
+    (tmp_path / "script.py").write_text(IMPORTS_BEFORE)
+    for helpers, own, calls in ((1.0, 10.0, 1), (1.0, 10.0, 1), (2.0, 10.0, 2), (2.0, 20.0, 3)):
+        np.save(data / "gain.npy", helpers)
+        np.save(tmp_path / "own.npy", own)
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), (tmp_path / "calls").stat().st_size) == (helpers + own, calls)
 
 
 def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
@@ -204,6 +273,29 @@ def test_workers_tell_what_they_read(computed: Callable[..., tuple[float, int]])
         assert computed(gain, executor=pool) == (1.0, 1)
         Path("one/gain").write_text("7.0")
         assert [computed(gain, executor=pool), computed(gain)] == 2 * [(7.0, 2)]
+
+
+def test_a_worker_that_remembers_what_has_changed_is_refused(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "globals().get('GAIN') or globals().setdefault('GAIN', float(Path('one/gain').read_text()))"
+    with ProcessPoolExecutor(1) as pool:
+        assert computed(gain, executor=pool) == (1.0, 1)
+        Path("one/gain").write_text("7.0")
+        with pytest.raises(
+            InputError, match=r"^reader: one.gain has changed since a worker on \S+ read it; start the worker again$"
+        ):
+            computed(gain, executor=pool)
+    with ProcessPoolExecutor(1) as pool:
+        assert computed(gain, executor=pool)[0] == 7.0
+
+
+def test_a_worker_that_remembers_what_its_sender_does_is_not_refused(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "globals().get('OURS') or globals().setdefault('OURS', float(Path('one/gain').read_text()))"
+    with ThreadPoolExecutor(1) as threads:
+        for calls in (1, 2):
+            assert computed(gain, executor=threads) == (1.0, calls)
+            Path("one/gain").write_text("7.0")
 
 
 def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def test_where_the_manifest_knows_no_reason_it_says_so(run, flss):
     edit(flss / "manifest.json", files={"flss.nc": digest((flss / "flss.nc").read_bytes())})
     code, text, _ = run("rerun", flss)
     assert code == 1
-    assert "nothing that the manifest knows of differs (files that code reads without" in " ".join(text.split())
+    assert "nothing that the manifest knows of differs (files that your code reads it does" in " ".join(text.split())
 
 
 def test_what_differs_is_named_even_where_all_numbers_are_equal(run, flss):

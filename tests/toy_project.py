@@ -1,4 +1,4 @@
-"""A user's project of several modules, scripts and data files, and the record of a cell in it."""
+"""A user's project of several modules and scripts, and the record of a cell in it."""
 
 import subprocess
 import sys
@@ -11,13 +11,10 @@ TOY = {
     "toy/study.py": "import numpy\nfrom toy import walk\nfrom typing import TYPE_CHECKING\n"
     "if TYPE_CHECKING:\n    import toy.film\ndef cell(controller=None): ...",
     "toy/louder.py": "def louder(what): return what",
-    "toy/walk.py": "def walk():\n    import toy.inner.deep\n    return deep, 'own.toml', 'data/more.toml'",
+    "toy/walk.py": "def walk():\n    import toy.inner.deep\n    return deep",
     "toy/inner/__init__.py": "GAIN = 1",
     "toy/inner/deep.py": "from . import deeper",
     "toy/inner/deeper.py": "import scipy.stats",
-    "toy/own.toml": "p = 1",
-    "toy/data/more.toml": "q = 1",
-    "here.json": "{}",
     "toy/film.py": "import matplotlib\ndef show(): ...",
     "toy/cli.py": "import toy.study",
     "helper.py": "",
@@ -25,7 +22,7 @@ TOY = {
     "bare/deep/other.py": "",
     "fast.pyc": "",
     "mine.py": "from helper import *\nfrom bare import helper\nimport bare.deep.other\n"
-    "if not True:\n    import fast\nHERE = 'here.json'\n" + MINE,
+    "if not True:\n    import fast\n" + MINE,
 }
 
 PRINT_STEM = """

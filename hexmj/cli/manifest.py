@@ -37,7 +37,7 @@ KINDS = {
 """What may differ -> what it is called."""
 
 STAMP = re.compile("@[0-9a-f]{12}")
-"""Of a loaded file, in the names of its module and of the data files that it names."""
+"""Of a loaded file, in the name of its module."""
 
 SHOWN = 8
 """Most names of a kind in a sentence."""
@@ -54,7 +54,7 @@ class Manifest:
     versions: dict[str, str]
     """Of Python, the packages that compute, and the C library."""
     code: dict[str, str]
-    """Module or data file that the command may need -> digest."""
+    """Module, or data file of this package, that the command may need -> digest."""
     own: dict[str, str]
     """The user's files that the words name, as they name them -> digest."""
     processor: list[str]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 UNSEEN = "not compared"
 ABSENT = "not made this time"
-NOTHING = "nothing that the manifest knows of differs (files that code reads without naming them it does not know)"
+NOTHING = "nothing that the manifest knows of differs (files that your code reads it does not know)"
 
 
 @dataclass(frozen=True)

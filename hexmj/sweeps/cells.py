@@ -80,9 +80,9 @@ class Cell:
         """What its code has read so far in this process, as JSON; see `reads.reads`."""
         return json.dumps(reads(source_files(frozenset(self._modules())), self._homes()), sort_keys=True)
 
-    def edited(self, told: str) -> str:
-        """The first file or folder of `reads` that holds something else by now; empty if none does."""
-        return changed(json.loads(told), self._homes())
+    def edited(self, told: str, known: str = "{}") -> list[str]:
+        """Files and folders of `reads` that hold something else by now, but for those of which others know the same."""
+        return changed(dict(json.loads(told).items() - json.loads(known).items()), self._homes())
 
     def _homes(self) -> list[Path]:
         """Folders that a user's own modules lie in, and the current one."""

@@ -3,9 +3,8 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from.  Data files that a module names, with or without a folder, are looked for beside
-it, in the package's `assets` or, for a user's own, in the current folder and in what it names as folders there: they
-count as they are now and as they were when it ran, and so does it that there is none.
+the one module it comes from, and TOML files and MJCFs count that its modules name; `reads` hears what a
+user's own read.
 """
 
 import ast
@@ -17,12 +16,13 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
+from os.path import isfile
 from pathlib import Path
 from typing import NamedTuple
 
 from hexmj import as_run
 from hexmj.errors import InputError
-from hexmj.files import digest
+from hexmj.files import digest, digest_of
 from hexmj.parsing import parsed
 from hexmj.sweeps.plain import PACKAGE, module_label
 
@@ -58,8 +58,8 @@ class Code:
 @dataclass(frozen=True)
 class _Module:
     digest: str
-    texts: list[str]
-    """That may name data files and their folders."""
+    data: list[Path]
+    """Of this package."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -70,8 +70,8 @@ class _Module:
 class _Needed(NamedTuple):
     sources: dict[str, str]
     versions: dict[str, str]
-    read: list[tuple[str, Path, list[str]]]
-    """Of each module its name, its file and texts that may name data files."""
+    modules: list[tuple[str, Path, list[Path]]]
+    """Of each its name, its file and its data files."""
     missing: set[str]
     """Modules without a file."""
 
@@ -81,28 +81,23 @@ _FILES: dict[str, Path] = {}
 
 
 def code(modules: frozenset[str]) -> Code:
-    """All that some modules need, and they themselves: sources as they ran, data files as they are and were.
+    """All that some modules need, and they themselves: sources as they ran, data files as they are.
 
     Raises:
         InputError: one has no source, or a source is not what this program ran.
     """
     needed, data = _needed(modules), dict[str, str]()
-    for name, file, texts in needed.read:
+    for name, file, paths in needed.modules:
         content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if content and digest(content) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        if names := as_run.data_names(texts):
-            ours = file.is_relative_to(PACKAGE)
-            folders = [file.parent, _ASSETS] if ours else as_run.data_folders(file)
-            more = {} if ours else as_run.named_folders(file, texts)
-            held = {f"{module_label(name)}, {one}": as_run.data(file, one, folders, more) for one in names}
-            data |= {one: digest for one, digest in held.items() if digest}
+        data |= {f"{name}, {path.name}": digest_of(path) for path in paths}
     return Code(dict(sorted((needed.sources | data).items())), needed.versions)
 
 
 def source_files(modules: frozenset[str]) -> set[str]:
     """The files of all sources that some modules need."""
-    return {str(file) for _, file, _ in _needed(modules).read}
+    return {str(file) for _, file, _ in _needed(modules).modules}
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -130,7 +125,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
         if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
             sources[module_label(name)] = module.digest
-            read.append((name, file, module.texts))
+            read.append((name, file, module.data))
             ours = top == PACKAGE.name
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
@@ -213,10 +208,18 @@ def _read(name: str, file: Path) -> _Module:
     types = {inner for one in guarded for statement in one.body for inner in ast.walk(statement)}
     followed = nodes if package == name else [one for one in nodes if one not in types]
     imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
-    if not file.is_relative_to(PACKAGE):
+    ours = file.is_relative_to(PACKAGE)
+    if not ours:
         imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), as_run.texts(nodes), package == name, imports, bound)
+    return _Module(digest(content), _data(file, nodes) if ours else [], package == name, imports, bound)
+
+
+def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
+    """TOML files and MJCFs that a module of this package names, beside it or in its assets."""
+    texts = {one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)}
+    names = [one for one in texts if one.endswith((".toml", ".xml"))]
+    return [path for name in sorted(names) for folder in (file.parent, _ASSETS) if isfile(path := folder / name)]
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:

@@ -113,7 +113,8 @@ def finish(
             else:
                 waiting.append(i)
         parcels = [
-            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting
+            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), cells[i].reads(), paths[i], threads or 1)
+            for i in waiting
         ]
         for j, done in _by_others(executor, parcels, folder):
             yield finished(waiting[j], done)
@@ -158,6 +159,8 @@ class _Parcel:
 
     pickled: bytes
     record: str
+    read: str
+    """By the sender's process; see `Cell.reads`."""
     path: Path | None
     threads: int
     mark: Path | None = None
@@ -184,7 +187,10 @@ class _Parcel:
             raise InputError(
                 f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
             )
-        return _made(cell, self.path, record, threads=self.threads)
+        data = _made(cell, self.path, record, threads=self.threads)
+        if files := [file for file in cell.edited(cell.reads(), self.read) if os.path.exists(file)]:
+            raise InputError(f"{cell.name}: {files[0]} has changed since {here} read it; start the worker again")
+        return data
 
 
 def _by_others(

@@ -83,8 +83,10 @@ class KeptValues:
             row, _, value = line.rpartition(" ")[0].partition(" ")
             if row == READ and f"{line}\n" == self._marked(f"{READ} {value}"):
                 self._read = value
-                if file := self._cell.edited(value):
-                    raise InputError(f"{path} was made of {file} as it was; delete {path.name}, and it is made anew")
+                if files := self._cell.edited(value):
+                    raise InputError(
+                        f"{path} was made of {files[0]} as it was; delete {path.name}, and it is made anew"
+                    )
             with suppress(ValueError):  # of what is no line
                 key, number = bytes.fromhex(row), float.fromhex(value)
                 if f"{line}\n" == self._line(key, number) and math.isfinite(number):

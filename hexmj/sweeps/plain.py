@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from html import unescape
@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from hexmj import as_run
 from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.files import digest, read_bytes
@@ -25,25 +24,22 @@ PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
 
-def plain(value: Any, folders: Mapping[Path, str] | None = None) -> Any:
+def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     """A setting as JSON can hold it: a frozen dataclass or named tuple with the name of its class, an array as a list.
 
     A file is its name and a digest of its content, wherever it lies; so is a text with a dot that names one.  A field
-    of a user's own class may name one without a dot, and beside the class's module or those of its bases as well, or in
-    folders that these name.
+    of a user's own class may name one without a dot, and beside the class's module or those of its bases as well.
 
     Args:
         value: of the setting.
-        folders: where files are looked for, beside the current one, with the way to each that counts only if a file is
-            there.
+        folders: where files are looked for, beside the current one.
 
     Raises:
         InputError: it is none of the things that a setting can be.
     """
-    folders = folders or {}
     if (names := field_names(value)) is not None:
         _check_fields(value, names)
-        of_class = {**folders, **_folders(type(value))}
+        of_class = [*folders, *_folders(type(value))]
         return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class) for name in names}
     if (type(value) is np.ndarray or isinstance(value, np.generic)) and value.dtype in (np.bool_, np.int64, np.float64):
         return value.tolist()
@@ -114,26 +110,18 @@ def content(path: Path) -> bytes:
     return b"".join(found[one] for one in sorted(found))
 
 
-def _held(name: str | Path, folders: Mapping[Path, str]) -> str:
-    """Digests of what a file holds in the current folder and in others, each empty without it but where it is told how
-    one comes there; none if all are."""
-    first = {folder / name: "" for folder in (Path(), *(one for one, way in folders.items() if not way))}
-    paths = first | {path: way for folder, way in folders.items() if (path := folder / name) not in first}
-    held = {path: digest(content(path)) if isfile(path) else "" for path in paths}
-    told = [f"{way}:{held[path]}" if way else held[path] for path, way in paths.items() if held[path] or not way]
-    return ",".join(told) if any(held.values()) else ""
+def _held(name: str | Path, folders: Sequence[Path]) -> str:
+    """Digests of what a file holds in the current folder and in others, each empty without it; none if all are."""
+    paths = dict.fromkeys(folder / name for folder in (Path(), *folders))
+    held = [digest(content(path)) if isfile(path) else "" for path in paths]
+    return ",".join(held) if any(held) else ""
 
 
-def _folders(kind: type) -> dict[Path, str]:
-    """Where the modules of a user's own class and of its bases lie, and folders that they name."""
+def _folders(kind: type) -> list[Path]:
+    """Where the modules of a user's own class and of its bases lie."""
     names = [one.__module__ for one in kind.__mro__ if one.__module__.partition(".")[0] not in sys.stdlib_module_names]
     files = [Path(file) for name in names if (file := getattr(sys.modules.get(name), "__file__", None))]
-    own = [file for file in files if not file.is_relative_to(PACKAGE)]
-    beside = {file.parent: "" for file in own}
-    named = {
-        f"{i} {way}": folder for i, file in enumerate(own) for folder, way in as_run.folders_named_in(file).items()
-    }
-    return beside | {folder: way for way, folder in named.items() if folder not in beside}
+    return [file.parent for file in files if not file.is_relative_to(PACKAGE)]
 
 
 def _check_fields(value: Any, names: tuple[str, ...]) -> None:
