@@ -7,11 +7,13 @@ that ran before, what their texts name is noted then.
 import ast
 import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from traceback import walk_stack
+from types import FrameType
 from typing import Any
 
 from hexmj import as_run, files
@@ -32,57 +34,88 @@ _KEEPS = __file__, *(f"{_OURS}sweeps{os.sep}{one}.py" for one in ("cells", "file
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"
 
-_HEARD: dict[str, dict[frozenset[str], str]] = {}
-"""File or folder, relative to the current one if it was asked for so -> files of the code that read it -> what it held
-when they last did, the latest at the end."""
+LARGE = 2**26
+"""Size from which on a file is not read through as it is opened [bytes]."""
+
+_UNREAD = "unread "
+"""Begins what is noted of a large file instead of a digest: its size and times."""
+
+_ANYBODY = "anybody"
+"""Stands for the code of a thread in which nothing is a user's, while cells are computed."""
+
+Asked = tuple[str, str]
+"""A file or folder as it was asked for, relative to the current one or not, and its absolute path."""
+
+HEARD: dict[Asked, dict[frozenset[str], str]] = {}
+"""File or folder -> files of the code that read it -> what it held when they last did, the latest at the end."""
 
 _WRITTEN: set[str] = set()
 """Files that the user's code writes itself while this package calls it."""
 
-_COMPUTING: list[dict[str, set[str]]] = []
+_BOTH: set[str] = set()
+"""Files that were opened to be read and written."""
+
+_COMPUTING: list[dict[Asked, set[str]]] = []
 """For each cell that is being computed: file -> what it held whenever it was read meanwhile."""
+
+_EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0}
+"""Event -> which of its arguments is the path."""
+
+_QUIET = "exec", "os.listdir", "os.scandir"
+"""Events that write nothing."""
 
 
 @contextmanager
-def computing() -> Iterator[dict[str, set[str]]]:
+def computing() -> Iterator[dict[Asked, set[str]]]:
     """Meanwhile threads of the user's own count as called by this package; gives what each file held as it was read.
 
-    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.
+    What was read meanwhile, and is gone in the end, was made on the way; what was opened to be written as well, and
+    holds something else in the end, was written: both are forgotten.
     """
-    held: dict[str, set[str]] = {}
+    held: dict[Asked, set[str]] = {}
     _COMPUTING.append(held)
     try:
         yield held
     finally:
         _COMPUTING[:] = [one for one in _COMPUTING if one is not held]
-        for path in list(held):
-            if not os.path.exists(path) and all(_HEARD.get(path, {}).values()):
-                _HEARD.pop(path, None)
+        for asked, seen in list(held.items()):
+            whole = asked[1]
+            if not os.path.exists(whole) and all(HEARD.get(asked, {}).values()):
+                HEARD.pop(asked, None)
+            if whole in _BOTH and _seen(whole) not in seen:
+                _forget(whole, held)
 
 
-def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, str]:
-    """What some code has read so far in this process.
+def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
+    """What some code has read so far in this process, but for its sources.
 
     Args:
         sources: its files.
         homes: folders that may lie elsewhere another time.
 
     Returns:
-        File or folder -> digests of what it held.  It is told from the current folder where it was asked for so, else
-        from the first of `homes` that lies beside it or above, but for the system's root.
+        File or folder -> a digest of what it held, and its absolute path.  It is told from the current folder, without
+        that path, where it was asked for so and still lies there, else from the first of `homes` that lies beside it or
+        above, but for the system's root.
     """
-    own = {path: [held for by, held in list(heard.items()) if by & sources] for path, heard in list(_HEARD.items())}
-    return {_place(path, homes): held[-1] for path, held in own.items() if held}
+    told = dict[str, list[str]]()
+    for (path, whole), heard in list(HEARD.items()):
+        held = [held for by, held in list(heard.items()) if by & (sources | {_ANYBODY})]
+        if held and whole not in sources:
+            here = not os.path.isabs(path) and os.path.abspath(path) == whole
+            now = _held(whole) if held[-1].startswith(_UNREAD) and held[-1] == _seen(whole) else held[-1]
+            told[path if here else _place(whole, homes)] = [now, "" if here else whole]
+    return told
 
 
-def changed(read: Mapping[str, str], homes: Sequence[Path]) -> list[str]:
-    """Files and folders of `reads` that hold something else by now."""
-    paths = {_path(place, homes): held for place, held in read.items()}
-    return [path for path, held in paths.items() if _held(path) != held]
+def changed(told: Mapping[str, Sequence[str]], homes: Sequence[Path]) -> list[str]:
+    """Files and folders of `reads` that hold something else by now, from here or where they lay then."""
+    paths = [(path, one[0]) for place, one in told.items() for path in _paths(place, one[1], homes)]
+    return [path for path, held in paths if _held(path) != held]
 
 
 def _place(path: str, homes: Sequence[Path]) -> str:
-    for i, home in enumerate(homes if os.path.isabs(path) else ()):
+    for i, home in enumerate(homes):
         with suppress(ValueError):  # of another drive
             if os.path.commonpath([path, home]) != home.anchor:
                 return f"{i}:{os.path.relpath(path, home)}"
@@ -96,6 +129,10 @@ def _path(place: str, homes: Sequence[Path]) -> str:
     return os.path.normpath(os.path.join(*homes[int(number) :][:1], within))
 
 
+def _paths(place: str, whole: str, homes: Sequence[Path]) -> list[str]:
+    return [_path(place, homes), *([whole] if os.path.exists(whole) else [])]
+
+
 def _held(path: str) -> str:
     """A digest of a file, or of the names of a folder's data files; empty if neither is there."""
     with suppress(OSError, InputError):
@@ -106,53 +143,88 @@ def _held(path: str) -> str:
     return ""
 
 
+def _seen(path: str) -> str:
+    """What a file or folder holds; of a large file only what tells whether it has changed."""
+    with suppress(OSError):
+        told = os.stat(path)
+        if told.st_size >= LARGE:
+            return f"{_UNREAD}{told.st_size} {told.st_mtime_ns} {told.st_ino}"
+    return _held(path)
+
+
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    if event not in ("open", "os.listdir", "os.rename", "os.scandir") or isinstance(arguments[0], int):
+    runs = event == "exec" and getattr(arguments[0], "co_name", "") == "<module>"
+    path = arguments[0].co_filename if runs else arguments[_EVENTS[event]] if event in _EVENTS else 0
+    if isinstance(path, int):  # an open file, or nothing that is heard
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
-        path = os.path.normpath(os.fsdecode(arguments[event == "os.rename"] or "."))
+        path = os.path.normpath(os.fsdecode(path or "."))
         whole = os.path.abspath(path)
         if whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
             return
         by, called = _by(event)
-        if event == "os.rename" or (event == "open" and _writes(*arguments[1:])):
-            if called:
-                _WRITTEN.add(whole)
-                for known in (_HEARD, *_COMPUTING):
-                    for name in (path, whole):
-                        known.pop(name, None)
-        elif by and whole not in _WRITTEN:
-            heard = _HEARD.setdefault(path, {})
+        read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
+        if not read and called:
+            _forget(whole, *_COMPUTING)
+        elif read and by and whole not in _WRITTEN:
+            heard = HEARD.setdefault((path, whole), {})
             heard.pop(by, None)
-            heard[by] = now = _held(path)
+            heard[by] = now = _seen(whole)
+            _BOTH.update([whole] if written else [])
             for cell in _COMPUTING:
-                cell.setdefault(path, set()).update([now] if event == "open" else [])
+                cell.setdefault((path, whole), set()).update([now] if event == "open" else [])
 
 
-def _writes(mode: str | None, flags: int) -> bool:
-    """Whether a file is opened to be written, whether or not to be read as well."""
-    return bool({*mode} & {*"wxa+"}) if mode else flags & (os.O_WRONLY | os.O_RDWR) != 0
+def _access(mode: str | None, flags: int) -> tuple[bool, bool]:
+    """Whether a file is opened to be read as it is, and whether to be written."""
+    if mode:
+        return "r" in mode, bool({*mode} & {*"wxa+"})
+    kind = flags & (os.O_RDONLY | os.O_WRONLY | os.O_RDWR)
+    return kind != os.O_WRONLY and not flags & (os.O_TRUNC | os.O_APPEND), kind != os.O_RDONLY
+
+
+def _forget(whole: str, *cells: dict[Asked, set[str]]) -> None:
+    """A file is written by the user's code itself: whatever it reads there is no data."""
+    _WRITTEN.add(whole)
+    for known in (HEARD, *cells):
+        for asked in [one for one in known if one[1] == whole]:
+            del known[asked]
 
 
 def _by(event: str) -> tuple[frozenset[str], bool]:
     """Files of the user's code that does what happens, with its libraries or by what this package reads for it: within
     a call of this package's, which is told, too, as one of its modules is imported, or in its script.  None if others
-    do it, or Python's import itself, which sources tell."""
-    frame, users = sys._getframe(2), set[str]()
-    for_others = frame.f_code.co_filename == files.__file__
+    do it, or Python's import itself, which sources tell.
+
+    A thread that nobody's call leads to does it for the user's code that other threads are in.
+    """
+    mine, by, called = threading.get_ident(), *_users(sys._getframe(2), event)
+    if by is None and mine == threading.main_thread().ident:
+        return frozenset(), False
+    if by is None:
+        frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
+        others = [(users, whether) for users, whether in map(_users, frames) if users]
+        by = frozenset().union(*(users for users, _ in others)) or None
+        called = any(whether for _, whether in others)
+    return (frozenset({_ANYBODY} if _COMPUTING else ()), False) if by is None else (by, called)
+
+
+def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str] | None, bool]:
+    """As `_by`, of the thread that is in a frame alone; None if no call leads there."""
+    users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
     while frame is not None:
         name, file = frame.f_code.co_name, frame.f_code.co_filename
         whose = _whose(file)
-        if whose == "import's" and not users and (event != "open" or name == "_find_and_load"):
+        if whose == "import's" and event != "exec" and not users and (event != "open" or name == "_find_and_load"):
             return frozenset(), False
         if whose == "ours" and (users or not for_others or file in _KEEPS):
             return frozenset(users), bool(users)
-        if whose == "user's":
+        if whose == "user's" or file in as_run.FOLLOWED:
             users.add(file)
             if name == "<module>" and frame.f_globals.get("__name__"):
                 return frozenset(users), False
         frame = frame.f_back
-    return frozenset(users if _COMPUTING else ()), False
+    return None, False
 
 
 @lru_cache(maxsize=10_000)
@@ -178,7 +250,7 @@ def _note_before() -> None:
             for folder in filter(os.path.isdir, folders):
                 for name in (text for text in texts if text.lower().endswith(DATA)):
                     path = os.path.normpath(os.path.join(folder, name))
-                    _HEARD.setdefault(path, {})[frozenset({file})] = _held(path)
+                    HEARD.setdefault((path, os.path.abspath(path)), {})[frozenset({file})] = _seen(path)
 
 
 def _texts(source: bytes, last: int) -> set[str]:

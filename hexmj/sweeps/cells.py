@@ -15,7 +15,7 @@ from hexmj.as_run import is_users
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.files import digest
-from hexmj.reads import changed, computing, reads
+from hexmj.reads import HEARD, changed, computing, reads
 from hexmj.sweeps.code import code, source_files
 from hexmj.sweeps.plain import classes, label, plain
 
@@ -56,7 +56,7 @@ class Cell:
         asked = signature(self.function).parameters
         with computing() as read:
             made = self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
-        if twice := [file for file, held in read.items() if len(held) > 1]:
+        if twice := [path for (path, _), held in read.items() if len(held) > 1]:
             raise InputError(f"{self.name}: {twice[0]} has changed while it was in use; start again")
         return made
 
@@ -77,12 +77,16 @@ class Cell:
         return ""
 
     def reads(self) -> str:
-        """What its code has read so far in this process, as JSON; see `reads.reads`."""
-        return json.dumps(reads(source_files(frozenset(self._modules())), self._homes()), sort_keys=True)
+        """What its code has read so far in this process, as JSON; see `reads.reads`.  Nothing if it has no source."""
+        with suppress(InputError):
+            if HEARD:
+                return json.dumps(reads(source_files(frozenset(self._modules())), self._homes()), sort_keys=True)
+        return "{}"
 
     def edited(self, told: str, known: str = "{}") -> list[str]:
         """Files and folders of `reads` that hold something else by now, but for those of which others know the same."""
-        return changed(dict(json.loads(told).items() - json.loads(known).items()), self._homes())
+        same = json.loads(known)
+        return changed({place: one for place, one in json.loads(told).items() if same.get(place) != one}, self._homes())
 
     def _homes(self) -> list[Path]:
         """Folders that a user's own modules lie in, and the current one."""

@@ -127,6 +127,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
             sources[module_label(name)] = module.digest
             read.append((name, file, module.data))
             ours = top == PACKAGE.name
+            as_run.FOLLOWED.update([] if ours else [str(file)])
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
             waiting += inner

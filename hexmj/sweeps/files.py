@@ -24,8 +24,11 @@ READ = "read"
 """Attribute of the file, or first word of a ledger's line: what was read as it was made, as JSON; see `Cell.reads`."""
 
 
-def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> "xr.Dataset":
-    """Keep a cell with the record of what it depends on and with what it read, and give its data as they will be read.
+def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> tuple["xr.Dataset", str]:
+    """Keep a cell with the record of what it depends on and with what it read.
+
+    Returns:
+        Its data as they will be read, and what it read.
 
     Args:
         path: of the file, unless it is taken by the same cell of other reads.
@@ -43,20 +46,20 @@ def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> "xr.Data
         path = path.with_name(f"{path.stem}.{digest(told.encode())}.nc")
     content = netcdf.encode(data.assign_attrs({RECORD: record, READ: told}))
     write_whole(path, sealed(content))
-    return _decode(path, content, record)[0]
+    return _decode(path, content, record)
 
 
-def find(path: Path, cell: "Cell", record: str) -> "xr.Dataset | None":
-    """The data of a kept cell, if there is one, and all that it read is as it was; arguments as of `write`.
+def find(path: Path, cell: "Cell", record: str) -> tuple["xr.Dataset", str] | None:
+    """As `write` has given them, if there is a kept cell, and all that it read is as it was; arguments as there.
 
     Raises:
         InputError: it cannot be read, is damaged, or has another record.
     """
     if path.exists():
         for one in (path, *sorted(path.parent.glob(f"{escape(path.stem)}.*.nc"))):
-            data, told = _decode(one, read_sealed(one), record)
-            if not cell.edited(told):
-                return data
+            kept = _decode(one, read_sealed(one), record)
+            if not cell.edited(kept[1]):
+                return kept
     return None
 
 

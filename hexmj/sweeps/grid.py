@@ -1,5 +1,6 @@
 """Cells computed one after another or on any executor, kept as they finish, and put together along named axes."""
 
+import json
 import math
 import os
 import pickle
@@ -22,6 +23,9 @@ from hexmj.sweeps.files import find, write
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    Made = tuple[xr.Dataset, str]
+    """The data of a cell, and what it read; see `Cell.reads`."""
 
 
 class Study(Protocol):
@@ -90,21 +94,24 @@ def finish(
         finished_all = all(path and os.path.exists(path) for path in paths)
         (remove_leftovers if finished_all else prepare)(folder)
     whole = sum(cell.work for cell in cells)
-    told = [0.0] * len(cells)
+    told, read = [0.0] * len(cells), dict[str, Any]()
 
     def tell(i: int, done: float) -> None:
         told[i] += done
         if progress:
             progress(done * cells[i].work / whole)
 
-    def finished(i: int, data: "xr.Dataset") -> tuple[int, "xr.Dataset"]:
+    def finished(i: int, made: "Made") -> tuple[int, "xr.Dataset"]:
+        data, by_it = made
+        for place, held in json.loads(by_it).items():
+            if read.setdefault(place, held) != held:
+                raise InputError(f"{cells[i].name}: {held[1] or place} has changed while it was in use; start again")
         tell(i, 1.0 - told[i])
         return i, data
 
     if executor is None:
         for i, cell in enumerate(cells):
-            done = _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i))
-            yield finished(i, done)
+            yield finished(i, _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i)))
     else:
         waiting = list[int]()
         for i, path in enumerate(paths):
@@ -113,10 +120,15 @@ def finish(
             else:
                 waiting.append(i)
         parcels = [
-            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), cells[i].reads(), paths[i], threads or 1)
-            for i in waiting
+            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting
         ]
         for j, done in _by_others(executor, parcels, folder):
+            cell = cells[waiting[j]]
+            if other := [file for file in cell.edited(done[1], cell.reads()) if os.path.exists(file)]:
+                raise InputError(
+                    f"{cell.name}: a worker has read another {other[0]} than is here; start the workers again, in the"
+                    " same folder"
+                )
             yield finished(waiting[j], done)
     if folder:
         remove_leftovers(folder)  # once more: workers of one that was killed may have outlived its begin
@@ -141,7 +153,7 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     return whole
 
 
-def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.Dataset":
+def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
@@ -150,7 +162,7 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "xr.D
     before = record if path else cell.settings_now()
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    return write(path, cell, record, data) if path else data
+    return write(path, cell, record, data) if path else (data, cell.reads())
 
 
 @dataclass(frozen=True)
@@ -159,15 +171,13 @@ class _Parcel:
 
     pickled: bytes
     record: str
-    read: str
-    """By the sender's process; see `Cell.reads`."""
     path: Path | None
     threads: int
     mark: Path | None = None
     """A file of the folder, which is there as long as somebody waits for the cell."""
 
-    def compute(self) -> "xr.Dataset":
-        """The cell's data, by a worker that sees what the cell was sent from: files, code, packages and folder."""
+    def compute(self) -> "Made":
+        """The cell, by a worker that sees what the cell was sent from: files, code, packages and folder."""
         here = f"a worker on {socket.gethostname()}"
         try:
             cell = pickle.loads(self.pickled)
@@ -187,17 +197,12 @@ class _Parcel:
             raise InputError(
                 f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
             )
-        data = _made(cell, self.path, record, threads=self.threads)
-        if files := [file for file in cell.edited(cell.reads(), self.read) if os.path.exists(file)]:
-            raise InputError(f"{cell.name}: {files[0]} has changed since {here} read it; start the worker again")
-        return data
+        return _made(cell, self.path, record, threads=self.threads)
 
 
-def _by_others(
-    executor: Executor, parcels: Sequence[_Parcel], folder: Path | None
-) -> Iterator[tuple[int, "xr.Dataset"]]:
+def _by_others(executor: Executor, parcels: Sequence[_Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
-    futures: dict[Future[xr.Dataset], int] = {}
+    futures: dict[Future[Made], int] = {}
     with marked(folder.absolute()) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in enumerate(parcels):
@@ -220,7 +225,7 @@ def _by_others(
                 future.cancel()
 
 
-def _submitted(executor: Executor, parcel: _Parcel) -> "Future[xr.Dataset]":
+def _submitted(executor: Executor, parcel: _Parcel) -> "Future[Made]":
     if has_given_up(executor):
         raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:
