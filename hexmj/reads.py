@@ -6,6 +6,7 @@ that ran before, what their texts name is noted then.
 
 import ast
 import os
+import re
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence, Set
@@ -26,6 +27,9 @@ DATA = (
     *(".npy", ".npz", ".pt", ".pkl"),
 )
 """Ends of the names of data files, in small letters or capitals."""
+
+_METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
+"""In the names of files by which Python and libraries look for what is installed."""
 
 _OURS = f"{Path(__file__).parent}{os.sep}"
 _KEEPS = __file__, *(f"{_OURS}sweeps{os.sep}{one}.py" for one in ("cells", "files", "kept_values"))
@@ -160,7 +164,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     with suppress(Exception):  # of whoever opens something, wherever in the process
         path = os.path.normpath(os.fsdecode(path or "."))
         whole = os.path.abspath(path)
-        if whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
+        if path.startswith("<") or whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
             return
         by, called = _by(event)
         read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
@@ -172,7 +176,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             heard[by] = now = _seen(whole)
             _BOTH.update([whole] if written else [])
             for cell in _COMPUTING:
-                cell.setdefault((path, whole), set()).update([now] if event == "open" else [])
+                cell.setdefault((path, whole), set()).update([] if event in _QUIET else [now])
 
 
 def _access(mode: str | None, flags: int) -> tuple[bool, bool]:
@@ -232,7 +236,7 @@ def _whose(file: str) -> str:
     """Whose the code of a file is."""
     if file.startswith(_OURS):
         return "ours"
-    if file.startswith("<frozen importlib"):
+    if file.startswith("<frozen importlib") or _METADATA.search(file):
         return "import's"
     return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
 

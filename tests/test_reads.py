@@ -3,10 +3,12 @@
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,7 @@ from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import ENVIRONMENT
 
 READER = """
-import json, os
+import importlib, json, os, sqlite3
 from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 from pathlib import Path
@@ -51,6 +53,10 @@ def write_all(gain: str, at: str = "one") -> None:
     Path(at, "gain").write_text(gain)
     Path(at, "gain.json").write_text(gain)
     np.save(Path(at, "gain.npy"), float(gain))
+    np.array([float(gain)]).tofile(Path(at, "gain.bin"))
+    Path(at, "gain.db").unlink(missing_ok=True)
+    with closing(sqlite3.connect(Path(at, "gain.db"))) as data, data:
+        data.executescript(f"create table told (gain); insert into told values ({gain})")
     hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
 
 
@@ -81,6 +87,10 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
         'len(os.listdir(at)) + json.loads(Path(at, "gain" + ".json").read_text())',
         'ThreadPoolExecutor(1).submit(lambda: float(Path(at, "gain").read_text())).result()',
         'eval(compile(Path(at + "/gain").read_bytes(), "<text>", "eval"))',
+        'list(ThreadPoolExecutor(1).map(np.loadtxt, [f"{at}/gain"]))[0]',
+        'np.memmap(f"{at}/gain.bin", float)[0]',
+        '[os.chdir(at), float(Path("gain").read_text()), os.chdir("..")][1]',
+        'sqlite3.connect(f"{at}/gain.db").execute("select gain from told").fetchone()[0]',
         'float(hexmj.load(f"{at}/gain.nc").gain)',
     ],
 )
@@ -204,6 +214,51 @@ def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
     assert not [file for file in (tmp_path / "kept").iterdir() if b"kept/" in file.read_bytes()]
 
 
+FAR_FETCHED = """
+import importlib, pkgutil
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np, xarray as xr
+import installed
+with ThreadPoolExecutor(1) as threads:
+    (ONE,) = threads.map(np.loadtxt, ["one"])
+(TWO,) = [importlib.import_module(f"pk.{found.name}").TWO for found in pkgutil.iter_modules(__path__)]
+def cell(three):
+    return xr.Dataset({"gain": ONE + TWO + three.of("three")})
+"""
+
+INSTALLED = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Reads:
+    def of(self, name):
+        with open(name) as file:
+            return float(file.read())
+"""
+
+FAR_SCRIPT = """
+from pathlib import Path
+import installed
+from hexmj.sweeps import Cell, run
+from pk import cell
+if __name__ == "__main__":
+    print(run([Cell("far", cell, {"three": installed.Reads()})], Path("kept"))[0].gain.item())
+"""
+
+
+def test_reads_in_threads_by_an_installed_class_and_of_modules_that_are_found_count(tmp_path: Path) -> None:
+    for folder in ("pk", "site-packages"):
+        (tmp_path / folder).mkdir()
+    for name, text in (("pk/__init__", FAR_FETCHED), ("site-packages/installed", INSTALLED), ("script", FAR_SCRIPT)):
+        (tmp_path / f"{name}.py").write_text(text)
+    env = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}site-packages"}
+    for gains, kept in (((1, 2, 3), 1), ((1, 2, 3), 1), ((7, 2, 3), 2), ((7, 8, 3), 3), ((7, 8, 9), 4), ((1, 2, 3), 4)):
+        for name, gain in zip(("one", "pk/part.py", "three"), gains, strict=True):
+            (tmp_path / name).write_text(f"TWO = {gain}" if name.endswith(".py") else str(gain))
+        (tmp_path / f"{gains}.json").write_text("neither read nor listed")
+        told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=env)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (sum(gains), kept)
+
+
 BEFORE = """
 import numpy as np
 from pathlib import Path
@@ -296,6 +351,39 @@ def test_a_worker_that_remembers_what_its_sender_does_is_not_refused(
         for calls in (1, 2):
             assert computed(gain, executor=threads) == (1.0, calls)
             Path("one/gain").write_text("7.0")
+
+
+def test_cells_of_one_run_have_to_have_read_the_same(computed: Callable[..., tuple[float, int]]) -> None:
+    computed('float(Path("one", "gain").read_text())')
+    cells = [Cell(name, importable("reader.py").cell, {"at": name}) for name in ("first", "second")]
+    with pytest.raises(InputError, match=r"^second: .*one.gain has changed while it was in use; start again$"):
+        run(cells, Path("both"), progress=lambda _: os.system("echo 9 >> one/gain") and None)
+    first, second = run(cells, Path("both"))
+    assert first.gain == second.gain != 1.0
+
+
+def test_a_copied_project_reads_what_its_code_opens(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:
+    gain = f"float(Path({str(tmp_path / 'one')!r}, 'gain').read_text())"
+    assert computed(gain) == (1.0, 1)
+    copy = shutil.copytree(tmp_path, tmp_path / "copy")
+    Path("one/gain").write_text("7.0")
+    os.chdir(copy)
+    assert run([Cell("reader", importable("reader.py").cell, {"at": "one"})], Path("kept"))[0].gain == 7.0
+
+
+def test_a_large_file_is_not_read_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reads, "LARGE", 1000)
+    monkeypatch.chdir(tmp_path)
+    text = "with open('large') as file:\n        return xr.Dataset({'gain': file.read(1)})"
+    Path("begins.py").write_text(f"import xarray as xr\ndef cell():\n    {text}")
+    begins, digests = importable("begins.py"), reads.digest_of
+    monkeypatch.setattr(reads, "digest_of", lambda path: read.append(path) or digests(path))
+    for letter, kept in (("a", 1), ("a", 1), ("b", 2)):
+        Path("large").write_text(letter * 1000)
+        read: list[Path] = []
+        assert begins.cell().gain == letter and read == []
+        assert run([Cell("begins", begins.cell, {})], Path("kept"))[0].gain == letter
+        assert len(list(Path("kept").iterdir())) == kept
 
 
 def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:
