@@ -1,7 +1,7 @@
 """Files and folders that a user's code reads while this package calls it, or while its modules run.
 
 No source has to name them: they are noted as they are opened, from the first import of this package on.  Of modules
-that ran before, what their texts name is noted then.
+that ran before, what their texts name is noted then; of any, the MJCFs, which are opened where nobody hears it.
 """
 
 import ast
@@ -27,6 +27,12 @@ DATA = (
     *(".npy", ".npz", ".pt", ".pkl"),
 )
 """Ends of the names of data files, in small letters or capitals."""
+
+MJCF = ".xml", ".mjcf", ".mjb"
+"""Those of what MuJoCo opens."""
+
+DEEPEST = 2
+"""Number of folders that texts name, one within the other."""
 
 _METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
 """In the names of files by which Python and libraries look for what is installed."""
@@ -166,6 +172,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         whole = os.path.abspath(path)
         if path.startswith("<") or whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
             return
+        if runs:
+            _note_named(whole, as_run.RUN[whole][-1], 0)
         by, called = _by(event)
         read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
         if not read and called:
@@ -241,26 +249,30 @@ def _whose(file: str) -> str:
     return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
 
 
+def _note_named(file: str, source: bytes, reached: int) -> None:
+    """Note what nobody hears of the code of a file: data files that its texts name up to the line that it has reached,
+    which may have been read before, and MJCFs, which MuJoCo opens by itself.  They are looked for beside it, in the
+    current folder, and in folders within these that other texts name."""
+    texts = dict[str, int]()
+    for one in ast.walk(parsed(source)):
+        if isinstance(one, ast.Constant) and isinstance(one.value, str):
+            for text in (one.value, one.value.lstrip("/")):  # of a formatted one, what stands after its folder
+                texts.setdefault(text, one.lineno)
+    names = [text for text, line in texts.items() if text.lower().endswith(DATA if line <= reached else MJCF)]
+    new = {os.path.dirname(file), os.path.dirname(os.path.realpath(file)), "."} if names else set[str]()
+    for _ in range(1 + DEEPEST):
+        for path in {os.path.normpath(os.path.join(folder, name)) for folder in new for name in names}:
+            HEARD.setdefault((path, os.path.abspath(path)), {})[frozenset({file})] = _seen(path)
+        new = {within for folder in new for text in texts if os.path.isdir(within := os.path.join(folder, text))}
+
+
 def _note_before() -> None:
-    """Note what modules that ran before may have read: data files that texts name in what has run of them, beside them,
-    in the current folder, or in a folder that another text names there."""
+    """Note what modules that ran before may have read."""
     stack = walk_stack(sys._getframe())
     reached = {frame.f_code.co_filename: line for frame, line in stack if frame.f_code.co_name == "<module>"}
     for file, (source, *_) in as_run.RUN.items():
         with suppress(SyntaxError, ValueError):  # of what is no Python
-            texts = _texts(source, reached.get(file, sys.maxsize))
-            homes = os.path.dirname(file), os.path.dirname(os.path.realpath(file)), "."
-            folders = {os.path.normpath(os.path.join(home, text)) for home in homes for text in ("", *texts)}
-            for folder in filter(os.path.isdir, folders):
-                for name in (text for text in texts if text.lower().endswith(DATA)):
-                    path = os.path.normpath(os.path.join(folder, name))
-                    HEARD.setdefault((path, os.path.abspath(path)), {})[frozenset({file})] = _seen(path)
-
-
-def _texts(source: bytes, last: int) -> set[str]:
-    """Texts in a source up to its last line that has run, alone or after a folder in a formatted one."""
-    nodes = [one for one in ast.walk(parsed(source)) if isinstance(one, ast.Constant) and one.lineno <= last]
-    return {part for one in nodes if isinstance(one.value, str) for part in (one.value, one.value.lstrip("/"))}
+            _note_named(file, source, reached.get(file, sys.maxsize))
 
 
 _note_before()

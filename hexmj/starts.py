@@ -76,10 +76,15 @@ def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
 
 def _in_order(starts: Any) -> Any:
     """Starts as (start, leg), the legs as `LEGS` has them where a DataArray or DataFrame labels them."""
+    labels = [*getattr(starts, "columns", ())]
     if "leg" in getattr(starts, "dims", ()):
         starts = starts.transpose(..., "leg")
-        return starts.sel(leg=[*LEGS]) if "leg" in starts.coords else starts
-    return starts[[*LEGS]] if set(LEGS) == set(getattr(starts, "columns", ())) else starts
+        labels = [*starts.coords["leg"].values] if "leg" in starts.coords else []
+    if not any(isinstance(label, str) for label in labels):
+        return starts
+    if sorted(map(str, labels)) != sorted(LEGS):
+        raise InputError(f"starts of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
+    return np.asarray(starts)[:, [labels.index(leg) for leg in LEGS]]
 
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:

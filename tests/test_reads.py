@@ -31,6 +31,7 @@ from pathlib import Path
 import hexmj
 import numpy as np
 import xarray as xr
+from hexmj import load_controller
 
 def cell(at):
     with open("calls", "a") as file:
@@ -48,6 +49,17 @@ def value(rows, at):
 """
 
 
+BASE = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Waits:
+    name: str = "waits"
+    waits: float = {}
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        raise NotImplementedError
+"""
+
+
 def write_all(gain: str, at: str = "one") -> None:
     """Into every file of the folder."""
     Path(at, "gain").write_text(gain)
@@ -58,6 +70,7 @@ def write_all(gain: str, at: str = "one") -> None:
     with closing(sqlite3.connect(Path(at, "gain.db"))) as data, data:
         data.executescript(f"create table told (gain); insert into told values ({gain})")
     hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
+    Path(at, "base.py").write_text(BASE.format(gain))
 
 
 @pytest.fixture
@@ -92,6 +105,7 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
         '[os.chdir(at), float(Path("gain").read_text()), os.chdir("..")][1]',
         'sqlite3.connect(f"{at}/gain.db").execute("select gain from told").fetchone()[0]',
         'float(hexmj.load(f"{at}/gain.nc").gain)',
+        'load_controller(f"{at}/base.py:Waits").waits',
     ],
 )
 def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tuple[float, int]], gain: str) -> None:
@@ -219,12 +233,16 @@ import importlib, pkgutil
 from concurrent.futures import ThreadPoolExecutor
 import numpy as np, xarray as xr
 import installed
+import mujoco
 with ThreadPoolExecutor(1) as threads:
     (ONE,) = threads.map(np.loadtxt, ["one"])
 (TWO,) = [importlib.import_module(f"pk.{found.name}").TWO for found in pkgutil.iter_modules(__path__)]
 def cell(three):
-    return xr.Dataset({"gain": ONE + TWO + three.of("three")})
+    return xr.Dataset({"gain": ONE + TWO + three.of("three") + mujoco.MjModel.from_xml_path("four.xml").body_mass[1]})
 """
+
+FEW, MANY = (1, 2, 3, 4), (7, 8, 9, 10)
+FOUR = '<mujoco><worldbody><body><geom size="1" mass="{}"/></body></worldbody></mujoco>'
 
 INSTALLED = """
 from dataclasses import dataclass
@@ -251,9 +269,18 @@ def test_reads_in_threads_by_an_installed_class_and_of_modules_that_are_found_co
     for name, text in (("pk/__init__", FAR_FETCHED), ("site-packages/installed", INSTALLED), ("script", FAR_SCRIPT)):
         (tmp_path / f"{name}.py").write_text(text)
     env = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}site-packages"}
-    for gains, kept in (((1, 2, 3), 1), ((1, 2, 3), 1), ((7, 2, 3), 2), ((7, 8, 3), 3), ((7, 8, 9), 4), ((1, 2, 3), 4)):
-        for name, gain in zip(("one", "pk/part.py", "three"), gains, strict=True):
-            (tmp_path / name).write_text(f"TWO = {gain}" if name.endswith(".py") else str(gain))
+    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "four.xml": FOUR}
+    for gains, kept in (
+        (FEW, 1),
+        (FEW, 1),
+        ((7, 2, 3, 4), 2),
+        ((7, 8, 3, 4), 3),
+        ((7, 8, 9, 4), 4),
+        (MANY, 5),
+        (FEW, 5),
+    ):
+        for (name, text), gain in zip(texts.items(), gains, strict=True):
+            (tmp_path / name).write_text(text.format(gain))
         (tmp_path / f"{gains}.json").write_text("neither read nor listed")
         told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=env)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (sum(gains), kept)
@@ -263,7 +290,7 @@ BEFORE = """
 import numpy as np
 from pathlib import Path
 HERE = Path(__file__).parent
-GAIN = np.load(f"{HERE}/data" + "/gain.npy")
+GAIN = np.load(f"{HERE}/data" + "/of" + "/gain.npy")
 """
 
 IMPORTS_BEFORE = """
@@ -283,7 +310,7 @@ if __name__ == "__main__":
 
 
 def test_what_was_read_before_the_package_was_imported_counts_if_it_is_named(tmp_path: Path) -> None:
-    (data := tmp_path / "lib" / "data").mkdir(parents=True)
+    (data := tmp_path / "lib" / "data" / "of").mkdir(parents=True)
     (tmp_path / "lib" / "before.py").write_text(BEFORE)
     (tmp_path / "script.py").write_text(IMPORTS_BEFORE)
     for helpers, own, calls in ((1.0, 10.0, 1), (1.0, 10.0, 1), (2.0, 10.0, 2), (2.0, 20.0, 3)):
@@ -357,7 +384,7 @@ def test_cells_of_one_run_have_to_have_read_the_same(computed: Callable[..., tup
     computed('float(Path("one", "gain").read_text())')
     cells = [Cell(name, importable("reader.py").cell, {"at": name}) for name in ("first", "second")]
     with pytest.raises(InputError, match=r"^second: .*one.gain has changed while it was in use; start again$"):
-        run(cells, Path("both"), progress=lambda _: os.system("echo 9 >> one/gain") and None)
+        run(cells, Path("both"), progress=lambda _: print(os.system("echo 9 >> one/gain")))
     first, second = run(cells, Path("both"))
     assert first.gain == second.gain != 1.0
 

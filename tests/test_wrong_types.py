@@ -310,6 +310,10 @@ def test_labelled_legs_may_come_in_any_order():
     for given in (labelled.sel(leg=shuffled), labelled.T, table[shuffled], labelled.drop_vars("leg").T):
         assert np.array_equal(walk(given).x, walk(starts).x)
     assert not np.array_equal(walk(labelled.sel(leg=shuffled).to_numpy()).x, walk(starts).x)
+    assert np.array_equal(walk(labelled.assign_coords(leg=range(6))).x, walk(starts).x)
+    for labels in ([*"abcdef"], [*LEGS[:5], "L1"]):
+        with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
+            walk(labelled.assign_coords(leg=labels))
 
 
 def test_states_may_be_given_as_0_and_1():
