@@ -204,39 +204,36 @@ def _forget(whole: str, *cells: dict[Asked, set[str]]) -> None:
 
 
 def _by(event: str) -> tuple[frozenset[str], bool]:
-    """Files of the user's code that does what happens, with its libraries or by what this package reads for it: within
-    a call of this package's, which is told, too, as one of its modules is imported, or in its script.  None if others
-    do it, or Python's import itself, which sources tell.
+    """Files of the user's code that does what happens, with its libraries or by what this package reads for it, and
+    whether this package has called it.  None if others do it, or Python's import itself, which sources tell.
 
-    A thread that nobody's call leads to does it for the user's code that other threads are in.
+    A thread that neither this package's call nor a module leads to does it for the code that other threads are in, too.
     """
-    mine, by, called = threading.get_ident(), *_users(sys._getframe(2), event)
-    if by is None and mine == threading.main_thread().ident:
-        return frozenset(), False
-    if by is None:
+    mine, (by, called, led) = threading.get_ident(), _users(sys._getframe(2), event)
+    if not led and mine != threading.main_thread().ident:
         frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
-        others = [(users, whether) for users, whether in map(_users, frames) if users]
-        by = frozenset().union(*(users for users, _ in others)) or None
+        others = [(users, whether) for users, whether, led in map(_users, frames) if led]
+        by = by.union(*(users for users, _ in others)) or frozenset({_ANYBODY} if _COMPUTING else ())
         called = any(whether for _, whether in others)
-    return (frozenset({_ANYBODY} if _COMPUTING else ()), False) if by is None else (by, called)
+    return by, called
 
 
-def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str] | None, bool]:
-    """As `_by`, of the thread that is in a frame alone; None if no call leads there."""
+def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bool, bool]:
+    """As `_by`, of the thread that is in a frame alone, and whether this package's call or a module leads there."""
     users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
     while frame is not None:
         name, file = frame.f_code.co_name, frame.f_code.co_filename
         whose = _whose(file)
         if whose == "import's" and event != "exec" and not users and (event != "open" or name == "_find_and_load"):
-            return frozenset(), False
+            return frozenset(), False, True
         if whose == "ours" and (users or not for_others or file in _KEEPS):
-            return frozenset(users), bool(users)
+            return frozenset(users), bool(users), True
         if whose == "user's" or file in as_run.FOLLOWED:
             users.add(file)
             if name == "<module>" and frame.f_globals.get("__name__"):
-                return frozenset(users), False
+                return frozenset(users), False, True
         frame = frame.f_back
-    return None, False
+    return frozenset(users), False, False
 
 
 @lru_cache(maxsize=10_000)

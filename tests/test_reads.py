@@ -320,6 +320,33 @@ def test_what_was_read_before_the_package_was_imported_counts_if_it_is_named(tmp
         assert (float(told), (tmp_path / "calls").stat().st_size) == (helpers + own, calls)
 
 
+WARMED = """
+import threading
+from functools import cache
+from pathlib import Path
+import xarray as xr
+from hexmj.sweeps import Cell, run
+@cache
+def gain(name):
+    return float(Path(name).read_text())
+def cell():
+    return xr.Dataset({"gain": gain("ga" + "in")})
+"""
+
+
+def test_what_a_thread_has_read_before_the_sweep_counts(tmp_path: Path) -> None:
+    (tmp_path / "warmed.py").write_text(WARMED)
+    (tmp_path / "script.py").write_text(
+        "import threading, warmed\nfrom pathlib import Path\nfrom hexmj.sweeps import Cell, run\n"
+        "thread = threading.Thread(target=warmed.gain, args=['gain'])\nthread.start()\nthread.join()\n"
+        "print(run([Cell('warmed', warmed.cell, {})], Path('kept'))[0].gain.item())"
+    )
+    for gain, kept in ((1.0, 1), (2.0, 2), (1.0, 2)):
+        (tmp_path / "gain").write_text(str(gain))
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+
+
 def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(
         "from hexmj.sweeps import Cell, run\nfrom pathlib import Path\nimport xarray as xr\n"
