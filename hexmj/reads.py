@@ -20,6 +20,7 @@ from typing import Any
 from hexmj import as_run, files
 from hexmj.errors import InputError
 from hexmj.files import digest, digest_of
+from hexmj.mjcf import parts
 from hexmj.parsing import parsed
 
 DATA = (
@@ -37,6 +38,9 @@ DEEPEST = 2
 _METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
 """In the names of files by which Python and libraries look for what is installed."""
 
+_CACHES = re.compile(r"__pycache__|\.nb[ic]$")
+"""In the names of what Python and numba keep of their own."""
+
 _OURS = f"{Path(__file__).parent}{os.sep}"
 _KEEPS = __file__, *(f"{_OURS}sweeps{os.sep}{one}.py" for one in ("cells", "files", "kept_values"))
 """What names cells and keeps them: it opens nothing for the user's code."""
@@ -49,6 +53,9 @@ LARGE = 2**26
 
 _UNREAD = "unread "
 """Begins what is noted of a large file instead of a digest: its size and times."""
+
+_CHANGED = "changed"
+"""Stands for what a file held that was opened to be read and written, and changed: no file ever holds that."""
 
 _ANYBODY = "anybody"
 """Stands for the code of a thread in which nothing is a user's, while cells are computed."""
@@ -79,8 +86,8 @@ _QUIET = "exec", "os.listdir", "os.scandir"
 def computing() -> Iterator[dict[Asked, set[str]]]:
     """Meanwhile threads of the user's own count as called by this package; gives what each file held as it was read.
 
-    What was read meanwhile, and is gone in the end, was made on the way; what was opened to be written as well, and
-    holds something else in the end, was written: both are forgotten.
+    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.  Of what was opened to be
+    written as well, and holds something else in the end, nobody knows who has changed it: what read it is made anew.
     """
     held: dict[Asked, set[str]] = {}
     _COMPUTING.append(held)
@@ -93,7 +100,8 @@ def computing() -> Iterator[dict[Asked, set[str]]]:
             if not os.path.exists(whole) and all(HEARD.get(asked, {}).values()):
                 HEARD.pop(asked, None)
             if whole in _BOTH and _seen(whole) not in seen:
-                _forget(whole, held)
+                HEARD[asked] = dict.fromkeys(HEARD.get(asked, {}), _CHANGED)
+                del held[asked]
 
 
 def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
@@ -170,14 +178,14 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     with suppress(Exception):  # of whoever opens something, wherever in the process
         path = os.path.normpath(os.fsdecode(path or "."))
         whole = os.path.abspath(path)
-        if path.startswith("<") or whole.startswith(_SYSTEMS) or "__pycache__" in whole or not as_run.is_users(whole):
+        if path.startswith("<") or whole.startswith(_SYSTEMS) or _CACHES.search(whole) or not as_run.is_users(whole):
             return
         if runs:
             _note_named(whole, as_run.RUN[whole][-1], 0)
         by, called = _by(event)
         read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
         if not read and called:
-            _forget(whole, *_COMPUTING)
+            _forget(whole)
         elif read and by and whole not in _WRITTEN:
             heard = HEARD.setdefault((path, whole), {})
             heard.pop(by, None)
@@ -192,13 +200,13 @@ def _access(mode: str | None, flags: int) -> tuple[bool, bool]:
     if mode:
         return "r" in mode, bool({*mode} & {*"wxa+"})
     kind = flags & (os.O_RDONLY | os.O_WRONLY | os.O_RDWR)
-    return kind != os.O_WRONLY and not flags & (os.O_TRUNC | os.O_APPEND), kind != os.O_RDONLY
+    return kind != os.O_WRONLY and not flags & (os.O_TRUNC | os.O_APPEND | os.O_EXCL), kind != os.O_RDONLY
 
 
-def _forget(whole: str, *cells: dict[Asked, set[str]]) -> None:
+def _forget(whole: str) -> None:
     """A file is written by the user's code itself: whatever it reads there is no data."""
     _WRITTEN.add(whole)
-    for known in (HEARD, *cells):
+    for known in (HEARD, *_COMPUTING):
         for asked in [one for one in known if one[1] == whole]:
             del known[asked]
 
@@ -207,10 +215,10 @@ def _by(event: str) -> tuple[frozenset[str], bool]:
     """Files of the user's code that does what happens, with its libraries or by what this package reads for it, and
     whether this package has called it.  None if others do it, or Python's import itself, which sources tell.
 
-    A thread that neither this package's call nor a module leads to does it for the code that other threads are in, too.
+    A thread that neither this package's call nor a module leads to opens files for the code that others are in, too.
     """
     mine, (by, called, led) = threading.get_ident(), _users(sys._getframe(2), event)
-    if not led and mine != threading.main_thread().ident:
+    if not led and mine != threading.main_thread().ident and event not in _QUIET:
         frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
         others = [(users, whether) for users, whether, led in map(_users, frames) if led]
         by = by.union(*(users for users, _ in others)) or frozenset({_ANYBODY} if _COMPUTING else ())
@@ -259,7 +267,8 @@ def _note_named(file: str, source: bytes, reached: int) -> None:
     new = {os.path.dirname(file), os.path.dirname(os.path.realpath(file)), "."} if names else set[str]()
     for _ in range(1 + DEEPEST):
         for path in {os.path.normpath(os.path.join(folder, name)) for folder in new for name in names}:
-            HEARD.setdefault((path, os.path.abspath(path)), {})[frozenset({file})] = _seen(path)
+            for one in (path, *(map(str, parts(Path(path))) if path.endswith(MJCF) and os.path.isfile(path) else ())):
+                HEARD.setdefault((one, os.path.abspath(one)), {})[frozenset({file})] = _seen(one)
         new = {within for folder in new for text in texts if os.path.isdir(within := os.path.join(folder, text))}
 
 

@@ -66,7 +66,7 @@ def check_draw(n_starts: int, seed: int) -> tuple[int, int]:
 def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
     """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0; labelled legs may come in
     any order."""
-    x = numbers("starts", _in_order(starts))
+    x = numbers("starts", in_order(starts))
     if x.ndim != 2 or x.shape[1] != 6 or len(x) == 0:
         raise InputError(f"starts have the shape {x.shape}; expected (start, leg) with at least one start and 6 legs")
     if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
@@ -74,17 +74,21 @@ def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
     return x
 
 
-def _in_order(starts: Any) -> Any:
-    """Starts as (start, leg), the legs as `LEGS` has them where a DataArray or DataFrame labels them."""
+def in_order(starts: Any) -> Any:
+    """Starts as (..., leg), the legs as `LEGS` has them where a DataArray or DataFrame labels them, but by numbers.
+
+    Raises:
+        InputError: labels of other legs.
+    """
     labels = [*getattr(starts, "columns", ())]
     if "leg" in getattr(starts, "dims", ()):
         starts = starts.transpose(..., "leg")
         labels = [*starts.coords["leg"].values] if "leg" in starts.coords else []
-    if not any(isinstance(label, str) for label in labels):
+    if not labels or labels == [*range(len(LEGS))]:
         return starts
     if sorted(map(str, labels)) != sorted(LEGS):
         raise InputError(f"starts of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
-    return np.asarray(starts)[:, [labels.index(leg) for leg in LEGS]]
+    return np.asarray(starts)[..., [labels.index(leg) for leg in LEGS]]
 
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:

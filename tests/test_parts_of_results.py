@@ -135,6 +135,11 @@ def test_results_of_other_settings_are_not_drawn_under_those_of_the_first():
     assert "a, b; 2 starts" in hexmj.plot(told).get_suptitle()
 
 
+def test_velocities_of_other_numbers_of_starts_are_drawn_together():
+    few, many = (hexmj.flss(hexmj.LDVS, [v], n_starts=n, window=5.0) for v, n in ((0.3, 5), (0.5, 8)))
+    assert "starts" not in hexmj.plot(xr.concat([few, many], "velocity", combine_attrs="drop_conflicts")).get_suptitle()
+
+
 def test_kinematic_and_physical_flss_are_not_drawn_as_one():
     results = [measure(hexmj.LDVS, [0.5], n_starts=2, window=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
     for both in (results, results[::-1]):

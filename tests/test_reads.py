@@ -23,10 +23,11 @@ from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import ENVIRONMENT
 
 READER = """
-import importlib, json, os, sqlite3
+import importlib, json, os, sqlite3, tempfile
 from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 from pathlib import Path
+from threading import Thread
 
 import hexmj
 import numpy as np
@@ -158,12 +159,29 @@ def test_a_file_that_changes_while_a_cell_reads_it_is_a_sentence(computed: Calla
         "[Path('one/gain').read_text(), Path('one/gain').write_text(str(np.random.random())), 2.0][2]",
         "[hexmj.save(xr.Dataset({'a': np.random.random()}), 'a.nc'), hexmj.load('a.nc'), 2.0][2]",
         "[Path('a').write_text(str(np.random.random())), os.replace('a', 'b'), Path('b').read_text(), 2.0][3]",
+        "[(it := tempfile.mkstemp()), os.write(it[0], b'2.0'), os.close(it[0]), float(Path(it[1]).read_text())][3]",
     ],
 )
 def test_a_memory_that_is_read_and_written_does_not_count(
     computed: Callable[..., tuple[float, int]], gain: str
 ) -> None:
     assert [computed(gain), computed(gain)] == 2 * [(2.0, 1)]
+
+
+def test_what_was_opened_to_be_written_too_and_has_changed_is_believed_no_more(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "float([np.memmap('one/gain.bin', float)[0], os.system('printf 12345678 > one/gain.bin')][0])"
+    assert computed(gain) == (1.0, 1)
+    changed = np.fromfile("one/gain.bin")[0]
+    assert [computed(gain), computed(gain)] == [(changed, 2), (changed, 2)]
+
+
+def test_a_thread_of_nobodys_that_lists_a_folder_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[(one := Thread(target=os.listdir, args=['one'])).start(), one.join(), 2.0][2]"
+    assert computed(gain) == (2.0, 1)
+    Path("one/new.json").write_text("")
+    assert computed(gain) == (2.0, 1)
 
 
 def test_what_is_gone_in_the_end_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
@@ -269,7 +287,8 @@ def test_reads_in_threads_by_an_installed_class_and_of_modules_that_are_found_co
     for name, text in (("pk/__init__", FAR_FETCHED), ("site-packages/installed", INSTALLED), ("script", FAR_SCRIPT)):
         (tmp_path / f"{name}.py").write_text(text)
     env = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}site-packages"}
-    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "four.xml": FOUR}
+    (tmp_path / "four.xml").write_text('<mujoco><include file="inner.xml"/></mujoco>')
+    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "inner.xml": FOUR}
     for gains, kept in (
         (FEW, 1),
         (FEW, 1),
@@ -448,8 +467,8 @@ def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float
         shutil.copytree(name, moved / name) if Path(name).is_dir() else shutil.copy(name, moved / name)
     shutil.rmtree("one")
     os.chdir(moved)
-    data = run([Cell("reader", importable("reader.py").cell, {"at": "elsewhere"})], Path("kept"))[0]
-    assert (float(data.gain), os.stat("calls").st_size) == (1.0, 1)
+    cells = [Cell(name, importable("reader.py").cell, {"at": "elsewhere"}) for name in ("reader", "one more")]
+    assert ([float(data.gain) for data in run(cells, Path("kept"))], os.stat("calls").st_size) == ([1.0, 1.0], 2)
 
 
 @pytest.mark.parametrize(

@@ -311,7 +311,9 @@ def test_labelled_legs_may_come_in_any_order():
         assert np.array_equal(walk(given).x, walk(starts).x)
     assert not np.array_equal(walk(labelled.sel(leg=shuffled).to_numpy()).x, walk(starts).x)
     assert np.array_equal(walk(labelled.assign_coords(leg=range(6))).x, walk(starts).x)
-    for labels in ([*"abcdef"], [*LEGS[:5], "L1"]):
+    with pytest.raises(hexmj.InputError, match=r"^starts have the shape \(6,\)"):
+        walk(labelled[0])
+    for labels in ([*"abcdef"], [*LEGS[:5], "L1"], [1, 0, 2, 3, 4, 5]):
         with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
             walk(labelled.assign_coords(leg=labels))
 

@@ -94,7 +94,7 @@ def finish(
         finished_all = all(path and os.path.exists(path) for path in paths)
         (remove_leftovers if finished_all else prepare)(folder)
     whole = sum(cell.work for cell in cells)
-    told, read = [0.0] * len(cells), dict[str, Any]()
+    told, read = [0.0] * len(cells), dict[str, str]()
 
     def tell(i: int, done: float) -> None:
         told[i] += done
@@ -103,9 +103,9 @@ def finish(
 
     def finished(i: int, made: "Made") -> tuple[int, "xr.Dataset"]:
         data, by_it = made
-        for place, held in json.loads(by_it).items():
+        for place, (held, path) in json.loads(by_it).items():
             if read.setdefault(place, held) != held:
-                raise InputError(f"{cells[i].name}: {held[1] or place} has changed while it was in use; start again")
+                raise InputError(f"{cells[i].name}: {path or place} has changed while it was in use; start again")
         tell(i, 1.0 - told[i])
         return i, data
 

@@ -1,11 +1,9 @@
 """Settings as plain JSON: what a cell is named by and what its file tells."""
 
-import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
-from html import unescape
 from inspect import getattr_static
 from os.path import isfile
 from pathlib import Path
@@ -15,10 +13,8 @@ import numpy as np
 
 from hexmj.checks import short
 from hexmj.errors import InputError
-from hexmj.files import digest, read_bytes
-
-NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2""")
-"""Files and their folders in an MJCF."""
+from hexmj.files import digest
+from hexmj.mjcf import content
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
@@ -89,25 +85,6 @@ def classes(value: Any) -> Iterator[type]:
     elif isinstance(value, list | tuple):
         for item in value:
             yield from classes(item)
-
-
-def content(path: Path) -> bytes:
-    """Of a file; of an MJCF with all files that it includes or refers to, such as meshes, as far as they are there.
-
-    They are looked for beside every file that names one and in every folder that is named, with or without their own.
-    """
-    found, new = dict[Path, bytes](), {path}
-    while new:
-        found |= {one: read_bytes(one) for one in new}
-        texts = [text.decode(errors="replace") for text in found.values() if b"\0" not in text]
-        told = [(kind, value) for text in texts for kind, _, value in NAMED.findall(text)]
-        named = told + [(kind, unescape(value)) for kind, value in told]
-        names = {name for kind, value in named if kind == "file" for name in (value, Path(value).name)}
-        folders = {
-            one.parent / folder for one in found for folder in ("", *(value for kind, value in named if kind != "file"))
-        }
-        new = {folder / name for folder in folders for name in names if isfile(folder / name)} - found.keys()
-    return b"".join(found[one] for one in sorted(found))
 
 
 def _held(name: str | Path, folders: Sequence[Path]) -> str:

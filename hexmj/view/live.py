@@ -26,6 +26,7 @@ from hexmj.physics.outcomes import measured_walk
 from hexmj.physics.settling import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
+from hexmj.starts import in_order
 from hexmj.timing import MOST_STEPS, Stride
 from hexmj.walks import PlannedWalk, joined, part_of
 
@@ -141,7 +142,7 @@ class LiveWalk:
         Raises:
             InputError: a value that makes no sense.
         """
-        self.controller, self.velocity, self.start = controller, velocity, np.array(start, dtype=float)
+        self.controller, self.velocity, self.start = controller, velocity, np.array(in_order(start), dtype=float)
         self.conditions, self.stride = conditions or Conditions(), stride or Stride()
         self.begin()
 

@@ -16,9 +16,10 @@ from hexmj.intervals import wilson_intervals
 from hexmj.legs import GEOMETRIES
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.mjcf import content
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweeps import Cell, over_axes
-from hexmj.sweeps.plain import content, plain
+from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.variants import instead, naming, variants, varied
 
