@@ -8,16 +8,14 @@ import ast
 import os
 import re
 import sys
-import threading
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
-from functools import lru_cache
 from pathlib import Path
 from traceback import walk_stack
-from types import FrameType
 from typing import Any
 
-from hexmj import as_run, files
+from hexmj import as_run
+from hexmj.callers import ANYBODY, LISTS, callers
 from hexmj.errors import InputError
 from hexmj.files import digest, digest_of
 from hexmj.mjcf import parts
@@ -35,15 +33,8 @@ MJCF = ".xml", ".mjcf", ".mjb"
 DEEPEST = 2
 """Number of folders that texts name, one within the other."""
 
-_METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
-"""In the names of files by which Python and libraries look for what is installed."""
-
 _CACHES = re.compile(r"__pycache__|\.nb[ic]$")
 """In the names of what Python and numba keep of their own."""
-
-_OURS = f"{Path(__file__).parent}{os.sep}"
-_KEEPS = __file__, *(f"{_OURS}sweeps{os.sep}{one}.py" for one in ("cells", "files", "kept_values"))
-"""What names cells and keeps them: it opens nothing for the user's code."""
 
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"
@@ -56,9 +47,6 @@ _UNREAD = "unread "
 
 _CHANGED = "changed"
 """Stands for what a file held that was opened to be read and written, and changed: no file ever holds that."""
-
-_ANYBODY = "anybody"
-"""Stands for the code of a thread in which nothing is a user's, while cells are computed."""
 
 Asked = tuple[str, str]
 """A file or folder as it was asked for, relative to the current one or not, and its absolute path."""
@@ -78,7 +66,7 @@ _COMPUTING: list[dict[Asked, set[str]]] = []
 _EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0}
 """Event -> which of its arguments is the path."""
 
-_QUIET = "exec", "os.listdir", "os.scandir"
+_QUIET = "exec", *LISTS
 """Events that write nothing."""
 
 
@@ -99,7 +87,7 @@ def computing() -> Iterator[dict[Asked, set[str]]]:
             whole = asked[1]
             if not os.path.exists(whole) and all(HEARD.get(asked, {}).values()):
                 HEARD.pop(asked, None)
-            if whole in _BOTH and _seen(whole) not in seen:
+            if whole in _BOTH and seen != {_seen(whole)}:
                 HEARD[asked] = dict.fromkeys(HEARD.get(asked, {}), _CHANGED)
                 del held[asked]
 
@@ -118,7 +106,7 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
     """
     told = dict[str, list[str]]()
     for (path, whole), heard in list(HEARD.items()):
-        held = [held for by, held in list(heard.items()) if by & (sources | {_ANYBODY})]
+        held = [held for by, held in list(heard.items()) if by & (sources | {ANYBODY})]
         if held and whole not in sources:
             here = not os.path.isabs(path) and os.path.abspath(path) == whole
             now = _held(whole) if held[-1].startswith(_UNREAD) and held[-1] == _seen(whole) else held[-1]
@@ -127,9 +115,10 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
 
 
 def changed(told: Mapping[str, Sequence[str]], homes: Sequence[Path]) -> list[str]:
-    """Files and folders of `reads` that hold something else by now, from here or where they lay then."""
+    """Files and folders of `reads` that hold something else by now, from here or where they lay then, but for what the
+    user's code writes itself."""
     paths = [(path, one[0]) for place, one in told.items() for path in _paths(place, one[1], homes)]
-    return [path for path, held in paths if _held(path) != held]
+    return [path for path, held in paths if os.path.abspath(path) not in _WRITTEN and _held(path) != held]
 
 
 def _place(path: str, homes: Sequence[Path]) -> str:
@@ -182,7 +171,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return
         if runs:
             _note_named(whole, as_run.RUN[whole][-1], 0)
-        by, called = _by(event)
+        by, called = callers(event, bool(_COMPUTING))
         read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
         if not read and called:
             _forget(whole)
@@ -209,49 +198,6 @@ def _forget(whole: str) -> None:
     for known in (HEARD, *_COMPUTING):
         for asked in [one for one in known if one[1] == whole]:
             del known[asked]
-
-
-def _by(event: str) -> tuple[frozenset[str], bool]:
-    """Files of the user's code that does what happens, with its libraries or by what this package reads for it, and
-    whether this package has called it.  None if others do it, or Python's import itself, which sources tell.
-
-    A thread that neither this package's call nor a module leads to opens files for the code that others are in, too.
-    """
-    mine, (by, called, led) = threading.get_ident(), _users(sys._getframe(2), event)
-    if not led and mine != threading.main_thread().ident and event not in _QUIET:
-        frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
-        others = [(users, whether) for users, whether, led in map(_users, frames) if led]
-        by = by.union(*(users for users, _ in others)) or frozenset({_ANYBODY} if _COMPUTING else ())
-        called = any(whether for _, whether in others)
-    return by, called
-
-
-def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bool, bool]:
-    """As `_by`, of the thread that is in a frame alone, and whether this package's call or a module leads there."""
-    users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
-    while frame is not None:
-        name, file = frame.f_code.co_name, frame.f_code.co_filename
-        whose = _whose(file)
-        if whose == "import's" and event != "exec" and not users and (event != "open" or name == "_find_and_load"):
-            return frozenset(), False, True
-        if whose == "ours" and (users or not for_others or file in _KEEPS):
-            return frozenset(users), bool(users), True
-        if whose == "user's" or file in as_run.FOLLOWED:
-            users.add(file)
-            if name == "<module>" and frame.f_globals.get("__name__"):
-                return frozenset(users), False, True
-        frame = frame.f_back
-    return frozenset(users), False, False
-
-
-@lru_cache(maxsize=10_000)
-def _whose(file: str) -> str:
-    """Whose the code of a file is."""
-    if file.startswith(_OURS):
-        return "ours"
-    if file.startswith("<frozen importlib") or _METADATA.search(file):
-        return "import's"
-    return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
 
 
 def _note_named(file: str, source: bytes, reached: int) -> None:

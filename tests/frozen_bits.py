@@ -2,8 +2,8 @@
 
 Every array of every sample is kept as a digest in ``frozen_bits.json``, with the processor and the versions that made
 it: MuJoCo's results depend on the processor (AVX-512), and those of a search by CMA-ES on the kernels that OpenBLAS has
-for it: on an AMD processor 11 of its 24 arrays differ, and none with OPENBLAS_CORETYPE=SkylakeX.  A commit that changes a number on purpose records anew and
-says so.
+for it: on an AMD processor 11 of its 24 arrays differ, and none with OPENBLAS_CORETYPE=SkylakeX.  A commit that
+changes a number on purpose records anew and says so.
 """
 
 import hashlib

@@ -12,9 +12,25 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("attributes", "checks", "errors", "files", "intervals", "legs", "literal", "loaded", "locks", "netcdf", "parsing"),
+    (
+        *(
+            "attributes",
+            "checks",
+            "errors",
+            "files",
+            "intervals",
+            "legs",
+            "literal",
+            "loaded",
+            "locks",
+            "mjcf",
+            "netcdf",
+        ),
+        "parsing",
+    ),
     (
         "as_run",
+        "callers",
         "field_docs",
         "pictures",
         "progress",

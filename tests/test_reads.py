@@ -168,13 +168,14 @@ def test_a_memory_that_is_read_and_written_does_not_count(
     assert [computed(gain), computed(gain)] == 2 * [(2.0, 1)]
 
 
+@pytest.mark.parametrize("read_again", ["", ", np.fromfile('one/gain.bin')"])
 def test_what_was_opened_to_be_written_too_and_has_changed_is_believed_no_more(
-    computed: Callable[..., tuple[float, int]],
+    computed: Callable[..., tuple[float, int]], read_again: str
 ) -> None:
-    gain = "float([np.memmap('one/gain.bin', float)[0], os.system('printf 12345678 > one/gain.bin')][0])"
-    assert computed(gain) == (1.0, 1)
+    gain = f"[np.memmap('one/gain.bin', float)[0], os.system('printf 12345678 > one/gain.bin'){read_again}][0]"
+    assert computed(f"float({gain})") == (1.0, 1)
     changed = np.fromfile("one/gain.bin")[0]
-    assert [computed(gain), computed(gain)] == [(changed, 2), (changed, 2)]
+    assert [computed(f"float({gain})"), computed(f"float({gain})")] == [(changed, 2), (changed, 2)]
 
 
 def test_a_thread_of_nobodys_that_lists_a_folder_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:

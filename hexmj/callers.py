@@ -1,0 +1,73 @@
+"""Whose code brings about what audit hooks hear, by the stacks of the threads."""
+
+import os
+import re
+import sys
+import threading
+from functools import lru_cache
+from pathlib import Path
+from types import FrameType
+
+from hexmj import as_run, files
+
+LISTS = "os.listdir", "os.scandir"
+"""Events of folders that are listed."""
+
+ANYBODY = "anybody"
+"""Stands for the code of a thread in which nothing is a user's, while cells are computed."""
+
+_METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
+"""In the names of files by which Python and libraries look for what is installed."""
+
+_OURS = f"{Path(__file__).parent}{os.sep}"
+_KEEPS = tuple(
+    f"{_OURS}{one.replace('/', os.sep)}.py" for one in ("reads", "sweeps/cells", "sweeps/files", "sweeps/kept_values")
+)
+"""What names cells and keeps them: it opens nothing for the user's code."""
+
+
+def callers(event: str, computing: bool) -> tuple[frozenset[str], bool]:
+    """Files of the user's code that does what happens, with its libraries or by what this package reads for it, and
+    whether this package has called it.  None if others do it, or Python's import itself, which sources tell.
+
+    A thread that neither this package's call nor a module leads to opens files for the code that others are in, too.
+
+    Args:
+        event: of Python's audit hooks.
+        computing: whether cells are computed, for which such a thread may work if nobody is known.
+    """
+    mine, (by, called, led) = threading.get_ident(), _users(sys._getframe(2), event)
+    if not led and mine != threading.main_thread().ident and event not in LISTS:
+        frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
+        others = [(users, whether) for users, whether, led in map(_users, frames) if led]
+        by = by.union(*(users for users, _ in others)) or frozenset({ANYBODY} if computing else ())
+        called = any(whether for _, whether in others)
+    return by, called
+
+
+def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bool, bool]:
+    """As `callers`, of the thread that is in a frame alone, and whether this package's call or a module leads there."""
+    users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
+    while frame is not None:
+        name, file = frame.f_code.co_name, frame.f_code.co_filename
+        whose = _whose(file)
+        if whose == "import's" and event != "exec" and not users and (event != "open" or name == "_find_and_load"):
+            return frozenset(), False, True
+        if whose == "ours" and (users or not for_others or file in _KEEPS):
+            return frozenset(users), bool(users), True
+        if whose == "user's" or file in as_run.FOLLOWED:
+            users.add(file)
+            if name == "<module>" and frame.f_globals.get("__name__"):
+                return frozenset(users), False, True
+        frame = frame.f_back
+    return frozenset(users), False, False
+
+
+@lru_cache(maxsize=10_000)
+def _whose(file: str) -> str:
+    """Whose the code of a file is."""
+    if file.startswith(_OURS):
+        return "ours"
+    if file.startswith("<frozen importlib") or _METADATA.search(file):
+        return "import's"
+    return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
