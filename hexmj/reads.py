@@ -46,13 +46,14 @@ _UNREAD = "unread "
 """Begins what is noted of a large file instead of a digest: its size and times."""
 
 _CHANGED = "changed"
-"""Stands for what a file held that was opened to be read and written, and changed: no file ever holds that."""
+"""Stands for what a file held that has changed since it was first read: no file ever holds that."""
 
 Asked = tuple[str, str]
 """A file or folder as it was asked for, relative to the current one or not, and its absolute path."""
 
-HEARD: dict[Asked, dict[frozenset[str], str]] = {}
-"""File or folder -> files of the code that read it -> what it held when they last did, the latest at the end."""
+HEARD: dict[Asked, dict[tuple[frozenset[str], str], bool]] = {}
+"""File or folder -> files of the code that read it, and what it held then, the latest at the end -> whether they have
+read that only as cells were computed."""
 
 _WRITTEN: set[str] = set()
 """Files that the user's code writes itself while this package calls it."""
@@ -74,8 +75,8 @@ _QUIET = "exec", *LISTS
 def computing() -> Iterator[dict[Asked, set[str]]]:
     """Meanwhile threads of the user's own count as called by this package; gives what each file held as it was read.
 
-    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.  Of what was opened to be
-    written as well, and holds something else in the end, nobody knows who has changed it: what read it is made anew.
+    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.  That something has changed
+    that was opened to be written as well is no error, but believed no more.
     """
     held: dict[Asked, set[str]] = {}
     _COMPUTING.append(held)
@@ -84,11 +85,11 @@ def computing() -> Iterator[dict[Asked, set[str]]]:
     finally:
         _COMPUTING[:] = [one for one in _COMPUTING if one is not held]
         for asked, seen in list(held.items()):
-            whole = asked[1]
-            if not os.path.exists(whole) and all(HEARD.get(asked, {}).values()):
+            whole, heard = asked[1], HEARD.get(asked, {})
+            if not os.path.exists(whole) and not any(then == "" for _, then in heard):
                 HEARD.pop(asked, None)
             if whole in _BOTH and seen != {_seen(whole)}:
-                HEARD[asked] = dict.fromkeys(HEARD.get(asked, {}), _CHANGED)
+                heard.update({(by, _CHANGED): False for by, _ in heard})
                 del held[asked]
 
 
@@ -100,17 +101,21 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
         homes: folders that may lie elsewhere another time.
 
     Returns:
-        File or folder -> a digest of what it held, and its absolute path.  It is told from the current folder, without
-        that path, where it was asked for so and still lies there, else from the first of `homes` that lies beside it or
-        above, but for the system's root.
+        File or folder -> a digest of what it holds, and its absolute path; `_CHANGED` instead if it held something else
+        when it was last read, or ever before cells were computed, which the code may remember.  It is told from the
+        current folder, without that path, if it was asked for so and still lies there, else from the first of `homes`
+        that lies beside it or above, but for the system's root.
     """
     told = dict[str, list[str]]()
     for (path, whole), heard in list(HEARD.items()):
-        held = [held for by, held in list(heard.items()) if by & (sources | {ANYBODY})]
-        if held and whole not in sources:
+        own = [(then, within) for (by, then), within in list(heard.items()) if by & (sources | {ANYBODY})]
+        held = {then for then, within in own if not within} | {then for then, _ in own[-1:]}
+        if held and whole not in sources and whole not in _WRITTEN:
             here = not os.path.isabs(path) and os.path.abspath(path) == whole
-            now = _held(whole) if held[-1].startswith(_UNREAD) and held[-1] == _seen(whole) else held[-1]
-            told[path if here else _place(whole, homes)] = [now, "" if here else whole]
+            told[path if here else _place(whole, homes)] = [
+                _held(whole) if held == {_seen(whole)} else _CHANGED,
+                "" if here else whole,
+            ]
     return told
 
 
@@ -176,9 +181,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if not read and called:
             _forget(whole)
         elif read and by and whole not in _WRITTEN:
-            heard = HEARD.setdefault((path, whole), {})
-            heard.pop(by, None)
-            heard[by] = now = _seen(whole)
+            heard, now = HEARD.setdefault((path, whole), {}), _seen(whole)
+            heard[by, now] = heard.pop((by, now), True) and bool(_COMPUTING)
             _BOTH.update([whole] if written else [])
             for cell in _COMPUTING:
                 cell.setdefault((path, whole), set()).update([] if event in _QUIET else [now])
@@ -214,7 +218,7 @@ def _note_named(file: str, source: bytes, reached: int) -> None:
     for _ in range(1 + DEEPEST):
         for path in {os.path.normpath(os.path.join(folder, name)) for folder in new for name in names}:
             for one in (path, *(map(str, parts(Path(path))) if path.endswith(MJCF) and os.path.isfile(path) else ())):
-                HEARD.setdefault((one, os.path.abspath(one)), {})[frozenset({file})] = _seen(one)
+                HEARD.setdefault((one, os.path.abspath(one)), {})[frozenset({file}), _seen(one)] = False
         new = {within for folder in new for text in texts if os.path.isdir(within := os.path.join(folder, text))}
 
 

@@ -22,6 +22,9 @@ from hexmj.loaded import importable
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import ENVIRONMENT
 
+FEW, MANY = (1, 2, 3, 4), (7, 8, 9, 10)
+FOUR = '<mujoco><worldbody><body><geom size="1" mass="{}"/></body></worldbody></mujoco>'
+
 READER = """
 import importlib, json, os, sqlite3, tempfile
 from concurrent.futures import ThreadPoolExecutor
@@ -175,7 +178,7 @@ def test_what_was_opened_to_be_written_too_and_has_changed_is_believed_no_more(
     gain = f"[np.memmap('one/gain.bin', float)[0], os.system('printf 12345678 > one/gain.bin'){read_again}][0]"
     assert computed(f"float({gain})") == (1.0, 1)
     changed = np.fromfile("one/gain.bin")[0]
-    assert [computed(f"float({gain})"), computed(f"float({gain})")] == [(changed, 2), (changed, 2)]
+    assert [computed(f"float({gain})"), computed(f"float({gain})")] == [(changed, 2), (changed, 3)]
 
 
 def test_a_thread_of_nobodys_that_lists_a_folder_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
@@ -209,6 +212,32 @@ def test_what_a_module_remembers_of_a_file_counts_whatever_becomes_of_that(
             monkeypatch.chdir("elsewhere")
         assert run([Cell("remembers", remembers.cell, {})], tmp_path / "kept")[0].gain == gain
         monkeypatch.delitem(sys.modules, remembers.__name__)
+
+
+@pytest.mark.parametrize(
+    ("before", "gain"),
+    [
+        ("A = float(Path('gain').read_text())", "A + float(Path('gain').read_text())"),
+        ("A = np.memmap('gain.bin', float, 'r')", "A[0]"),
+        ("", "mujoco.MjModel.from_xml_path('gain.xml').body_mass[1]"),
+    ],
+)
+def test_what_mixes_what_a_file_held_and_what_it_holds_is_believed_no_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, before: str, gain: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    imports = "import mujoco\nimport numpy as np\nimport xarray as xr\nfrom pathlib import Path"
+    Path("mixes.py").write_text(f"{imports}\n{before}\ndef cell():\n    return xr.Dataset({{'gain': {gain}}})")
+    for mass, believed in (("1.0", True), ("2.0", False)):
+        Path("gain").write_text(mass)
+        Path("gain.xml").write_text(FOUR.format(mass))
+        with open("gain.bin", "r+b" if mass == "2.0" else "wb") as file:
+            np.array([float(mass)]).tofile(file)
+        cell = Cell("mixes", importable("mixes.py").cell, {})
+        run([cell], Path("kept"))
+        last = max(Path("kept").iterdir(), key=lambda file: file.stat().st_mtime_ns)
+        with xr.open_dataset(last, engine="h5netcdf") as data:
+            assert (cell.edited(data.attrs["read"]) == []) == believed
 
 
 SCRIPT = """
@@ -259,9 +288,6 @@ with ThreadPoolExecutor(1) as threads:
 def cell(three):
     return xr.Dataset({"gain": ONE + TWO + three.of("three") + mujoco.MjModel.from_xml_path("four.xml").body_mass[1]})
 """
-
-FEW, MANY = (1, 2, 3, 4), (7, 8, 9, 10)
-FOUR = '<mujoco><worldbody><body><geom size="1" mass="{}"/></body></worldbody></mujoco>'
 
 INSTALLED = """
 from dataclasses import dataclass
