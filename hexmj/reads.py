@@ -45,7 +45,7 @@ LARGE = 2**26
 _UNREAD = "unread "
 """Begins what is noted of a large file instead of a digest: its size and times."""
 
-_CHANGED = "changed"
+CHANGED = "changed"
 """Stands for what a file held that has changed since it was first read: no file ever holds that."""
 
 Asked = tuple[str, str]
@@ -75,8 +75,8 @@ _QUIET = "exec", *LISTS
 def computing() -> Iterator[dict[Asked, set[str]]]:
     """Meanwhile threads of the user's own count as called by this package; gives what each file held as it was read.
 
-    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.  That something has changed
-    that was opened to be written as well is no error, but believed no more.
+    What was read meanwhile, and is gone in the end, was made on the way: it is forgotten.  Of what was opened to be
+    written as well, and has changed, nobody knows who did that: `CHANGED`.
     """
     held: dict[Asked, set[str]] = {}
     _COMPUTING.append(held)
@@ -89,8 +89,8 @@ def computing() -> Iterator[dict[Asked, set[str]]]:
             if not os.path.exists(whole) and not any(then == "" for _, then in heard):
                 HEARD.pop(asked, None)
             if whole in _BOTH and seen != {_seen(whole)}:
-                heard.update({(by, _CHANGED): False for by, _ in heard})
-                del held[asked]
+                heard.update({(by, CHANGED): False for by, _ in heard})
+                held[asked] = {CHANGED}
 
 
 def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
@@ -101,7 +101,7 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
         homes: folders that may lie elsewhere another time.
 
     Returns:
-        File or folder -> a digest of what it holds, and its absolute path; `_CHANGED` instead if it held something else
+        File or folder -> a digest of what it holds, and its absolute path; `CHANGED` instead if it held something else
         when it was last read, or ever before cells were computed, which the code may remember.  It is told from the
         current folder, without that path, if it was asked for so and still lies there, else from the first of `homes`
         that lies beside it or above, but for the system's root.
@@ -113,7 +113,7 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
         if held and whole not in sources and whole not in _WRITTEN:
             here = not os.path.isabs(path) and os.path.abspath(path) == whole
             told[path if here else _place(whole, homes)] = [
-                _held(whole) if held == {_seen(whole)} else _CHANGED,
+                _held(whole) if held == {_seen(whole)} else CHANGED,
                 "" if here else whole,
             ]
     return told

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from inspect import signature
 from pathlib import Path
 from typing import Any
+from warnings import warn
 
 from hexmj.as_run import is_users
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.files import digest
-from hexmj.reads import HEARD, changed, computing, reads
+from hexmj.reads import CHANGED, HEARD, changed, computing, reads
 from hexmj.sweeps.code import code, source_files
 from hexmj.sweeps.plain import classes, label, plain
 
@@ -56,6 +57,9 @@ class Cell:
         asked = signature(self.function).parameters
         with computing() as read:
             made = self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
+        for path in [path for (path, _), held in read.items() if held == {CHANGED}]:
+            told = f"{self.name}: {path} was opened to be read and written, and has changed; it is made anew each time"
+            warn(told, stacklevel=2)
         if twice := [path for (path, _), held in read.items() if len(held) > 1]:
             raise InputError(f"{self.name}: {twice[0]} has changed while it was in use; start again")
         return made

@@ -17,6 +17,7 @@ from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
+from hexmj.reads import CHANGED
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.files import find, write
@@ -94,7 +95,9 @@ def finish(
         finished_all = all(path and os.path.exists(path) for path in paths)
         (remove_leftovers if finished_all else prepare)(folder)
     whole = sum(cell.work for cell in cells)
-    told, read = [0.0] * len(cells), dict[str, str]()
+    told = [0.0] * len(cells)
+    before = [one for cell in cells for one in json.loads(cell.reads()).items()]
+    read = {place: held for place, (held, _) in before if held != CHANGED}
 
     def tell(i: int, done: float) -> None:
         told[i] += done
