@@ -5,32 +5,41 @@ from html import unescape
 from os.path import isfile
 from pathlib import Path
 
-from hexmj.files import read_bytes
+from hexmj.files import opened, read_bytes
 
 NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2""")
 """Files and their folders in an MJCF."""
 
+HEAD = 1000
+"""Within so many bytes an MJCF has its first tag; what has none is a mesh or the like, and is not looked through."""
 
-def parts(path: Path) -> dict[Path, bytes]:
+
+def parts(path: Path) -> list[Path]:
     """A file; of an MJCF all files that it includes or refers to, such as meshes, as far as they are there.
 
     They are looked for beside every file that names one and in every folder that is named, with or without their own.
+
+    Raises:
+        InputError: one cannot be read.
     """
-    found, new = dict[Path, bytes](), {path}
+    texts, new = dict[Path, str](), {path}
     while new:
-        found |= {one: read_bytes(one) for one in new}
-        texts = [text.decode(errors="replace") for text in found.values() if b"\0" not in text]
-        told = [(kind, value) for text in texts for kind, _, value in NAMED.findall(text)]
+        texts |= {one: _text(one) for one in new}
+        told = [(kind, value) for text in texts.values() for kind, _, value in NAMED.findall(text)]
         named = told + [(kind, unescape(value)) for kind, value in told]
         names = {name for kind, value in named if kind == "file" for name in (value, Path(value).name)}
         folders = {
-            one.parent / folder for one in found for folder in ("", *(value for kind, value in named if kind != "file"))
+            one.parent / folder for one in texts for folder in ("", *(value for kind, value in named if kind != "file"))
         }
-        new = {folder / name for folder in folders for name in names if isfile(folder / name)} - found.keys()
-    return found
+        new = {folder / name for folder in folders for name in names if isfile(folder / name)} - texts.keys()
+    return sorted(texts)
 
 
 def content(path: Path) -> bytes:
-    """Of a file with all of its parts."""
-    found = parts(path)
-    return b"".join(found[one] for one in sorted(found))
+    """Of a file with all of its parts; errors as of `parts`."""
+    return b"".join(map(read_bytes, parts(path)))
+
+
+def _text(path: Path) -> str:
+    with opened(path) as file:
+        return read_bytes(path).decode(errors="replace") if b"<" in file.read(HEAD) else ""

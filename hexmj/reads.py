@@ -120,10 +120,14 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
 
 
 def changed(told: Mapping[str, Sequence[str]], homes: Sequence[Path]) -> list[str]:
-    """Files and folders of `reads` that hold something else by now, from here or where they lay then, but for what the
-    user's code writes itself."""
+    """Files and folders of `reads` that hold something else by now, from here or where they lay then."""
     paths = [(path, one[0]) for place, one in told.items() for path in _paths(place, one[1], homes)]
-    return [path for path, held in paths if os.path.abspath(path) not in _WRITTEN and _held(path) != held]
+    return [path for path, held in paths if _held(path) != held]
+
+
+def comparable(path: str) -> bool:
+    """Whether what two processes have read there has to be the same: it is there, and no user's code writes it."""
+    return os.path.exists(path) and os.path.abspath(path) not in _WRITTEN
 
 
 def _place(path: str, homes: Sequence[Path]) -> str:
@@ -217,7 +221,7 @@ def _note_named(file: str, source: bytes, reached: int) -> None:
     new = {os.path.dirname(file), os.path.dirname(os.path.realpath(file)), "."} if names else set[str]()
     for _ in range(1 + DEEPEST):
         for path in {os.path.normpath(os.path.join(folder, name)) for folder in new for name in names}:
-            for one in (path, *(map(str, parts(Path(path))) if path.endswith(MJCF) and os.path.isfile(path) else ())):
+            for one in {path, *(map(str, parts(Path(path))) if path.endswith(MJCF) and os.path.isfile(path) else ())}:
                 HEARD.setdefault((one, os.path.abspath(one)), {})[frozenset({file}), _seen(one)] = False
         new = {within for folder in new for text in texts if os.path.isdir(within := os.path.join(folder, text))}
 

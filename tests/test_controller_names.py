@@ -75,6 +75,16 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
 
 
 def test_a_field_may_have_a_type_for_type_checkers_alone(mine, tmp_path):
+    text = (
+        mine.read_text()
+        .replace("height: float", "height: Height")
+        .replace("import numpy", "Height = float\nimport numpy")
+    )
+    mine.write_text(f"from __future__ import annotations\n{text}")
+    (tmp_path / "tall.toml").write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = "4"\n')
+    with pytest.raises(hexmj.InputError, match=r"height = '4'; expected a number"):
+        hexmj.load_controller("tall.toml")
+    mine.write_text(MINE)
     only = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from numpy.typing import NDArray\n"
     text = mine.read_text().replace("height: float = 0.0", "height: float = 0.0\n    table: NDArray | None = None")
     mine.write_text(f"from __future__ import annotations\n{only}{text}")

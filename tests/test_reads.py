@@ -464,6 +464,18 @@ def test_cells_of_one_run_have_to_have_read_the_same(computed: Callable[..., tup
     assert first.gain == second.gain != 1.0
 
 
+def test_a_default_that_is_written_where_a_file_is_gone_is_no_reason_to_believe_more(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "[os.path.exists('own') or Path('own').write_text('2.0'), float(Path('own').read_text())][1]"
+    Path("own").write_text("1.0")
+    computed(gain)
+    cells = [Cell(name, importable("reader.py").cell, {"at": name}) for name in ("first", "second")]
+    assert [float(data.gain) for data in run(cells, Path("both"))] == [1.0, 1.0]
+    Path("own").unlink()
+    assert [float(data.gain) for data in run(cells, Path("both"))] == [2.0, 2.0]
+
+
 def test_a_copied_project_reads_what_its_code_opens(computed: Callable[..., tuple[float, int]], tmp_path: Path) -> None:
     gain = f"float(Path({str(tmp_path / 'one')!r}, 'gain').read_text())"
     assert computed(gain) == (1.0, 1)

@@ -3,13 +3,14 @@
 import os
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import fields, replace
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, get_type_hints
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
@@ -104,7 +105,10 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         )
     found: Any = load_controller(named)
     try:
-        wanted = {one.name: _PLAIN[one.type] for one in fields(found) if one.name in values and one.type in _PLAIN}
+        types = {one.name: one.type for one in fields(found)}
+        with suppress(NameError):  # of a type that is there for type checkers alone
+            types |= get_type_hints(type(found))
+        wanted = {name: _PLAIN[kind] for name, kind in types.items() if name in values and kind in _PLAIN}
         return replace(found, **(values | {name: typed(name, values[name], kind) for name, kind in wanted.items()}))
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None

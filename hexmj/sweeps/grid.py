@@ -17,7 +17,7 @@ from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.files import marked, prepare, remove_leftovers
 from hexmj.progress import Progress, shown
-from hexmj.reads import CHANGED
+from hexmj.reads import CHANGED, comparable
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.files import find, write
@@ -98,6 +98,7 @@ def finish(
     told = [0.0] * len(cells)
     before = [one for cell in cells for one in json.loads(cell.reads()).items()]
     read = {place: held for place, (held, _) in before if held != CHANGED}
+    known = frozenset(read)
 
     def tell(i: int, done: float) -> None:
         told[i] += done
@@ -107,7 +108,7 @@ def finish(
     def finished(i: int, made: "Made") -> tuple[int, "xr.Dataset"]:
         data, by_it = made
         for place, (held, path) in json.loads(by_it).items():
-            if read.setdefault(place, held) != held:
+            if (held != CHANGED or place in known) and read.setdefault(place, held) != held:
                 raise InputError(f"{cells[i].name}: {path or place} has changed while it was in use; start again")
         tell(i, 1.0 - told[i])
         return i, data
@@ -127,7 +128,7 @@ def finish(
         ]
         for j, done in _by_others(executor, parcels, folder):
             cell = cells[waiting[j]]
-            if other := [file for file in cell.edited(done[1], cell.reads()) if os.path.exists(file)]:
+            if other := [file for file in cell.edited(done[1], cell.reads()) if comparable(file)]:
                 raise InputError(
                     f"{cell.name}: a worker has read another {other[0]} than is here; start the workers again, in the"
                     " same folder"
