@@ -65,7 +65,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
         panels[0, column].set_title(_title(kind), fontsize=10)
         panels[-1, column].set_xlabel("velocity $V_r / V_p$")
     for row, measure in enumerate(measures):
-        panels[row, 0].set_ylabel(f"FLSS {ROWS[measure]}")
+        panels[row, 0].set_ylabel(f"FLSS, {ROWS[measure]}")
     entries = [Line2D([], [], markersize=4, label=one.replace("_", " "), **STYLES[one]) for one in used]
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
