@@ -30,15 +30,18 @@ def callers(event: str, computing: bool) -> tuple[frozenset[str], bool]:
     """Files of the user's code that does what happens, with its libraries or by what this package reads for it, and
     whether this package has called it.  None if others do it, or Python's import itself, which sources tell.
 
-    A thread that neither this package's call nor a module leads to opens files for the code that others are in, too.
+    A thread that neither this package's call nor a module leads to opens files for the code that the main one is in;
+    while cells are computed, for what any is in.
 
     Args:
         event: of Python's audit hooks.
         computing: whether cells are computed, for which such a thread may work if nobody is known.
     """
-    mine, (by, called, led) = threading.get_ident(), _users(sys._getframe(2), event)
-    if not led and mine != threading.main_thread().ident and event not in LISTS:
-        frames = [frame for ident, frame in sys._current_frames().items() if ident != mine]
+    by, called, led = _users(sys._getframe(2), event)
+    mine, main = threading.get_ident(), threading.main_thread().ident
+    if not led and mine != main and event not in LISTS:
+        threads = sys._current_frames()
+        frames = [threads[one] for one in threads if one != mine and (computing or one == main)]
         others = [(users, whether) for users, whether, led in map(_users, frames) if led]
         by = by.union(*(users for users, _ in others)) or frozenset({ANYBODY} if computing else ())
         called = any(whether for _, whether in others)
