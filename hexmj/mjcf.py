@@ -42,4 +42,5 @@ def content(path: Path) -> bytes:
 
 def _text(path: Path) -> str:
     with opened(path) as file:
-        return read_bytes(path).decode(errors="replace") if b"<" in file.read(HEAD) else ""
+        head = file.read(HEAD)
+        return (head + file.read()).decode(errors="replace") if b"<" in head else ""

@@ -221,9 +221,17 @@ def _note_named(file: str, source: bytes, reached: int) -> None:
     new = {os.path.dirname(file), os.path.dirname(os.path.realpath(file)), "."} if names else set[str]()
     for _ in range(1 + DEEPEST):
         for path in {os.path.normpath(os.path.join(folder, name)) for folder in new for name in names}:
-            for one in {path, *(map(str, parts(Path(path))) if path.endswith(MJCF) and os.path.isfile(path) else ())}:
+            for one in {path, *_parts(path)}:
                 HEARD.setdefault((one, os.path.abspath(one)), {})[frozenset({file}), _seen(one)] = False
         new = {within for folder in new for text in texts if os.path.isdir(within := os.path.join(folder, text))}
+
+
+def _parts(path: str) -> list[str]:
+    """The files that an MJCF is made of, if it is one that can be read."""
+    with suppress(InputError):
+        if path.lower().endswith(MJCF) and os.path.isfile(path):
+            return [str(one) for one in parts(Path(path))]
+    return []
 
 
 def _note_before() -> None:

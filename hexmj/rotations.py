@@ -32,6 +32,23 @@ def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))
 
 
+@njit(cache=True, nogil=True)
+def lowest(qpos: Any, corners: Any, radii: Any) -> float:
+    """Height of the lowest of some spheres that a root carries, for compiled code [mm].
+
+    Args:
+        qpos: place and quaternion of the root, and more, (position,).
+        corners: their middles in the root frame, (corner, axis) [mm].
+        radii: of each, (corner,) [mm].
+    """
+    _, _, _, _, _, _, up_x, up_y, up_z = matrix(qpos[3], qpos[4], qpos[5], qpos[6])
+    least = np.inf
+    for c in range(len(corners)):
+        height = qpos[2] + up_x * corners[c, 0] + up_y * corners[c, 1] + up_z * corners[c, 2] - radii[c]
+        least = min(least, height)
+    return least
+
+
 @njit(nogil=True, forceinline=True)
 def matrix(w: float, x: float, y: float, z: float) -> Any:
     """The rotation of one quaternion, row by row: nine numbers, for compiled code."""

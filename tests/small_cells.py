@@ -15,6 +15,9 @@ from hexmj.sweeps import Cell
 PATHS = ".", *(str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}
 
+BODY = '<mujoco><worldbody><body><geom size="1" mass="{}"/></body></worldbody></mujoco>'
+"""An MJCF of one mass."""
+
 MINE = """
 from dataclasses import dataclass
 

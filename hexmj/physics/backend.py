@@ -13,7 +13,7 @@ from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.callbacks import batched
-from hexmj.rotations import matrix
+from hexmj.rotations import lowest
 from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
@@ -227,14 +227,10 @@ def _side_by_side(ids: Any, values: Any) -> Any:
 @njit(cache=True, nogil=True)
 def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
     """Heights of the lowest points of some trunks, (n,) [mm]; corners (corner, axis) and radii (corner,) [mm]."""
-    lowest = np.full(len(ids), np.inf)
+    heights = np.empty(len(ids))
     for i, n in enumerate(ids):
-        q = qpos[n]
-        _, _, _, _, _, _, up_x, up_y, up_z = matrix(q[3], q[4], q[5], q[6])
-        for c in range(len(corners)):
-            height = q[2] + up_x * corners[c, 0] + up_y * corners[c, 1] + up_z * corners[c, 2] - radii[c]
-            lowest[i] = min(lowest[i], height)
-    return lowest
+        heights[i] = lowest(qpos[n], corners, radii)
+    return heights
 
 
 @njit(cache=True, nogil=True)

@@ -11,7 +11,7 @@ from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk
 from hexmj.physics.settling import Settled
-from hexmj.rotations import matrix
+from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time
 from hexmj.walks import Walk
 
@@ -261,10 +261,8 @@ def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
         for t in range(valid[i]):
             q, sensed = qpos[i, t], sensors[i, t]
             _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
-            _, _, _, _, _, _, up_x, up_y, up_z = matrix(q[3], q[4], q[5], q[6])
-            for c in range(len(corner)):
-                height = q[2] + up_x * corner[c, 0] + up_y * corner[c, 1] + up_z * corner[c, 2] - radius[c]
-                sums.clearance[start] = min(sums.clearance[start], height)
+            _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
+            sums.clearance[start] = min(sums.clearance[start], lowest(q, corner, radius))
             sums.upright[start] = min(sums.upright[start], up_z)
             if up_z < LEAST_UPRIGHT:
                 sums.toppled[start] = min(sums.toppled[start], sums.shown[start])

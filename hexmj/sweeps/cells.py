@@ -53,6 +53,9 @@ class Cell:
 
         Raises:
             InputError: a file that it has read more than once has changed meanwhile.
+
+        Warns:
+            UserWarning: so has one that was opened to be written, too.
         """
         asked = signature(self.function).parameters
         with computing() as read:

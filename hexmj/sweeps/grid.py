@@ -78,8 +78,8 @@ def finish(
         how: see `Execution`.
 
     Raises:
-        InputError: a cell cannot be named, sent, written or believed, or a worker was killed.  And whatever the first
-            cell to fail raises.
+        InputError: a cell cannot be named, sent, written or believed, a file that cells read has changed meanwhile or
+            is another where a worker is, or a worker was killed.  And whatever the first cell to fail raises.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")

@@ -1,0 +1,182 @@
+"""What programs read counts for the cells that they sweep: scripts, packages beside them, installed ones, threads."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from small_cells import BODY, ENVIRONMENT
+
+SCRIPT = """
+from hexmj.sweeps import Cell, run
+from pathlib import Path
+import xarray as xr
+def load(name):
+    return [float(path.read_text()) for path in (Path(name),)][0]
+GAIN = load("ga" + "in")
+def cell():
+    return xr.Dataset({"gain": GAIN})
+if __name__ == "__main__":
+    print(run([Cell("script", cell, {})], Path("kept"))[0].gain.item())
+"""
+
+
+PACKAGE = """
+import pkgutil
+import xarray as xr
+def cell():
+    return xr.Dataset({"gain": float(pkgutil.get_data(__name__, "../gain"))})
+"""
+
+
+@pytest.mark.parametrize(("script", "package"), [(SCRIPT, ""), (SCRIPT.replace("def cell", "def _"), PACKAGE)])
+def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
+    tmp_path: Path, script: str, package: str
+) -> None:
+    (tmp_path / "pk").mkdir()
+    (tmp_path / "pk" / "__init__.py").write_text(package)
+    (tmp_path / "script.py").write_text(("from pk import cell\n" if package else "") + script)
+    for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2), (1.0, 2)):
+        (tmp_path / "gain").write_text(str(gain))
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+    assert not [file for file in (tmp_path / "kept").iterdir() if b"kept/" in file.read_bytes()]
+
+
+FAR_FETCHED = """
+import importlib, pkgutil
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np, xarray as xr
+import installed
+import mujoco
+with ThreadPoolExecutor(1) as threads:
+    (ONE,) = threads.map(np.loadtxt, ["one"])
+(TWO,) = [importlib.import_module(f"pk.{found.name}").TWO for found in pkgutil.iter_modules(__path__)]
+def cell(three):
+    return xr.Dataset({"gain": ONE + TWO + three.of("three") + mujoco.MjModel.from_xml_path("four.xml").body_mass[1]})
+"""
+
+FEW, MANY = (1, 2, 3, 4), (7, 8, 9, 10)
+
+INSTALLED = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Reads:
+    def of(self, name):
+        with open(name) as file:
+            return float(file.read())
+"""
+
+FAR_SCRIPT = """
+from pathlib import Path
+import installed
+from hexmj.sweeps import Cell, run
+from pk import cell
+if __name__ == "__main__":
+    print(run([Cell("far", cell, {"three": installed.Reads()})], Path("kept"))[0].gain.item())
+"""
+
+
+def test_reads_in_threads_by_an_installed_class_and_of_modules_that_are_found_count(tmp_path: Path) -> None:
+    for folder in ("pk", "site-packages"):
+        (tmp_path / folder).mkdir()
+    for name, text in (("pk/__init__", FAR_FETCHED), ("site-packages/installed", INSTALLED), ("script", FAR_SCRIPT)):
+        (tmp_path / f"{name}.py").write_text(text)
+    env = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}site-packages"}
+    (tmp_path / "four.xml").write_text('<mujoco><include file="inner.xml"/></mujoco>')
+    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "inner.xml": BODY}
+    for gains, kept in (
+        (FEW, 1),
+        (FEW, 1),
+        ((7, 2, 3, 4), 2),
+        ((7, 8, 3, 4), 3),
+        ((7, 8, 9, 4), 4),
+        (MANY, 5),
+        (FEW, 5),
+    ):
+        for (name, text), gain in zip(texts.items(), gains, strict=True):
+            (tmp_path / name).write_text(text.format(gain))
+        (tmp_path / f"{gains}.json").write_text("neither read nor listed")
+        told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=env)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (sum(gains), kept)
+
+
+BEFORE = """
+import numpy as np
+from pathlib import Path
+HERE = Path(__file__).parent
+GAIN = np.load(f"{HERE}/data" + "/of" + "/gain.npy")
+"""
+
+IMPORTS_BEFORE = """
+import numpy as np
+from lib import before
+OWN = np.load("own.npy")
+from hexmj.sweeps import Cell, run
+from pathlib import Path
+import xarray as xr
+def cell():
+    Path("calls").open("a").write(".")
+    return xr.Dataset({"gain": before.GAIN + OWN})
+if __name__ == "__main__":
+    print(run([Cell("before", cell, {})], Path("kept"))[0].gain.item())
+    np.save("written.npy", np.random.random())
+"""
+
+
+def test_what_was_read_before_the_package_was_imported_counts_if_it_is_named(tmp_path: Path) -> None:
+    (data := tmp_path / "lib" / "data" / "of").mkdir(parents=True)
+    (tmp_path / "lib" / "before.py").write_text(BEFORE)
+    (tmp_path / "script.py").write_text(IMPORTS_BEFORE)
+    for helpers, own, calls in ((1.0, 10.0, 1), (1.0, 10.0, 1), (2.0, 10.0, 2), (2.0, 20.0, 3)):
+        np.save(data / "gain.npy", helpers)
+        np.save(tmp_path / "own.npy", own)
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), (tmp_path / "calls").stat().st_size) == (helpers + own, calls)
+
+
+WARMED = """
+import threading
+from functools import cache
+from pathlib import Path
+import xarray as xr
+from hexmj.sweeps import Cell, run
+@cache
+def gain(name):
+    return float(Path(name).read_text())
+def cell():
+    return xr.Dataset({"gain": gain("ga" + "in")})
+"""
+
+
+def test_what_a_thread_has_read_before_the_sweep_counts(tmp_path: Path) -> None:
+    (tmp_path / "warmed.py").write_text(WARMED)
+    (tmp_path / "script.py").write_text(
+        "import threading, warmed\nfrom pathlib import Path\nfrom hexmj.sweeps import Cell, run\n"
+        "thread = threading.Thread(target=warmed.gain, args=['gain'])\nthread.start()\nthread.join()\n"
+        "print(run([Cell('warmed', warmed.cell, {})], Path('kept'))[0].gain.item())"
+    )
+    for gain, kept in ((1.0, 1), (2.0, 2), (1.0, 2)):
+        (tmp_path / "gain").write_text(str(gain))
+        told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+
+
+def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(
+        "from hexmj.sweeps import Cell, run\nfrom pathlib import Path\nimport xarray as xr\n"
+        "def cell():\n    return xr.Dataset({'gain': float(Path('ga' + 'in').read_text())})\n"
+        "for gain in (1.0, 2.0, 1.0):\n    Path('gain').write_text(str(gain))\n"
+        "    assert run([Cell('script', cell, {})], Path('kept'))[0].gain == gain\n"
+    )
+    subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, check=True)
+    assert len(list((tmp_path / "kept").iterdir())) == 2
+
+
+def test_an_mjcf_that_cannot_be_read_is_nothing_to_the_import(tmp_path: Path) -> None:
+    (tmp_path / "leg.xml").symlink_to("/proc/self/mem")
+    (tmp_path / "script.py").write_text("LEG = 'leg.xml'\nimport hexmj\nprint(hexmj.LDVS.name)")
+    assert subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT) == b"ldvs\n"
