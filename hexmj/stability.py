@@ -16,6 +16,10 @@ from hexmj.errors import InputError
 from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
+ROUNDING = 4.0 * 2.0**-53
+"""Bounds the error of a difference of two products of differences, relative to the sum of these (Shewchuk 1997, orient2d:
+3 + 16 * 2^-53): within it nobody knows on which side of a line a foot lies, and it counts as lying on it."""
+
 NOWHERE = "a foot that stands is at NaN or infinity; expected all that stand to be somewhere"
 
 
@@ -115,9 +119,10 @@ def margins(feet: Any, stance: Any, margin: Any) -> None:
                 left = right = False
                 for c in range(6):
                     if s[c]:
-                        side = ex * (f[c, 1] - f[a, 1]) - ey * (f[c, 0] - f[a, 0])
-                        left |= side > 0.0
-                        right |= side < 0.0
+                        one, other = ex * (f[c, 1] - f[a, 1]), ey * (f[c, 0] - f[a, 0])
+                        doubt = ROUNDING * (abs(one) + abs(other))
+                        left |= one - other > doubt
+                        right |= other - one > doubt
                 if left and right:
                     continue
                 side = ey * f[a, 0] - ex * f[a, 1]  # of the centre of mass

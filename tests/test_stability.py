@@ -96,6 +96,17 @@ def test_feet_in_a_line_are_never_stable(seed, standing, beside):
     assert np.array_equal(support_polygon(feet, stance), feet[stance])
 
 
+def test_feet_in_a_slanted_line_are_never_stable():
+    """Such as rounding leaves them: a polygon so thin that the signs of its corners are not known."""
+    rng = np.random.default_rng(1)
+    along, beside, slope = rng.normal(0.0, 10.0, (100_000, 6)), rng.normal(0.0, 1.0, (100_000, 1)), rng.normal()
+    feet = np.stack([along, slope * along + beside], axis=-1)
+    stance = np.arange(6) < rng.integers(3, 7, (100_000, 1))
+    distance = np.abs(beside[:, 0]) / np.hypot(1.0, slope)
+    margin = stability_margin(feet, stance)
+    assert (margin <= -distance * (1.0 - 1e-9) + 1e-12).all()
+
+
 def test_feet_in_one_place():
     corners = np.array([[10.0, 10.0], [10.0, -10.0], [-10.0, -10.0], [-10.0, 10.0], [10.0, 10.0], [0.0, 1.0]])
     assert stability_margin(corners, np.ones(6, dtype=bool)) == pytest.approx(10.0)
