@@ -55,14 +55,14 @@ def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bo
     users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
     while frame is not None:
         name, file = frame.f_code.co_name, frame.f_code.co_filename
-        whose = _whose(file)
+        whose, runs = _whose(file), name == "<module>" and frame.f_globals.get("__name__")
         if whose == "import's" and event != "exec" and not users and (event != "open" or name == "_find_and_load"):
             return frozenset(), False, True
         if whose == "ours" and (users or not for_others or file in _KEEPS):
             return frozenset(users), bool(users), True
-        if whose == "user's" or file in as_run.FOLLOWED:
+        if whose == "user's" or file in as_run.FOLLOWED or (runs and whose == "a library's"):
             users.add(file)
-            if name == "<module>" and frame.f_globals.get("__name__"):
+            if runs and whose == "user's":
                 return frozenset(users), False, True
         frame = frame.f_back
     return frozenset(users), False, False

@@ -59,21 +59,23 @@ def cell(three):
     return xr.Dataset({"gain": ONE + TWO + three.of("three") + mujoco.MjModel.from_xml_path("four.xml").body_mass[1]})
 """
 
-FEW, MANY = (1, 2, 3, 4), (7, 8, 9, 10)
+FEW, MANY = (1, 2, 3, 4, 5), (7, 8, 9, 10, 11)
 
 INSTALLED = """
 from dataclasses import dataclass
+with open("five") as file:
+    FIVE = float(file.read())
 @dataclass(frozen=True)
 class Reads:
     def of(self, name):
         with open(name) as file:
-            return float(file.read())
+            return float(file.read()) + FIVE
 """
 
 FAR_SCRIPT = """
 from pathlib import Path
-import installed
 from hexmj.sweeps import Cell, run
+import installed
 from pk import cell
 if __name__ == "__main__":
     print(run([Cell("far", cell, {"three": installed.Reads()})], Path("kept"))[0].gain.item())
@@ -87,15 +89,16 @@ def test_reads_in_threads_by_an_installed_class_and_of_modules_that_are_found_co
         (tmp_path / f"{name}.py").write_text(text)
     env = ENVIRONMENT | {"PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}site-packages"}
     (tmp_path / "four.xml").write_text('<mujoco><include file="inner.xml"/></mujoco>')
-    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "inner.xml": BODY}
+    texts = {"one": "{}", "pk/part.py": "TWO = {}", "three": "{}", "inner.xml": BODY, "five": "{}"}
     for gains, kept in (
         (FEW, 1),
         (FEW, 1),
-        ((7, 2, 3, 4), 2),
-        ((7, 8, 3, 4), 3),
-        ((7, 8, 9, 4), 4),
-        (MANY, 5),
-        (FEW, 5),
+        ((7, 2, 3, 4, 5), 2),
+        ((7, 8, 3, 4, 5), 3),
+        ((7, 8, 9, 4, 5), 4),
+        ((7, 8, 9, 10, 5), 5),
+        (MANY, 6),
+        (FEW, 6),
     ):
         for (name, text), gain in zip(texts.items(), gains, strict=True):
             (tmp_path / name).write_text(text.format(gain))
