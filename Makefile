@@ -80,7 +80,7 @@ browser:
 	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || \
 	    { echo "$(PYTHON) cannot make virtual environments: apt-get install python3-venv."; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) install --constraint constraints.txt --editable .
+	$(PIP) install --constraint constraints.txt --editable ".[film]"
 	touch $@
 
 # A peer with other versions of MuJoCo; its OpenCV is replaced by the one that needs no libGL.
@@ -93,7 +93,7 @@ browser:
 
 .venv/dev: .venv/project
 	$(PIP) install "pip>=25.1"  # the first with dependency groups
-	$(PIP) install --constraint constraints.txt --editable ".[gym,dask,view,docs]" --group dev
+	$(PIP) install --constraint constraints.txt --editable ".[film,search,gym,dask,view,docs]" --group dev
 	touch $@
 
 # stable-baselines3 and torch, for tests of learning, which are skipped without them.

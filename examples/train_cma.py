@@ -1,4 +1,4 @@
-"""Reflexes learned by CMA-ES: 15 numbers that move the tips of LDVS, so that fewer insects fall as they set off.
+"""Reflexes learned by CMA-ES (`pip install ".[gym,search]"`): 15 numbers that keep LDVS from falling as it sets off.
 
 Every generation all candidates walk the same fresh starts, each start in an insect of its own in one vector
 environment.  `python examples/train_cma.py` takes some minutes and writes what it found beside itself; `hexmj league

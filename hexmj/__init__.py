@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from hexmj.starts import draw_starts as draw_starts
     from hexmj.timing import Acceleration as Acceleration
     from hexmj.timing import Stride as Stride
+    from hexmj.version import __version__ as __version__
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
@@ -88,6 +89,7 @@ _MODULES = {
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),
     "starts": ("draw_starts",),
     "timing": ("Acceleration", "Stride"),
+    "version": ("__version__",),
     "walks": ("Walk",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}

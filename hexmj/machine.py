@@ -103,10 +103,13 @@ def rendering() -> str:
 
 def films() -> str:
     """ffmpeg encodes two frames, which can be read back."""
-    import imageio_ffmpeg
     import numpy as np
 
-    from hexmj.replay.film.encoder import encoder
+    from hexmj.replay.film.encoder import encoder, missing
+
+    if reason := missing():
+        raise Unfit(reason)
+    import imageio_ffmpeg
 
     ffmpeg, frames = imageio_ffmpeg.get_ffmpeg_exe(), np.zeros((2, 48, 64, 3), np.uint8)
     frames[1] = 255
@@ -154,7 +157,7 @@ CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "install hexmj into a fresh environment (make test, make compare), Python 3.11 or newer"),
     "threads": (threads, "give --threads with the number of cores that are granted"),
     "rendering": (rendering, f"install {PACKAGES} and leave MUJOCO_GL unset, or set it to egl; only films need it"),
-    "films": (films, "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
+    "films": (films, "reinstall the extra film, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
     "compiled code": (compiled, "set NUMBA_CACHE_DIR to a folder that can be written to"),
     "walking": (walking, "reinstall mujoco and numba within the bounds above; if it stays, report it"),
 }

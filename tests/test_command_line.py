@@ -32,6 +32,7 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
 
 def test_version_is_one_line(run):
     assert run("--version") == (0, f"hexmj {version('hexmj')}\n", "")
+    assert hexmj.__version__ == version("hexmj")
 
 
 def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):

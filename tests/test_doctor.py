@@ -1,6 +1,7 @@
 """Every check of `hexmj doctor` passes here and, where its failure is simulated, reports it and names a remedy."""
 
 import json
+import sys
 from importlib import metadata
 
 import pytest
@@ -54,6 +55,10 @@ def no_ffmpeg(monkeypatch, tmp_path):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "ffmpeg"))
 
 
+def no_film_extra(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "mediapy", None)
+
+
 def no_cache(monkeypatch, tmp_path):
     def refuse(dir: str) -> None:
         raise PermissionError(13, "Permission denied")
@@ -77,6 +82,7 @@ def no_walk(monkeypatch, tmp_path):
         ("threads", a_small_quota, "would share 0.5 cores"),
         ("rendering", no_driver, "GLContext"),
         ("films", no_ffmpeg, "ffmpeg"),
+        ("films", no_film_extra, 'pip install ".[film]"'),
         ("compiled code", no_cache, "Permission denied"),
         ("walking", no_walk, "start 0 diverged"),
     ],

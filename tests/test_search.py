@@ -1,6 +1,7 @@
 """A search: it lowers the cost, goes on to the same bits where it was stopped, and believes no damaged file."""
 
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +111,13 @@ def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_al
     with pytest.raises(InputError, match="is damaged, or of another search"):
         search(PROBLEM, effort, folder=tmp_path)
     assert kept.read_text() == "precious"
+
+
+def test_without_cmaes_it_is_said_what_brings_it(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "cmaes", None)
+    assert Effort().algorithm == "evolution"
+    with pytest.raises(InputError, match=r'pip install "\.\[search\]"'):
+        Effort("cmaes")
 
 
 @pytest.mark.parametrize(

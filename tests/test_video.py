@@ -16,7 +16,7 @@ from film_reader import read_film
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.controllers.cruse1998 import UNCOORDINATED
-from hexmj.errors import InputError
+from hexmj.errors import InputError, RenderingError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.replay.film import gl
 from hexmj.replay.film.film import Film
@@ -229,6 +229,15 @@ def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
         render([fallen], path, Film(width=320, height=240), fail)
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_without_what_encodes_films_it_is_said_what_brings_it(fallen, tmp_path, monkeypatch, run):
+    monkeypatch.setitem(sys.modules, "mediapy", None)
+    with pytest.raises(RenderingError, match=r'pip install "\.\[film\]"'):
+        render([fallen], tmp_path / "film.mp4")
+    code, _, error = run("render", "--window", "5", "--out", tmp_path / "out")
+    assert code == 1 and 'pip install ".[film]"' in error
+    assert not list(tmp_path.iterdir())
 
 
 def test_whether_anything_can_be_rendered_is_known():

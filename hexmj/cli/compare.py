@@ -106,10 +106,9 @@ class Compare(StudyCommand):
 
     def _filmed(self, walked: "xr.Dataset") -> Path:
         """A video of a recording."""
-        from hexmj.replay.film import gl
-        from hexmj.replay.film.video import render
+        from hexmj.replay.film.video import missing, render
 
-        if sentence := gl.missing():
+        if sentence := missing():
             raise RenderingError(sentence)
         with progress_bar("rendering") as progress:
             render([walked], self.out / "gait.mp4", Film(), progress)

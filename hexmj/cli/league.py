@@ -137,12 +137,11 @@ class League(StudyCommand):
         Raises:
             InputError, SimulationError, RenderingError: there is no video, and why.
         """
-        from hexmj.replay.film import gl
-        from hexmj.replay.film.video import render
+        from hexmj.replay.film.video import missing, render
         from hexmj.studies.league.physics import REFUSALS
         from hexmj.studies.league.table import by_rank
 
-        if sentence := gl.missing():
+        if sentence := missing():
             raise RenderingError(sentence)
         takes_part, v = entrants(self.names), result.attrs["tried_at"]
         best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]

@@ -8,7 +8,6 @@ from contextlib import nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import reduce
 from importlib import import_module
-from importlib.metadata import version
 from io import StringIO, TextIOWrapper
 from operator import or_
 from pathlib import Path
@@ -24,6 +23,7 @@ from hexmj.cli.words import checked, shell, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.literal import literal
 from hexmj.signals import of_stop
+from hexmj.version import __version__
 
 NUMBA = (
     "numba cannot find or keep compiled code; delete its files (*.nbi, *.nbc, beside the modules or in"
@@ -93,7 +93,7 @@ class _Version:
     """`hexmj --version`."""
 
     def run(self) -> None:
-        print(f"hexmj {version('hexmj')}")
+        print(f"hexmj {__version__}")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import entry_points, version
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from hexmj.literal import literal
 from hexmj.loaded import importable, module_name
 from hexmj.results import json_text, save_text
 from hexmj.sweeps.code import code
+from hexmj.version import __version__
 
 FORMAT = 2
 """Of the file; 1 had settings and versions only."""
@@ -185,7 +186,7 @@ def _modules(typed: Sequence[str]) -> Iterator[str]:
 
 def _versions() -> dict[str, str]:
     libc, number = platform.libc_ver()
-    return {"hexmj": version("hexmj")} | ({libc: number} if libc else {})
+    return {"hexmj": __version__} | ({libc: number} if libc else {})
 
 
 def _processor() -> list[str]:

@@ -52,8 +52,7 @@ class Render(WalkingCommand):
 
     def run(self) -> None:
         """Record if there is nothing to render yet, then render from the recordings."""
-        from hexmj.replay.film import gl
-        from hexmj.replay.film.video import render
+        from hexmj.replay.film.video import missing, render
         from hexmj.replay.recording import load_recording
         from hexmj.replay.take import takes_of
 
@@ -65,7 +64,7 @@ class Render(WalkingCommand):
         name = self._name(shown)
         video, manifest = f"{name}.{self.format}", f"{name}.{self.format}-{MANIFEST}"
         out = results_folder(self.out, (video, f"{name}-1.nc", f"{name}-2.nc", manifest))
-        if sentence := gl.missing():
+        if sentence := missing():
             raise RenderingError(sentence)
         files, settings = [], {"film": asdict(self.film)}
         if not shown:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -12,10 +13,10 @@ import numpy as np
 
 from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.errors import InputError
+from hexmj.errors import InputError, without_extra
 from hexmj.locks import locked
 from hexmj.progress import Progress, shown
-from hexmj.search.covariance import CovarianceAdaptation
+from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
 from hexmj.search.problems import REFUSED, Problem, Sample
@@ -31,8 +32,6 @@ Costs = Callable[[np.ndarray], np.ndarray]
 
 MOST = 10_000
 """Individuals of the largest population."""
-
-ALGORITHMS = {"evolution": Evolution, "cmaes": CovarianceAdaptation}
 
 
 class Searcher(Protocol):
@@ -73,6 +72,8 @@ class Effort:
 
     def __post_init__(self) -> None:
         check_types(self)
+        if self.algorithm == "cmaes" and find_spec("cmaes") is None:
+            raise without_extra("search", "cmaes, which the algorithm of this name needs,")
         whole("population", self.population, 4 if self.algorithm == "cmaes" else 2, MOST, " individuals")
         check_draw(self.starts, self.seed)
         check_draw(self.refine_starts, self.seed)
@@ -141,7 +142,7 @@ def _search(
     work = effort.budget * effort.starts + effort.refine_budget * effort.refine_starts
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if effort.refine_budget else {})
     samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
-    searcher = ALGORITHMS[effort.algorithm](domain, effort.population, effort.seed)
+    searcher = _searcher(effort, domain)
     kept = {
         stage: KeptValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
     }
@@ -172,6 +173,14 @@ def _search(
         last.check_reach(best, threads)
     told = asked.assign_attrs(settings=settings, refused=len(refused))
     return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
+
+
+def _searcher(effort: Effort, domain: Domain) -> Searcher:
+    if effort.algorithm == "evolution":
+        return Evolution(domain, effort.population, effort.seed)
+    from hexmj.search.covariance import CovarianceAdaptation
+
+    return CovarianceAdaptation(domain, effort.population, effort.seed)
 
 
 def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:

@@ -2,21 +2,29 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import imageio_ffmpeg
-import mediapy
 import numpy as np
 
-from hexmj.errors import RenderingError
+from hexmj.errors import RenderingError, without_extra
 from hexmj.signals import unheard_by_children
+
+if TYPE_CHECKING:
+    import mediapy
 
 HOW: dict[str, dict[str, Any]] = {
     ".mp4": {"crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
     ".gif": {"codec": "gif"},
 }
 """End of a film's name -> how it is encoded."""
+
+
+def missing() -> str | None:
+    """What brings the libraries that encode films, in one sentence; None if they are there."""
+    both = find_spec("imageio_ffmpeg") and find_spec("mediapy")
+    return None if both else str(without_extra("film", "mediapy or imageio-ffmpeg, which films need,"))
 
 
 @contextmanager
@@ -33,6 +41,9 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
         OSError: the film cannot be written; with what ffmpeg says of it.
         RenderingError: there is no ffmpeg.
     """
+    import imageio_ffmpeg
+    import mediapy
+
     writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, **HOW[path.suffix])
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
@@ -46,7 +57,7 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
         _close(writer)
 
 
-def _close(writer: mediapy.VideoWriter) -> None:
+def _close(writer: "mediapy.VideoWriter") -> None:
     try:
         try:
             writer.close()

@@ -16,8 +16,7 @@ from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
 from hexmj.progress import Progress, shown
-from hexmj.replay.film import gl
-from hexmj.replay.film.encoder import HOW, encoder
+from hexmj.replay.film import encoder, gl
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
 from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
@@ -63,10 +62,10 @@ def render(
     if not 1 <= len(recordings) <= MOST_PANELS:
         raise InputError(f"{len(recordings)} recordings were given; expected 1 to {MOST_PANELS}")
     film.check_camera(typed("body", body, Body))
-    if path.suffix not in HOW or not path.parent.is_dir():
-        ends = " or ".join(HOW)
+    if path.suffix not in encoder.HOW or not path.parent.is_dir():
+        ends = " or ".join(encoder.HOW)
         raise InputError(f"the film cannot be written to {path}; expected a name with {ends} in a folder that exists")
-    if reason := gl.missing():
+    if reason := missing():
         raise RenderingError(reason)
     takes = takes_of(recordings, body)
     begin, end = min(take.begin for take in takes), max(take.end for take in takes)
@@ -75,6 +74,11 @@ def render(
     with shown(progress, "rendering") as told, replacing(path) as part:
         _write(takes, overlays, part, begin + np.arange(frames) / (film.fps * film.slow_motion), film, told)
     return frames
+
+
+def missing() -> str | None:
+    """Why no film can be made here and what brings it, in one sentence; None if it can."""
+    return gl.missing() or encoder.missing()
 
 
 def _write(
@@ -96,7 +100,7 @@ def _write(
             conditions: (opened.enter_context(gl.renderer(model, film.height, film.width)), mujoco.MjData(model))
             for conditions, model in worlds.items()
         }
-        add = opened.enter_context(encoder(path, *picture.shape[:2], film.fps))
+        add = opened.enter_context(encoder.encoder(path, *picture.shape[:2], film.fps))
         for seconds in times.tolist():
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
