@@ -15,7 +15,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.gym import StickInsect
-from hexmj.environments.learned import FELT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
+from hexmj.environments.learned import FELT, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
 from hexmj.errors import InputError
 from hexmj.loaded import importable
 from hexmj.view.live import LiveWalk
@@ -161,6 +161,31 @@ def test_an_action_is_held_and_rewarded_until_the_first_end():
     assert len(counted) == 4 and counted[0].shape == (2, 5) and seen.shape == (2, 1)
     np.testing.assert_array_equal(reward, 0.75)
     assert done.all() and all(one["TimeLimit.truncated"] and one["terminal_observation"] == 1 for one in infos)
+
+
+@pytest.mark.slow
+def test_a_fall_is_rewarded_by_what_was_felt_as_it_fell_and_every_insect_is_drawn():
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    face, fallen = importlib.import_module("hexmj.environments.stable_baselines"), []
+    insects = face.FeltInsects(2, velocity=0.5, render_mode="rgb_array")
+
+    def leaning(felt: np.ndarray) -> list[float]:
+        return np.abs(felt[:, TILT]).max(axis=1).tolist()
+
+    def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray:
+        fallen.extend(leaning(felt[fell]))
+        return walked
+
+    def front_up_hind_down(actions: np.ndarray, felt: np.ndarray) -> np.ndarray:
+        return np.tile([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(felt), 2))
+
+    held = face.HeldInsects(insects, 1, 100, front_up_hind_down, reward)
+    held.reset()
+    for _ in range(5):
+        held.step(np.zeros((2, 1)))
+    assert fallen and min(fallen) > max(leaning(insects.reset()))
+    assert len(frames := insects.get_images()) == 2 and all(frame.std() > 1 for frame in frames)
+    insects.close()
 
 
 def test_what_ppo_found_is_there_and_is_the_same_in_every_leg_mirrored(example):

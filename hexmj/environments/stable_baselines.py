@@ -27,7 +27,8 @@ Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Offsets of the tips, (n, leg * axis), of actions, (n, number), and what is felt, (n, `FELT`)."""
 
 Reward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Of the environment's reward, what is felt and who fell, each (n, ...): the reward to learn by, (n,)."""
+"""Of the environment's reward, what is felt as a step ends and who fell in it, each (n, ...): the reward to learn by,
+(n,)."""
 
 
 class FeltInsects(VecEnv):
@@ -58,8 +59,12 @@ class FeltInsects(VecEnv):
             infos[i] = {"terminal_observation": _seen(final)[0], "TimeLimit.truncated": bool(over[i])}
         return _seen(observed), reward.astype(np.float32), done, infos
 
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A frame of every insect, (height, width, 3), if they were asked for by `render_mode`."""
+        return self._insects.render() or [None] * self.num_envs
+
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Free the GL, if one was chosen."""
         self._insects.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
@@ -113,7 +118,10 @@ class HeldInsects(VecEnvWrapper):
             self._insects.step_async(self._moves(self._actions, self._felt))
             self._felt, gained, ends, told = self._insects.step_wait()
             fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in told])
-            reward += ~done * self._reward(gained, self._felt, fell)
+            last = self._felt.copy()
+            for i in np.flatnonzero(ends).tolist():
+                last[i] = told[i]["terminal_observation"]
+            reward += ~done * self._reward(gained, last, fell)
             for i in np.flatnonzero(ends & ~done).tolist():
                 infos[i] = told[i] | {"terminal_observation": self._constant[i]}
             done |= ends
