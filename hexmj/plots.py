@@ -4,7 +4,6 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.measures.parts import check_axes, check_window, what_parts_may_lack
 
@@ -49,7 +48,12 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     """
     import xarray as xr
 
-    figures = FIGURES.get(_study(typed("result", result, xr.Dataset)))
+    if not isinstance(result, xr.Dataset):
+        raise InputError(
+            f"result is of the type {type(result).__name__}; expected a Dataset: a result, what hexmj.load reads, or"
+            " what hexmj.record makes of a walk"
+        )
+    figures = FIGURES.get(_study(result))
     if figures is None:
         raise InputError(
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"

@@ -17,8 +17,8 @@ from hexmj.threads import run_blocks
 from hexmj.walks import Walk
 
 ROUNDING = 4.0 * 2.0**-53
-"""Bounds the error of a difference of two products of differences, relative to the sum of these (Shewchuk 1997, orient2d:
-3 + 16 * 2^-53): within it nobody knows on which side of a line a foot lies, and it counts as lying on it."""
+"""Bounds the error of a difference of two products, relative to the sum of their sizes (Shewchuk 1997, orient2d):
+within it nobody knows on which side of a line a foot lies, and it counts as lying on it."""
 
 NOWHERE = "a foot that stands is at NaN or infinity; expected all that stand to be somewhere"
 

@@ -214,7 +214,7 @@ def test_a_notebook_is_shown_a_figure():
 
 def test_what_belongs_to_no_figure_is_refused_in_a_sentence(tmp_path: Path):
     wrong: Any = 3
-    with pytest.raises(InputError, match="result = 3; expected a Dataset"):
+    with pytest.raises(InputError, match="result is of the type int; expected a Dataset"):
         hexmj.plot(wrong)
     with pytest.raises(InputError, match="result = 3; expected a Dataset"):
         hexmj.save(wrong, tmp_path / "a.nc")

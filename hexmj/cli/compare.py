@@ -90,7 +90,7 @@ class Compare(StudyCommand):
         frequencies, answers = _tables(result)
         yield "Frequency of the loss of static stability, with 95 % intervals"
         yield frequencies
-        yield "Starts: lost on paper and fell, either alone (kin., phys.), none; share that toppled; speed over command"
+        yield "Starts that lost on paper and fell (both), did either (kin., phys.) or none; speed over command"
         yield answers
         yield self.conditions_line()
         yield report_line(physical_report(result))
