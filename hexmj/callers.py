@@ -60,7 +60,10 @@ def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bo
             return frozenset(), False, True
         if whose == "ours" and (users or not for_others or file in _KEEPS):
             return frozenset(users), bool(users), True
-        if whose == "user's" or file in as_run.FOLLOWED or (runs and whose == "a library's"):
+        imported = frame.f_back and _whose(frame.f_back.f_code.co_filename) == "import's"
+        if runs and imported and whose == "a library's" and not users:  # it may be of a controller's package
+            return frozenset({file}), False, True
+        if whose == "user's" or file in as_run.FOLLOWED:
             users.add(file)
             if runs and whose == "user's":
                 return frozenset(users), False, True

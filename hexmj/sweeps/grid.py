@@ -94,46 +94,18 @@ def finish(
     if folder:
         finished_all = all(path and os.path.exists(path) for path in paths)
         (remove_leftovers if finished_all else prepare)(folder)
-    whole = sum(cell.work for cell in cells)
-    told = [0.0] * len(cells)
-    before = [one for cell in cells for one in json.loads(cell.reads()).items()]
-    read = {place: held for place, (held, _) in before if held != CHANGED}
-    known = frozenset(read)
-
-    def tell(i: int, done: float) -> None:
-        told[i] += done
-        if progress:
-            progress(done * cells[i].work / whole)
-
-    def finished(i: int, made: "Made") -> tuple[int, "xr.Dataset"]:
-        data, by_it = made
-        for place, (held, path) in json.loads(by_it).items():
-            if (held != CHANGED or place in known) and read.setdefault(place, held) != held:
-                raise InputError(f"{cells[i].name}: {path or place} has changed while it was in use; start again")
-        tell(i, 1.0 - told[i])
-        return i, data
-
+    share, read = _Share(cells, progress), _Read(cells)
     if executor is None:
-        for i, cell in enumerate(cells):
-            yield finished(i, _made(cell, paths[i], records[i], threads=threads, progress=partial(tell, i)))
+        made = (
+            (i, _made(cell, paths[i], records[i], threads=threads, progress=partial(share.tell, i)))
+            for i, cell in enumerate(cells)
+        )
     else:
-        waiting = list[int]()
-        for i, path in enumerate(paths):
-            if path and (kept := find(path, cells[i], records[i])):
-                yield finished(i, kept)
-            else:
-                waiting.append(i)
-        parcels = [
-            _Parcel(_pickled(cells[i]), records[i] or cells[i].record(), paths[i], threads or 1) for i in waiting
-        ]
-        for j, done in _by_others(executor, parcels, folder):
-            cell = cells[waiting[j]]
-            if other := [file for file in cell.edited(done[1], cell.reads()) if comparable(file)]:
-                raise InputError(
-                    f"{cell.name}: a worker has read another {other[0]} than is here; start the workers again, in the"
-                    " same folder"
-                )
-            yield finished(waiting[j], done)
+        made = _elsewhere(executor, cells, records, paths, folder, threads or 1)
+    for i, (data, by_it) in made:
+        read.check(cells[i], by_it)
+        share.finish(i)
+        yield i, data
     if folder:
         remove_leftovers(folder)  # once more: workers of one that was killed may have outlived its begin
 
@@ -155,6 +127,39 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
         rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
     (whole,) = rows
     return whole
+
+
+class _Share:
+    """Tells progress of what of all work each cell has done."""
+
+    def __init__(self, cells: Sequence[Cell], progress: Progress | None) -> None:
+        whole = sum(cell.work for cell in cells)
+        self._parts, self._done, self._progress = [one.work / whole for one in cells], [0.0] * len(cells), progress
+
+    def tell(self, i: int, done: float) -> None:
+        """So much more of a cell is done."""
+        self._done[i] += done
+        if self._progress:
+            self._progress(done * self._parts[i])
+
+    def finish(self, i: int) -> None:
+        """All of it."""
+        self.tell(i, 1.0 - self._done[i])
+
+
+class _Read:
+    """What the cells of one run have read, which has to be the same for all."""
+
+    def __init__(self, cells: Sequence[Cell]) -> None:
+        before = [one for cell in cells for one in json.loads(cell.reads()).items()]
+        self._held = {place: held for place, (held, _) in before if held != CHANGED}
+        self._known = frozenset(self._held)
+
+    def check(self, cell: Cell, by_it: str) -> None:
+        """Refuse what a cell has read, as `Cell.reads` tells it, if that is something else than before."""
+        for place, (held, path) in json.loads(by_it).items():
+            if (held != CHANGED or place in self._known) and self._held.setdefault(place, held) != held:
+                raise InputError(f"{cell.name}: {path or place} has changed while it was in use; start again")
 
 
 def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made":
@@ -204,12 +209,36 @@ class _Parcel:
         return _made(cell, self.path, record, threads=self.threads)
 
 
-def _by_others(executor: Executor, parcels: Sequence[_Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
+def _elsewhere(
+    executor: Executor,
+    cells: Sequence[Cell],
+    records: Sequence[str],
+    paths: Sequence[Path | None],
+    folder: Path | None,
+    threads: int,
+) -> Iterator[tuple[int, "Made"]]:
+    """What is kept, and then what an executor's workers make of the rest."""
+    parcels = dict[int, _Parcel]()
+    for i, (cell, record, path) in enumerate(zip(cells, records, paths, strict=True)):
+        if path and (kept := find(path, cell, record)):
+            yield i, kept
+        else:
+            parcels[i] = _Parcel(_pickled(cell), record or cell.record(), path, threads)
+    for i, made in _by_others(executor, parcels, folder):
+        if other := [file for file in cells[i].edited(made[1], cells[i].reads()) if comparable(file)]:
+            raise InputError(
+                f"{cells[i].name}: a worker has read another {other[0]} than is here; start the workers again, in the"
+                " same folder"
+            )
+        yield i, made
+
+
+def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
     futures: dict[Future[Made], int] = {}
     with marked(folder.absolute()) if folder and parcels else nullcontext() as mark:
         try:
-            for i, parcel in enumerate(parcels):
+            for i, parcel in parcels.items():
                 path = parcel.path and parcel.path.absolute()
                 futures[_submitted(executor, replace(parcel, path=path, mark=mark))] = i
             for future in as_completed(futures):
