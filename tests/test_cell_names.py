@@ -8,6 +8,8 @@ import subprocess
 import sys
 import zipfile
 from hashlib import sha256
+from importlib import metadata
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +21,17 @@ from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
 from hexmj.files import digest_of
 from hexmj.loaded import importable
-from hexmj.sweeps import Cell
+from hexmj.sweeps import Cell, packages
 from hexmj.sweeps.code import code
+from hexmj.sweeps.packages import NAMES
 from small_cells import ENVIRONMENT, MINE, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
+
+
+def test_modules_of_another_name_than_their_distribution_are_told_by_its_version() -> None:
+    for module, name in NAMES.items():
+        assert packages_distributions()[module] == [name]
+        assert packages.version(module) == metadata.version(name)
 
 
 def test_every_setting_is_in_the_name() -> None:

@@ -12,6 +12,10 @@ from packaging.utils import canonicalize_name
 
 from hexmj.files import digest, digest_of
 
+NAMES = {"PIL": "pillow"}
+"""Module -> distribution, of those that this package imports, where the names differ: to look through all that is
+installed takes a third of a second."""
+
 
 @cache
 def version(module: str) -> str:
@@ -20,7 +24,7 @@ def version(module: str) -> str:
     that of its own files.
     """
     try:
-        found = [Distribution.from_name(module)]
+        found = [Distribution.from_name(NAMES.get(module, module))]
     except PackageNotFoundError:
         found = [Distribution.from_name(one) for one in {*packages_distributions().get(module, ())}]
     return " ".join(sorted(f"{one.version}{_files(one)}" for one in found)) or _of_no_distribution(module)
