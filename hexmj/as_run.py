@@ -20,13 +20,10 @@ from hexmj.parsing import compiled
 INSTALLED = {"site-packages", "dist-packages"}
 """Folders of installed packages, this Python's own or another's."""
 
-_NOT_ITS_USERS = tuple(
-    f"{folder}{os.sep}"
-    for folder in (
-        *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")),
-        Path(__file__).parent,
-        Path(__file__).parents[1] / "assets",
-    )
+_FOLDERS = *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")), Path(__file__).parent
+_NOT_ITS_USERS = (
+    *(f"{folder}{os.sep}" for folder in _FOLDERS),
+    str(Path(__file__).parents[1] / "assets" / "stick_insect.xml"),
 )
 
 COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)

@@ -52,7 +52,11 @@ def callers(event: str, computing: bool) -> tuple[frozenset[str], bool]:
 
 def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bool, bool]:
     """As `callers`, of the thread that is in a frame alone, and whether this package's call or a module leads there."""
-    users, for_others = set[str](), event == "exec" or (frame and frame.f_code.co_filename == files.__file__)
+    users, calls, for_others = (
+        set[str](),
+        False,
+        event == "exec" or (frame and frame.f_code.co_filename == files.__file__),
+    )
     while frame is not None:
         name, file = frame.f_code.co_name, frame.f_code.co_filename
         whose, runs = _whose(file), name == "<module>" and frame.f_globals.get("__name__")
@@ -60,6 +64,8 @@ def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bo
             return frozenset(), False, True
         if whose == "ours" and (users or not for_others or file in _KEEPS):
             return frozenset(users), bool(users), True
+        if runs == "__main__" and file.startswith("<") and calls:  # it is typed, or behind `python -c`
+            return frozenset(users), False, True
         imported = frame.f_back and _whose(frame.f_back.f_code.co_filename) == "import's"
         if runs and imported and whose == "a library's" and not users:  # it may be of a controller's package
             return frozenset({file}), False, True
@@ -67,7 +73,7 @@ def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bo
             users.add(file)
             if runs and whose == "user's":
                 return frozenset(users), False, True
-        frame = frame.f_back
+        calls, frame = whose == "user's", frame.f_back
     return frozenset(users), False, False
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from hexmj.files import opened, read_bytes
 
-NAMED = re.compile(r"""\b(file|meshdir|texturedir|assetdir)\s*=\s*(["'])(.*?)\2""")
-"""Files and their folders in an MJCF."""
+NAMED = re.compile(r"""\b(file(?=name)?|meshdir|texturedir|assetdir)(?:name)?\s*=\s*(["'])(.*?)\2""")
+"""Files and their folders in an MJCF, or in a URDF, where it is a filename."""
 
 HEAD = 1000
 """Within so many bytes an MJCF has its first tag; what has none is a mesh or the like, and is not looked through."""

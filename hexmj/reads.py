@@ -27,14 +27,25 @@ DATA = (
 )
 """Ends of the names of data files, in small letters or capitals."""
 
-MJCF = ".xml", ".mjcf", ".mjb"
+MJCF = ".xml", ".mjcf", ".mjb", ".urdf"
 """Those of what MuJoCo opens."""
+
+SHOWN = ".png", ".pdf", ".svg", ".mp4", ".gif", ".html", ".log", "~"
+"""Those of what is made to be looked at: in a folder that is listed all other names count, but hidden ones."""
 
 DEEPEST = 2
 """Number of folders that texts name, one within the other."""
 
 _CACHES = re.compile(r"__pycache__|\.nb[ic]$")
 """In the names of what Python and numba keep of their own."""
+
+_URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
+"""Of a database of SQLite."""
+
+_FINDS = re.compile(
+    rb"""\b(import_module|__import__)\((?!\s*["'][\w.]*["']\s*[,)])|\b(iter_modules|walk_packages|pickle|dill|joblib)\b"""
+)
+"""In sources that find modules by no name that can be read."""
 
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"
@@ -64,7 +75,7 @@ _BOTH: set[str] = set()
 _COMPUTING: list[dict[Asked, set[str]]] = []
 """For each cell that is being computed: file -> what it held whenever it was read meanwhile."""
 
-_EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0}
+_EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event -> which of its arguments is the path."""
 
 _QUIET = "exec", *LISTS
@@ -112,11 +123,21 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
         held = {then for then, within in own if not within} | {then for then, _ in own[-1:]}
         if held and whole not in sources and whole not in _WRITTEN:
             here = not os.path.isabs(path) and os.path.abspath(path) == whole
-            told[path if here else _place(whole, homes)] = [
+            told[path if here else placed(whole, homes)] = [
                 _held(whole) if held == {_seen(whole)} else CHANGED,
                 "" if here else whole,
             ]
+    for file in _found_by(sources):
+        told[placed(file, homes)] = [now if (now := _held(file)) == digest(as_run.RUN[file][-1]) else CHANGED, file]
     return told
+
+
+def _found_by(sources: Set[str]) -> list[str]:
+    """A user's other modules, though not the script, if some sources may have found them by a computed name."""
+    if not any(_FINDS.search(one) for file in sources for one in as_run.RUN.get(file, ())):
+        return []
+    script = getattr(sys.modules.get("__main__"), "__file__", None)
+    return [file for file in as_run.RUN if file not in sources and file != script]
 
 
 def changed(told: Mapping[str, Sequence[str]], homes: Sequence[Path]) -> list[str]:
@@ -130,7 +151,8 @@ def comparable(path: str) -> bool:
     return os.path.exists(path) and os.path.abspath(path) not in _WRITTEN
 
 
-def _place(path: str, homes: Sequence[Path]) -> str:
+def placed(path: str, homes: Sequence[Path]) -> str:
+    """A path as told from the first of some folders with which it shares more than the system's root; else as it is."""
     for i, home in enumerate(homes):
         with suppress(ValueError):  # of another drive
             if os.path.commonpath([path, home]) != home.anchor:
@@ -150,13 +172,17 @@ def _paths(place: str, whole: str, homes: Sequence[Path]) -> list[str]:
 
 
 def _held(path: str) -> str:
-    """A digest of a file, or of the names of a folder's data files; empty if neither is there."""
+    """A digest of a file, or of the names in a folder; empty if neither is there."""
     with suppress(OSError, InputError):
         if os.path.isdir(path):
-            names = sorted(name for name in os.listdir(path) if name.lower().endswith(DATA))
+            names = sorted(one for one in os.listdir(path) if not one.startswith((".", "__")) and not _shown(one))
             return digest("\n".join(names).encode())
         return digest_of(Path(path))
     return ""
+
+
+def _shown(name: str) -> bool:
+    return name.lower().endswith(SHOWN)
 
 
 def _seen(path: str) -> str:
@@ -174,7 +200,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if isinstance(path, int):  # an open file, or nothing that is heard
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
-        path = os.path.normpath(os.fsdecode(path or "."))
+        path = os.path.normpath(_URI.sub(r"\1", os.fsdecode(path or ".")))
         whole = os.path.abspath(path)
         if path.startswith("<") or whole.startswith(_SYSTEMS) or _CACHES.search(whole) or not as_run.is_users(whole):
             return

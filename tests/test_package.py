@@ -22,8 +22,8 @@ def read(name: str) -> str:
 
 
 def test_one_version():
-    assert f"\n## {PROJECT['version']}, " in read("CHANGELOG.md")
-    assert yaml.safe_load(read("CITATION.cff"))["version"] == PROJECT["version"]
+    assert f"\n## {hexmj.__version__}, " in read("CHANGELOG.md")
+    assert yaml.safe_load(read("CITATION.cff"))["version"] == hexmj.__version__
 
 
 def test_the_citation_has_what_its_format_wants_and_names_the_paper():

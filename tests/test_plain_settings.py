@@ -1,6 +1,7 @@
 """Settings of a cell become plain data, files among them what they hold; what cannot is refused."""
 
 import json
+import shutil
 import sys
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
@@ -32,10 +33,11 @@ def test_settings_become_plain_json() -> None:
         "inner": {"folder": Path("/nowhere"), "counts": np.arange(2)},
     }
     assert plain(settings) == {
-        "wave": {"class": "small_cells.Wave", "slope": 2.0, "values": [[1.0, -0.0]]},
+        "wave": {"class": "small_cells.Wave", "slope": 2.0, "values": {"array": [[1.0, -0.0]], "shape": [1, 2]}},
         "pair": [1, None, True, "text"],
         "number": 0.1,
-        "inner": {"folder": "/nowhere", "counts": [0, 1]},
+        "inner": {"folder": "/nowhere", "counts": {"array": [0, 1], "shape": [2]}, "order": ["folder", "counts"]},
+        "order": ["wave", "pair", "number", "inner"],
     }
     assert json.loads(json.dumps(plain(settings))) == plain(settings)
 
@@ -116,14 +118,27 @@ def test_naming_a_cell_reads_no_docstring_nor_does_reading_one_rename_it(monkeyp
     assert names == {cell.record()}
 
 
-def test_a_file_among_the_settings_is_its_content(tmp_path: Path) -> None:
+def test_what_code_can_tell_apart_is_no_one_setting() -> None:
+    assert plain({"a": 1, "b": 2}) != plain({"b": 2, "a": 1})
+    assert plain((1.0, 2.0)) != plain(np.array([1.0, 2.0]))
+    assert plain(np.zeros((0, 3))) != plain(np.zeros((0, 6)))
+
+
+def test_a_file_among_the_settings_is_its_content_and_where_it_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for kind in (Path, str):
         for folder in ("here", "there"):
             (tmp_path / folder).mkdir(exist_ok=True)
             (tmp_path / folder / "body.xml").write_text("<mujoco/>")
         here, there = (plain(kind(tmp_path / folder / "body.xml")) for folder in ("here", "there"))
         assert here.partition("@")[2] == there.partition("@")[2] != ""
-        assert (here == there) == (kind is Path)
+        assert here != there
+        told = set[tuple[str, str]]()
+        for folder in (tmp_path, shutil.copytree(tmp_path, tmp_path.with_name(f"{tmp_path.name}-{kind.__name__}"))):
+            monkeypatch.chdir(folder)
+            told.add((plain(kind("here/body.xml")), plain(folder / "here" / "body.xml")))
+        assert len(told) == 1
         (tmp_path / "here" / "body.xml").write_text("<mujoco> </mujoco>")
         assert plain(kind(tmp_path / "here" / "body.xml")) != here
     assert plain(text := str(tmp_path)) == text
@@ -195,6 +210,16 @@ def test_an_mjcf_may_include_files_of_any_name(tmp_path: Path, name: str, told: 
     before = plain(tmp_path / "main.xml")
     (tmp_path / name).write_text("<mujocoinclude> </mujocoinclude>")
     assert plain(tmp_path / "main.xml") != before
+
+
+def test_a_mesh_of_a_urdf_counts(tmp_path: Path) -> None:
+    (tmp_path / "leg.urdf").write_text('<robot><mesh filename="meshes/leg.stl"/></robot>')
+    (tmp_path / "meshes").mkdir()
+    found = []
+    for text in ("solid", "solid leg"):
+        (tmp_path / "meshes" / "leg.stl").write_text(text)
+        found.append(plain(tmp_path / "leg.urdf"))
+    assert found[0] != found[1]
 
 
 def test_an_mjcf_in_folders_is_looked_for_beside_each_file(tmp_path: Path) -> None:

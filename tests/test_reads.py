@@ -118,13 +118,19 @@ def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tupl
     assert len(list(Path("kept").glob("*.nc"))) == 2
 
 
-def test_what_joins_a_folder_counts_if_it_is_data(computed: Callable[..., tuple[float, int]]) -> None:
-    listed = "len(glob(f'{at}/*.json'))"
-    assert computed(listed) == (1.0, 1)
-    (Path("one") / "joins.json").write_text("0")
-    assert computed(listed) == (2.0, 2)
-    (Path("one") / "notes~").write_text("no data")
-    assert computed(listed) == (2.0, 2)
+@pytest.mark.parametrize("name", ["joins.json", "joins.pth", "joins.zip"])
+def test_what_joins_a_folder_counts_unless_it_is_to_be_looked_at(
+    computed: Callable[..., tuple[float, int]], name: str
+) -> None:
+    listed = f"len(glob(f'{{at}}/joins*')) + len(glob(f'{{at}}/{Path(name).suffix}'))"
+    assert computed(listed) == (0.0, 1)
+    (Path("one") / name).write_text("0")
+    assert computed(listed) == (1.0, 2)
+    for other in ("notes~", "figure.png", ".hidden", "__pycache__"):
+        (Path("one") / other).write_text("no data")
+    assert computed(listed) == (1.0, 2)
+    (Path("one") / "run 2").mkdir()
+    assert computed(listed) == (1.0, 3)
 
 
 def test_a_file_that_was_missing_counts(computed: Callable[..., tuple[float, int]]) -> None:
@@ -348,8 +354,8 @@ def test_a_project_that_is_moved_is_believed(computed: Callable[..., tuple[float
     ("path", "moved"), [("/p/data/gain", "/q/data/gain"), ("/p/code/gain", "/q/code/gain"), ("/x/gain", "/x/gain")]
 )
 def test_places_are_told_from_the_project(path: str, moved: str) -> None:
-    assert reads._path(reads._place(path, [Path("/p/code")]), [Path("/q/code")]) == moved
-    assert reads._path(reads._place("data/gain", [Path("/p/code")]), [Path("/q/code")]) == "data/gain"
+    assert reads._path(reads.placed(path, [Path("/p/code")]), [Path("/q/code")]) == moved
+    assert reads._path(reads.placed("data/gain", [Path("/p/code")]), [Path("/q/code")]) == "data/gain"
 
 
 def test_kept_values_of_what_has_changed_are_refused(computed: Callable[..., tuple[float, int]]) -> None:

@@ -1,6 +1,7 @@
 """What programs read counts for the cells that they sweep: scripts, packages beside them, installed ones, threads."""
 
 import os
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -165,6 +166,58 @@ def test_what_a_thread_has_read_before_the_sweep_counts(tmp_path: Path) -> None:
     for gain, kept in ((1.0, 1), (2.0, 2), (1.0, 2)):
         (tmp_path / "gain").write_text(str(gain))
         told = subprocess.check_output([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+
+
+REMEMBERS = """
+import json, sqlite3
+from functools import cache
+import xarray as xr
+@cache
+def gain():
+    with sqlite3.connect("file:gains.db?mode=ro", uri=True) as base:
+        return json.load(open("gain.json")) + base.execute("select total(x) from gains").fetchone()[0]
+def cell(): return xr.Dataset({"gain": gain()})
+"""
+
+TYPED = (
+    "from hexmj.sweeps import Cell, run; from pathlib import Path; import remembers; remembers.gain();"
+    " print(run([Cell('typed', remembers.cell, {})], Path('kept'))[0].gain.item())"
+)
+
+
+def test_what_is_remembered_by_what_is_typed_counts(tmp_path: Path) -> None:
+    (tmp_path / "remembers.py").write_text(REMEMBERS)
+    with sqlite3.connect(tmp_path / "gains.db") as base:
+        base.execute("create table gains (x real)")
+    for gain in (1.0, 2.0):
+        (tmp_path / "gain.json").write_text(str(gain))
+        told = subprocess.check_output([sys.executable, "-c", TYPED], cwd=tmp_path, env=ENVIRONMENT, text=True)
+        assert float(told) == gain
+    with base:
+        base.execute("insert into gains values (5.0)")
+    base.close()
+    told = subprocess.check_output([sys.executable, "-"], cwd=tmp_path, env=ENVIRONMENT, text=True, input=TYPED)
+    assert float(told) == 7.0
+
+
+FINDS = """
+import importlib
+import xarray as xr
+def cell(): return xr.Dataset({"gain": importlib.import_module("gaits." + "wave").GAIN})
+"""
+
+
+def test_a_module_that_is_found_counts_whoever_imported_it_first(tmp_path: Path) -> None:
+    (tmp_path / "finds.py").write_text(FINDS)
+    (tmp_path / "gaits").mkdir()
+    (tmp_path / "script.py").write_text(
+        "from hexmj.sweeps import Cell, run\nfrom pathlib import Path\nimport finds, gaits.wave\n"
+        "print(run([Cell('finds', finds.cell, {})], Path('kept'))[0].gain.item())"
+    )
+    for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2)):
+        (tmp_path / "gaits" / "wave.py").write_text(f"GAIN = {gain}")
+        told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=ENVIRONMENT)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
 
 

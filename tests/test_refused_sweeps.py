@@ -1,8 +1,10 @@
 """Cells and sweeps that make no sense, and data that no file can hold, are refused in one sentence."""
 
+import os
 import re
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ def odd(what: str) -> object:
         "holes": xr.Dataset({"a": ("x", np.array(["a", None], dtype=object))}),
         "scaled": xr.Dataset({"a": ("x", [1.0], {"scale_factor": 0.5})}),
         "filled": xr.Dataset({"a": ("x", [1.0], {"_FillValue": 1.0})}),
+        "kept": xr.Dataset({"a": 1.0}, attrs={"cell": "mine"}),
         "levels": xr.Dataset(coords=xr.Coordinates.from_pandas_multiindex(LEVELS, "x")),
     }[what]
 
@@ -38,6 +41,7 @@ def odd(what: str) -> object:
         ("holes", "NetCDF cannot hold this: a is object; expected arrays, numbers and texts"),
         ("scaled", "NetCDF would be read otherwise: a has the attribute scale_factor; expected none"),
         ("filled", "NetCDF would be read otherwise: a has the attribute _FillValue; expected none"),
+        ("kept", "what odd gives has the attribute 'cell', which kept cells have; rename it"),
         ("levels", "NetCDF cannot hold this: "),
     ],
 )
@@ -45,6 +49,32 @@ def test_what_is_no_data_is_refused_in_one_sentence(tmp_path: Path, what: str, s
     with pytest.raises(InputError, match=re.escape(sentence)):
         run([Cell("odd", odd, {"what": what})], tmp_path)
     assert not list(tmp_path.glob("*.nc"))
+
+
+def odd_elsewhere(what: str) -> object:
+    """Goes by the name of `odd`, as `functools.wraps` makes it."""
+    return odd(what)
+
+
+odd_elsewhere = wraps(odd)(odd_elsewhere)
+
+
+def test_a_wrapper_that_goes_by_the_name_of_what_it_wraps_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="odd is not what its module has under that name"):
+        run([Cell("odd", odd_elsewhere, {"what": "dict"})], tmp_path)
+
+
+def test_a_cell_may_change_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("data").mkdir()
+    cells = [Cell(f"goes {i}", goes, {"folder": str(tmp_path / "data"), "i": i}) for i in range(2)]
+    run(cells, Path("kept"))
+    assert len(list((tmp_path / "kept").glob("*.nc"))) == 2
+
+
+def goes(folder: str, i: int) -> xr.Dataset:
+    os.chdir(folder)
+    return xr.Dataset({"i": i})
 
 
 def shut() -> Executor:

@@ -106,7 +106,16 @@ class Cell:
     def _told(self) -> dict[str, Any]:
         if not hasattr(self.function, "__qualname__"):
             raise InputError(f"{self.function!r:.80} of {self.name}; expected a function or a method")
-        return {"function": label(self.function), "of": plain(self._owner), "settings": plain(self.settings)}
+        if not _stands_there(self.function):
+            raise InputError(
+                f"{self.name}: {label(self.function)} is not what its module has under that name; expected a function"
+                " of a module, not one that was wrapped elsewhere"
+            )
+        return {
+            "function": label(self.function),
+            "of": plain(self._owner),
+            "settings": {key: plain(one) for key, one in self.settings.items()},
+        }
 
     @property
     def _owner(self) -> Any:
@@ -116,6 +125,14 @@ class Cell:
     def stem(self, record: str) -> str:
         """The name of its file without the ending."""
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
+
+
+def _stands_there(function: Any) -> bool:
+    """Whether a function is what its name leads to, and no wrapper that goes by it; within a function none leads."""
+    found: Any = sys.modules.get(function.__module__)
+    for name in function.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return "<" in function.__qualname__ or found == getattr(function, "__func__", function)
 
 
 def check_unchanged(cell: Cell, before: str, now: str) -> None:

@@ -24,6 +24,12 @@ READ = "read"
 """Attribute of the file, or first word of a ledger's line: what was read as it was made, as JSON; see `Cell.reads`."""
 
 
+def check_free(cell: "Cell", data: "xr.Dataset") -> None:
+    """Refuse data with an attribute of a name that is wanted here."""
+    if taken := {RECORD, READ} & data.attrs.keys():
+        raise InputError(f"what {cell.name} gives has the attribute {min(taken)!r}, which kept cells have; rename it")
+
+
 def write(path: Path, cell: "Cell", record: str, data: "xr.Dataset") -> tuple["xr.Dataset", str]:
     """Keep a cell with the record of what it depends on and with what it read.
 

@@ -20,7 +20,7 @@ from hexmj.progress import Progress, shown
 from hexmj.reads import CHANGED, comparable
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
-from hexmj.sweeps.files import find, write
+from hexmj.sweeps.files import check_free, find, write
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +83,7 @@ def finish(
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
-    folder = None if folder is None else path_of(folder)
+    folder = None if folder is None else path_of(folder).absolute()
     executor = typed("executor", how.get("executor"), Executor | None)
     progress, threads = typed("progress", how.get("progress"), Progress | None), how.get("threads")
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
@@ -170,6 +170,7 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made
         return kept
     before = record if path else cell.settings_now()
     data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
+    check_free(cell, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
     return write(path, cell, record, data) if path else (data, cell.reads())
 
@@ -236,11 +237,10 @@ def _elsewhere(
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
     futures: dict[Future[Made], int] = {}
-    with marked(folder.absolute()) if folder and parcels else nullcontext() as mark:
+    with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in parcels.items():
-                path = parcel.path and parcel.path.absolute()
-                futures[_submitted(executor, replace(parcel, path=path, mark=mark))] = i
+                futures[_submitted(executor, replace(parcel, mark=mark))] = i
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenExecutor:

@@ -1,5 +1,6 @@
 """Settings as plain JSON: what a cell is named by and what its file tells."""
 
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
@@ -11,20 +12,27 @@ from typing import Any
 
 import numpy as np
 
+from hexmj.as_run import is_users
 from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.files import digest
 from hexmj.mjcf import content
+from hexmj.reads import placed
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
+NUMBERS = np.bool_, np.int64, np.float64
+"""Types of numbers in arrays that are settings."""
+
 
 def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
-    """A setting as JSON can hold it: a frozen dataclass or named tuple with the name of its class, an array as a list.
+    """A setting as JSON can hold it: a frozen dataclass or named tuple with its class, an array with its shape.
 
-    A file is its name and a digest of its content, wherever it lies; so is a text with a dot that names one.  A field
-    of a user's own class may name one without a dot, and beside the class's module or those of its bases as well.
+    A file is its place and a digest of its content; so is a text with a dot that names one.  Its place is told as it is
+    given, from the current folder or those of the class's modules where it lies in one, and by its name alone in this
+    package.  A field of a user's own class may name a file without a dot, and beside the class's module or those of its
+    bases as well.
 
     Args:
         value: of the setting.
@@ -37,8 +45,10 @@ def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
         _check_fields(value, names)
         of_class = [*folders, *_folders(type(value))]
         return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class) for name in names}
-    if (type(value) is np.ndarray or isinstance(value, np.generic)) and value.dtype in (np.bool_, np.int64, np.float64):
-        return value.tolist()
+    if type(value) is np.ndarray and value.dtype in NUMBERS:
+        return {"array": value.tolist(), "shape": list(value.shape)}
+    if isinstance(value, np.generic) and value.dtype in NUMBERS:
+        return value.item()
     if type(value) is str and (folders or "." in value) and (held := _held(value, folders)):
         return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
@@ -46,9 +56,10 @@ def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     if type(value) is list or type(value) is tuple:
         return [plain(item, folders) for item in value]
     if type(value) is dict and all(isinstance(key, str) for key in value):
-        return {key: plain(item, folders) for key, item in value.items()}
+        told = {key: plain(item, folders) for key, item in value.items()}
+        return told if sorted(value) == list(value) else told | {"order": list(value)}
     if isinstance(value, Path) and not value.is_dir():
-        return f"{value.name}@{held}" if (held := _held(value, folders)) else str(value)
+        return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"
         " tuple, dict or array (float64, int64, bool) of these"
@@ -92,6 +103,13 @@ def _held(name: str | Path, folders: Sequence[Path]) -> str:
     paths = dict.fromkeys(folder / name for folder in (Path(), *folders))
     held = [digest(content(path)) if isfile(path) else "" for path in paths]
     return ",".join(held) if any(held) else ""
+
+
+def _place(file: Path, folders: Sequence[Path]) -> str:
+    """Where a file lies, as far as that does not change as a project is moved."""
+    if not is_users(str(file.absolute())):
+        return file.name
+    return placed(str(file), [*folders, Path.cwd()]) if file.is_absolute() else os.path.normpath(file)
 
 
 def _folders(kind: type) -> list[Path]:
