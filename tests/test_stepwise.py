@@ -7,6 +7,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers import Step, stepwise
+from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import ReadingPlan
 from stepwise_ldvs import plan_of, same
 
@@ -43,6 +44,13 @@ def test_a_step_may_be_worked_on_in_place():
 
     walk = stepwise(step, np.zeros((1, 6)), 0.5, STRIDE).advance(3)
     assert np.array_equal(walk.x[:, 0, 0], [-1.0, -2.0, -3.0])
+
+
+def test_a_refusal_names_the_step_of_the_walk_though_it_is_looked_at_in_parts():
+    count = iter(range(1000))
+    plan = stepwise(lambda v: Step(np.nan if next(count) == 777 else 0.0, True), np.zeros((1, 6)), 0.5, STRIDE)
+    with pytest.raises(hexmj.InputError, match="x is nan in step 777, start 0"):
+        first_losses(plan, np.array([1000]))
 
 
 def test_a_stepwise_plan_hears_what_it_is_told():

@@ -13,7 +13,7 @@ from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import Reading
 from hexmj.legs import CENTRED
 from hexmj.search.problems import Sample
-from hexmj.studies.variants.figure import COLOURS, variants_figure
+from hexmj.studies.variants.figure import STYLES, variants_figure
 from hexmj.studies.variants.study import Variants, notes
 from hexmj.sweeps import Cell, conduct
 from hexmj.variants import VARIANTS, instead, variants, varied
@@ -146,7 +146,7 @@ def test_the_figure_shows_every_set_and_velocity(result):
     figure = variants_figure(result)
     assert [axes.get_title() for axes in figure.axes] == ["V = 0.5", "V = 0.7"]
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(SETS)
-    assert all(name == "usual" or any(name.startswith(begin) for begin in COLOURS) for name in VARIANTS)
+    assert all(name == "usual" or any(name.startswith(begin) for begin in STYLES) for name in VARIANTS)
 
 
 def test_the_insect_walks_the_variants_that_its_legs_reach():

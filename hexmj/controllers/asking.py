@@ -100,7 +100,9 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
         bad = np.isinf(values) if may_be_unknown else ~np.isfinite(values)
         if bad.any():
             at, known = np.argwhere(bad)[0], "a number, or NaN where nothing tells" if may_be_unknown else "a number"
-            raise InputError(f"a plan's {name} is {values[tuple(at)]} in {place(walk, at)}; expected {known}")
+            raise InputError(
+                f"a plan's {name} is {values[tuple(at)]} in {place(walk, at, end - steps)}; expected {known}"
+            )
     if walk.geometry != plan.stride.geometry:
         raise InputError(f"a plan's geometry = {walk.geometry}; expected that of the stride")
     times = np.arange(end - steps + 1, end + 1) * plan.stride.dt
@@ -137,13 +139,14 @@ def check_repeats(
     check_same(one, other, controller.name)
 
 
-def check_same(one: PlannedWalk, other: PlannedWalk, whose: str) -> None:
+def check_same(one: PlannedWalk, other: PlannedWalk, whose: str, before: int = 0) -> None:
     """Refuse two plans that ought to be the same and are not: what is told of one is not of the other.
 
     Args:
         one: some steps of starts.
         other: the same steps of the same starts.
         whose: plans them, for a sentence.
+        before: number of steps of the plan before these.
 
     Raises:
         InputError: they differ.
@@ -155,13 +158,13 @@ def check_same(one: PlannedWalk, other: PlannedWalk, whose: str) -> None:
             at = tuple(np.argwhere(~same)[0])
             raise InputError(
                 f"{whose} plans another walk when it begins again: {name} is {a[at]:g} and {b[at]:g} in"
-                f" {place(one, at)}; expected the same numbers each time, as from seeds that are fields"
+                f" {place(one, at, before)}; expected the same numbers each time, as from seeds that are fields"
             )
 
 
-def place(walk: PlannedWalk, at: Sequence[int]) -> str:
-    """Where in a walk something is, for a sentence: step, start and leg, as far as they are given."""
-    names = [f"step {at[0]}", *(f"start {start} (V = {walk.velocity[at[0], start]:.3g})" for start in at[1:2])]
+def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:
+    """Where in a walk, or the part of a plan after some steps, something is: step, start and leg, as far as given."""
+    names = [f"step {before + at[0]}", *(f"start {start} (V = {walk.velocity[at[0], start]:.3g})" for start in at[1:2])]
     return ", ".join(names + [f"leg {LEGS[leg]}" for leg in at[2:]])
 
 

@@ -175,7 +175,7 @@ def physical_walk_of_plan(
         else:
             first = chunk.first // settled.substeps
             same = part_of(planned, slice(first, first + len(chunk.plan.time)))
-            check_same(same, chunk.plan, "the controller")
+            check_same(same, chunk.plan, "the controller", first)
         columns, seen, seen_centre = measured_walk(chunk, settled)
         at = np.ix_((chunk.first + columns) // conditions.substeps(stride) - 1, chunk.ids)
         x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre

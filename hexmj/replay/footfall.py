@@ -51,7 +51,7 @@ def walk_figure(recording: "xr.Dataset") -> "Picture":
             footfall.broken_barh(swings, (row + 0.2, 0.18), color=MEASURE_COLOURS["kinematic"])
         footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
     footfall.set(ylim=(5.6, -0.6), yticks=[], title=in_figure(recording.attrs["title"]))
-    legend = "black: foot off ground, blue: planned protraction" if physical else "bars: protraction"
+    legend = "thick, black: foot off ground; thin, blue: planned protraction" if physical else "bars: protraction"
     footfall.set_xlabel(legend, fontsize=8)
     margin.axhline(0.0, color="0.6", linewidth=0.8)
     mark = {"marker": "o", "markersize": 3} if len(time) == 1 else {}  # a line through one point is none

@@ -1,6 +1,6 @@
 """Sets under every variant as a figure: what each loses as usual, in the mean and at worst."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hexmj.literal import in_figure
 from hexmj.measures.captions import caption
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
     from hexmj.pictures import Picture
 
-COLOURS = {
-    "centred": "#6a4c93",
-    "PEP_min": "#b3261e",
-    "AEP0": "#e08e1b",
-    "PEP0": "#d4b106",
-    "dt": "#8a8a8a",
-    "undelayed": "#2a9d8f",
-    "sequential": "#14663a",
-    "lasting": "#1b6ca8",
+STYLES: dict[str, dict[str, Any]] = {
+    "centred": {"color": "#6a4c93", "marker": "s"},
+    "PEP_min": {"color": "#b3261e", "marker": "v"},
+    "AEP0": {"color": "#e08e1b", "marker": "o"},
+    "PEP0": {"color": "#d4b106", "marker": "^"},
+    "dt": {"color": "#8a8a8a", "marker": "X"},
+    "undelayed": {"color": "#2a9d8f", "marker": "<"},
+    "sequential": {"color": "#14663a", "marker": ">"},
+    "lasting": {"color": "#1b6ca8", "marker": "P"},
 }
 """Of the variants whose names begin so."""
 
@@ -44,10 +44,9 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
         panel.set_title(f"V = {velocity:g}", fontsize=11)
     for panel in panels[result.sizes["velocity"] :]:
         panel.set_visible(False)
-    dots = {"marker": "o", "linestyle": "none", "markersize": 6}
-    handles = [Line2D([], [], color=colour, label=name, **dots) for name, colour in COLOURS.items()]
+    dots: dict[str, Any] = {"linestyle": "none", "markersize": 6, "color": "0.1"}
     marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
-    handles = [Line2D([], [], color="0.1", label=name, **dots | mark) for name, mark in marks.items()] + handles
+    handles = [Line2D([], [], label=name, **dots | mark) for name, mark in (marks | STYLES).items()]
     figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
     told = f"{result.attrs['n_starts']} starts; {caption(result)}"
     head(figure, "FLSS with one constant or rule changed at a time", told)
@@ -62,10 +61,10 @@ def _panel(axes: "Axes", one: "xr.Dataset") -> None:
         here = one.sel(network=name)
         axes.plot([here.flss.min(), here.flss.max()], [row, row], color="0.85", linewidth=5, solid_capstyle="round")
         for variant in here.variant.values[::-1]:
-            colour = next((COLOURS[begin] for begin in COLOURS if variant.startswith(begin)), "0.1")
             style = {"marker": "D", "color": "white", "markeredgecolor": "0.1", "markersize": 6.5, "zorder": 4}
             if variant != "usual":
-                style = {"marker": "o", "color": colour, "markeredgecolor": "white", "markersize": 7, "alpha": 0.9}
+                own = next(STYLES[begin] for begin in STYLES if variant.startswith(begin))
+                style = {"markeredgecolor": "white", "markersize": 7.5, "alpha": 0.9} | own
             axes.plot(here.flss.sel(variant=variant), row, **style)
         axes.plot(here.flss.mean(), row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
     tidy(axes)
