@@ -207,6 +207,8 @@ def test_films_that_make_no_sense(fallen, tmp_path):
             Film(**{name: value})
     with pytest.raises(InputError, match="camera = 'behind'; valid names of stick_insect: following, side, top, front"):
         render([fallen], tmp_path / "film.mp4", Film(camera="behind"))
+    with pytest.raises(InputError, match="fps = 60 of a GIF; expected at most 50"):
+        render([fallen], tmp_path / "film.gif", Film(fps=60.0))
     with pytest.raises(InputError, match="7 recordings were given; expected 1 to 6"):
         render([fallen] * 7, tmp_path / "film.mp4")
     for path in (tmp_path / "film.avi", tmp_path / "nowhere" / "film.mp4"):

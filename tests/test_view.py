@@ -199,6 +199,16 @@ def test_a_page_is_served_the_walk_goes_on_and_sliders_change_it(view):
     assert "margin" in view._readout.content
 
 
+@pytest.mark.parametrize(("velocity", "vp"), [(0.97, 10.0), (0.345, 1000.0)])
+def test_what_lies_beyond_the_usual_has_sliders_too(velocity, vp):
+    walk = LiveWalk(LDVS, velocity, STARTS[0], Conditions.of(vp=vp))
+    view = BrowserView(LiveSession(walk, 0, STARTS.__getitem__), port=0)
+    try:
+        assert (view.controls["V"].value, view.controls["V_p"].value) == (velocity, vp)
+    finally:
+        view.server.stop()
+
+
 def test_weights_of_other_controllers_have_no_sliders():
     opened = BrowserView(LiveSession(begun(load_controller("graham")), 0, STARTS.__getitem__), port=0)
     try:

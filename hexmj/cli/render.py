@@ -90,6 +90,7 @@ class Render(WalkingCommand):
         self.film.check_camera(STICK_INSECT)
         if len(self.recordings) > MOST_PANELS:
             raise InputError(f"{len(self.recordings)} recordings were given; expected 1 to {MOST_PANELS}")
+        self.film.check_format(self.format)
         kept = {name: getattr(self, name) for name in ("recordings", "format", "out", "json", "film")}
         obeyed = Render(**kept)
         if self.recordings and (names := list(changed(self, obeyed))):

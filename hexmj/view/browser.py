@@ -146,9 +146,11 @@ class BrowserView:
         self.controls = {}
         self._readout = gui.add_markdown("")
         with gui.add_folder("Walk"):
-            velocity = gui.add_slider("V", 0.0, 0.95, 0.01, round(walk.velocity, 2), hint="from the next step on")
+            v = walk.velocity
+            velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="from the next step on")
             velocity.on_update(lambda _: self._wish(lambda walk: walk.steer(velocity=velocity.value)))
-            vp = gui.add_slider("V_p [mm/s]", 20, 400, 5, walk.conditions.time.vp, hint="the walk begins again")
+            now = walk.conditions.time.vp
+            vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="the walk begins again")
             vp.on_update(
                 lambda _: self._wish(lambda walk: walk.begin(conditions=walk.conditions.but(vp=float(vp.value))))
             )

@@ -10,6 +10,9 @@ from hexmj.errors import InputError
 MOST_PANELS = 6
 """Recordings in one film, at most."""
 
+FASTEST_GIF = 50
+"""Frames per second of a GIF, at most: it counts hundredths of a second, and players take a single one for ten."""
+
 
 @dataclass(frozen=True)
 class Film:
@@ -36,6 +39,15 @@ class Film:
         for name, value, least, most in (("fps", self.fps, 1, 240), ("slow_motion", self.slow_motion, 0.001, 1000)):
             if not least <= value <= most:
                 raise InputError(f"{name} = {value}; expected {least} to {most}")
+
+    def check_format(self, name: str) -> None:
+        """Refuse more frames per second than films of a format can have.
+
+        Raises:
+            InputError: there are.
+        """
+        if name == "gif" and self.fps > FASTEST_GIF:
+            raise InputError(f"fps = {self.fps:g} of a GIF; expected at most {FASTEST_GIF}, since no player shows more")
 
     def check_camera(self, body: Body) -> None:
         """Refuse a camera that a body has not.

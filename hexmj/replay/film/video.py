@@ -62,6 +62,7 @@ def render(
     if not 1 <= len(recordings) <= MOST_PANELS:
         raise InputError(f"{len(recordings)} recordings were given; expected 1 to {MOST_PANELS}")
     film.check_camera(typed("body", body, Body))
+    film.check_format(path.suffix.removeprefix("."))
     if path.suffix not in encoder.HOW or not path.parent.is_dir():
         ends = " or ".join(encoder.HOW)
         raise InputError(f"the film cannot be written to {path}; expected a name with {ends} in a folder that exists")
