@@ -28,7 +28,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.environments.alone import Alone
-from hexmj.environments.passes import ROUNDING, worth
+from hexmj.environments.passes import ROUNDING
 from hexmj.environments.task import Actions, Task, action_bounds, action_names, drawn, observation_bounds
 from hexmj.environments.walkers import Acted, Walkers
 from hexmj.errors import InputError
@@ -85,7 +85,7 @@ class InsectPhysics(mujoco.Physics):
 
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
-        self._next: list[np.ndarray] = []
+        self._rows = np.array(data.ctrl, ndmin=2)
         self._alone: Alone | None = None
 
     def copy(self, share_model: bool = False) -> "InsectPhysics":
@@ -107,18 +107,22 @@ class InsectPhysics(mujoco.Physics):
 
     def set_control(self, control: np.ndarray) -> None:
         """Targets of the joints [rad]: (actuator,), or (substep, actuator), one row for each substep to come."""
-        now, *self._next = np.atleast_2d(control)
-        super().set_control(now)
+        self._rows = np.array(control, ndmin=2)
+        super().set_control(self._rows[0])
 
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `fine_steps`."""
-        rows = [self.data.ctrl.copy(), *self._next]
-        targets = np.array((rows + nstep * rows[-1:])[:nstep])
+        rows = self._rows
+        rows[0] = self.data.ctrl
+        if len(rows) < nstep:
+            rows = np.concatenate([rows, np.repeat(rows[-1:], nstep - len(rows), axis=0)])
         try:
-            self.shown = self.alone.take(ONLY, targets[np.newaxis])
+            self.shown = self.alone.take(ONLY, rows[np.newaxis, :nstep])
         except Diverged as error:
             raise control.PhysicsError(f"the simulation diverged: {error.kinds}") from None
-        self.set_control(np.array(rows[nstep:] or rows[-1:]))
+        self._rows = rows[min(nstep, len(rows) - 1) :]
+        if len(rows) > nstep:
+            super().set_control(self._rows[0])
 
     @property
     def alone(self) -> Alone:
@@ -151,6 +155,7 @@ class Walking(control.Task):
         """Settle the next start."""
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
         self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
+        self._low, self._high = self._spec.minimum - ROUNDING, self._spec.maximum + ROUNDING
         self._walkers.begin(ONLY, drawn(self._random, self.task))
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
@@ -159,7 +164,7 @@ class Walking(control.Task):
         spec, action = self._spec, numbers("action", action)
         if action.shape != spec.shape:
             raise InputError(f"an action has the shape {action.shape}; expected {spec.shape}")
-        within = (action >= spec.minimum - ROUNDING) & (action <= spec.maximum + ROUNDING)
+        within = (action >= self._low) & (action <= self._high)
         if not within.all():
             i = int(np.argmin(within))
             name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
@@ -196,8 +201,7 @@ class Walking(control.Task):
 
     def get_reward(self, physics: InsectPhysics) -> float:
         """See `task`."""
-        here = physics.alone
-        return 0.0 if self._acted.terminated else worth(here.qvel[0], here.rotation[0], self.task.command)
+        return self._acted.reward.item()
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""
