@@ -81,6 +81,15 @@ def test_a_long_command_has_options_that_exist(command):
     assert options_of(checked(command.split()))
 
 
+def test_commands_within_sentences_have_options_that_exist():
+    text = re.sub(r"```.*?```", "", "".join([*PAGES.values(), (ROOT / "CONTRIBUTING.md").read_text()]), flags=re.DOTALL)
+    told = {" ".join(one.split()) for one in re.findall(r"`hexmj ([^`]+)`", text)}
+    whole = [one for one in told if " " in one and not re.search(r"[A-Z]{4}|--help|--(out|scheduler)$", one)]
+    assert len(whole) > 80
+    for command in whole:
+        assert options_of(checked(command.split())), command
+
+
 @pytest.mark.parametrize("command", REFUSED)
 def test_refused(command, here, run):
     assert run(*command.split())[0] == 2
