@@ -175,14 +175,14 @@ def _held(path: str) -> str:
     """A digest of a file, or of the names in a folder; empty if neither is there."""
     with suppress(OSError, InputError):
         if os.path.isdir(path):
-            names = sorted(one for one in os.listdir(path) if not one.startswith((".", "__")) and not _shown(one))
-            return digest("\n".join(names).encode())
+            return digest("\n".join(sorted(filter(_counts, os.listdir(path)))).encode())
         return digest_of(Path(path))
     return ""
 
 
-def _shown(name: str) -> bool:
-    return name.lower().endswith(SHOWN)
+def _counts(name: str) -> bool:
+    """Whether a name in a folder is one of data."""
+    return not name.startswith((".", "__")) and not name.lower().endswith(SHOWN)
 
 
 def _seen(path: str) -> str:
