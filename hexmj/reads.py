@@ -43,9 +43,10 @@ _URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
 
 _FINDS = re.compile(
-    rb"""\b(import_module|__import__)\((?!\s*["'][\w.]*["']\s*[,)])|\b(iter_modules|walk_packages|pickle|dill|joblib)\b"""
+    rb"\b(importlib|import_module|__import__|iter_modules|walk_packages|resolve_name|locate|sys\.modules|load_controller|"
+    rb"\w*pickle|dill|joblib|shelve|torch|stable_baselines3)\b"
 )
-"""In sources that find modules by no name that can be read."""
+"""Words of sources that may find modules by no name that can be read, or in what others have pickled."""
 
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"

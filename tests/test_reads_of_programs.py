@@ -201,24 +201,41 @@ def test_what_is_remembered_by_what_is_typed_counts(tmp_path: Path) -> None:
     assert float(told) == 7.0
 
 
-FINDS = """
-import importlib
-import xarray as xr
-def cell(): return xr.Dataset({"gain": importlib.import_module("gaits." + "wave").GAIN})
-"""
+FINDS = (
+    "import importlib\nfind = lambda name: importlib.import_module('gaits.' + name)",
+    "from importlib import import_module as load\ndef find(name): return load (f'gaits.{name}')",
+    "import pandas\ndef find(name): return pandas.read_pickle('wave.pkl')",
+    "import hexmj\ndef find(name): return hexmj.load_controller('mine.py:Mine')",
+)
 
 
-def test_a_module_that_is_found_counts_whoever_imported_it_first(tmp_path: Path) -> None:
-    (tmp_path / "finds.py").write_text(FINDS)
+@pytest.mark.parametrize("finds", FINDS, ids=range(4))
+def test_a_module_that_is_found_counts_whoever_imported_it_first(tmp_path: Path, finds: str) -> None:
+    (tmp_path / "finds.py").write_text(
+        f"import xarray as xr\n{finds}\ndef cell(): return xr.Dataset({{'gain': find('wave').GAIN}})"
+    )
     (tmp_path / "gaits").mkdir()
     (tmp_path / "script.py").write_text(
-        "from hexmj.sweeps import Cell, run\nfrom pathlib import Path\nimport finds, gaits.wave\n"
+        "import pickle\nfrom pathlib import Path\nimport hexmj\nfrom hexmj.sweeps import Cell, run\n"
+        "import finds, gaits.wave\nhexmj.load_controller('mine.py:Mine')\n"
+        "if not Path('wave.pkl').exists(): Path('wave.pkl').write_bytes(pickle.dumps(gaits.wave.Of()))\n"
         "print(run([Cell('finds', finds.cell, {})], Path('kept'))[0].gain.item())"
     )
     for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2)):
-        (tmp_path / "gaits" / "wave.py").write_text(f"GAIN = {gain}")
+        (tmp_path / "gaits" / "wave.py").write_text(f"GAIN = {gain}\nclass Of:\n    GAIN = {gain}")
+        (tmp_path / "mine.py").write_text(MINE.format(gain))
         told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=ENVIRONMENT)
         assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+
+
+MINE = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Mine:
+    name: str = "mine"
+    GAIN = {}
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None): ...
+"""
 
 
 def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
