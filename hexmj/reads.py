@@ -17,7 +17,7 @@ from typing import Any
 from hexmj import as_run
 from hexmj.callers import ANYBODY, LISTS, callers
 from hexmj.errors import InputError
-from hexmj.files import digest, digest_of
+from hexmj.files import DIGEST, digest, digest_of
 from hexmj.mjcf import parts
 from hexmj.parsing import parsed
 
@@ -38,6 +38,9 @@ DEEPEST = 2
 
 _CACHES = re.compile(r"__pycache__|\.nb[ic]$")
 """In the names of what Python and numba keep of their own."""
+
+_KEPT = re.compile(rf"-[0-9a-f]{{{DIGEST}}}(\.[0-9a-f]{{{DIGEST}}})?\.(nc|jsonl)$")
+"""In the names of kept cells and values: whoever looks through a whole project finds them."""
 
 _URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
@@ -76,10 +79,13 @@ _BOTH: set[str] = set()
 _COMPUTING: list[dict[Asked, set[str]]] = []
 """For each cell that is being computed: file -> what it held whenever it was read meanwhile."""
 
-_EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
+_LIBRARY = "ctypes.dlopen"
+"""Event of a compiled library that is loaded; without a path, of the program itself."""
+
+_EVENTS = {"open": 0, "os.listdir": 0, "os.scandir": 0, "os.rename": 1, "sqlite3.connect": 0, _LIBRARY: 0}
 """Event -> which of its arguments is the path."""
 
-_QUIET = "exec", *LISTS
+_QUIET = "exec", _LIBRARY, *LISTS
 """Events that write nothing."""
 
 
@@ -118,7 +124,8 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
         current folder, without that path, if it was asked for so and still lies there, else from the first of `homes`
         that lies beside it or above, but for the system's root.
     """
-    told = dict[str, list[str]]()
+    found, told = _found_by(sources), dict[str, list[str]]()
+    sources = sources | set(found)
     for (path, whole), heard in list(HEARD.items()):
         own = [(then, within) for (by, then), within in list(heard.items()) if by & (sources | {ANYBODY})]
         held = {then for then, within in own if not within} | {then for then, _ in own[-1:]}
@@ -128,7 +135,7 @@ def reads(sources: Set[str], homes: Sequence[Path]) -> dict[str, list[str]]:
                 _held(whole) if held == {_seen(whole)} else CHANGED,
                 "" if here else whole,
             ]
-    for file in _found_by(sources):
+    for file in found:
         told[placed(file, homes)] = [now if (now := _held(file)) == digest(as_run.RUN[file][-1]) else CHANGED, file]
     return told
 
@@ -183,7 +190,7 @@ def _held(path: str) -> str:
 
 def _counts(name: str) -> bool:
     """Whether a name in a folder is one of data."""
-    return not name.startswith((".", "__")) and not name.lower().endswith(SHOWN)
+    return not (name.startswith((".", "__")) or name.lower().endswith(SHOWN) or _KEPT.search(name))
 
 
 def _seen(path: str) -> str:
@@ -198,7 +205,7 @@ def _seen(path: str) -> str:
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     runs = event == "exec" and getattr(arguments[0], "co_name", "") == "<module>"
     path = arguments[0].co_filename if runs else arguments[_EVENTS[event]] if event in _EVENTS else 0
-    if isinstance(path, int):  # an open file, or nothing that is heard
+    if isinstance(path, int) or (event == _LIBRARY and not path):  # an open file, or nothing that is heard
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
         path = os.path.normpath(_URI.sub(r"\1", os.fsdecode(path or ".")))

@@ -27,6 +27,7 @@ FLOORS = (
             "netcdf",
         ),
         "parsing",
+        "version",
     ),
     (
         "as_run",

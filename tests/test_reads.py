@@ -22,7 +22,7 @@ from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import BODY
 
 READER = """
-import importlib, json, os, sqlite3, tempfile
+import json, os, sqlite3, tempfile
 from concurrent.futures import ThreadPoolExecutor
 from glob import glob
 from pathlib import Path
@@ -31,7 +31,6 @@ from threading import Thread
 import hexmj
 import numpy as np
 import xarray as xr
-from hexmj import load_controller
 
 def cell(at):
     with open("calls", "a") as file:
@@ -49,17 +48,6 @@ def value(rows, at):
 """
 
 
-BASE = """
-from dataclasses import dataclass
-@dataclass(frozen=True)
-class Waits:
-    name: str = "waits"
-    waits: float = {}
-    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        raise NotImplementedError
-"""
-
-
 def write_all(gain: str, at: str = "one") -> None:
     """Into every file of the folder."""
     Path(at, "gain").write_text(gain)
@@ -70,7 +58,6 @@ def write_all(gain: str, at: str = "one") -> None:
     with closing(sqlite3.connect(Path(at, "gain.db"))) as data, data:
         data.executescript(f"create table told (gain); insert into told values ({gain})")
     hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
-    Path(at, "base.py").write_text(BASE.format(gain))
 
 
 @pytest.fixture
@@ -105,7 +92,6 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
         '[os.chdir(at), float(Path("gain").read_text()), os.chdir("..")][1]',
         'sqlite3.connect(f"{at}/gain.db").execute("select gain from told").fetchone()[0]',
         'float(hexmj.load(f"{at}/gain.nc").gain)',
-        'load_controller(f"{at}/base.py:Waits").waits',
     ],
 )
 def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tuple[float, int]], gain: str) -> None:
@@ -118,6 +104,10 @@ def test_what_is_read_counts_and_what_is_kept_stays(computed: Callable[..., tupl
     assert len(list(Path("kept").glob("*.nc"))) == 2
 
 
+def test_who_looks_through_a_whole_project_finds_no_kept_cells(computed: Callable[..., tuple[float, int]]) -> None:
+    assert [computed("len(list(Path().rglob('*.json')))") for _ in range(3)] == 3 * [(2.0, 1)]
+
+
 @pytest.mark.parametrize("name", ["joins.json", "joins.pth", "joins.zip"])
 def test_what_joins_a_folder_counts_unless_it_is_to_be_looked_at(
     computed: Callable[..., tuple[float, int]], name: str
@@ -126,7 +116,7 @@ def test_what_joins_a_folder_counts_unless_it_is_to_be_looked_at(
     assert computed(listed) == (0.0, 1)
     (Path("one") / name).write_text("0")
     assert computed(listed) == (1.0, 2)
-    for other in ("notes~", "figure.png", ".hidden", "__pycache__"):
+    for other in ("notes~", "figure.png", "a cell-0123456789ab.nc", ".hidden", "__pycache__"):
         (Path("one") / other).write_text("no data")
     assert computed(listed) == (1.0, 2)
     (Path("one") / "run 2").mkdir()

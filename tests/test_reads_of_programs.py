@@ -221,11 +221,14 @@ def test_a_module_that_is_found_counts_whoever_imported_it_first(tmp_path: Path,
         "if not Path('wave.pkl').exists(): Path('wave.pkl').write_bytes(pickle.dumps(gaits.wave.Of()))\n"
         "print(run([Cell('finds', finds.cell, {})], Path('kept'))[0].gain.item())"
     )
-    for gain, kept in ((1.0, 1), (1.0, 1), (2.0, 2)):
-        (tmp_path / "gaits" / "wave.py").write_text(f"GAIN = {gain}\nclass Of:\n    GAIN = {gain}")
-        (tmp_path / "mine.py").write_text(MINE.format(gain))
+    for gain, more, kept in ((1.0, 0.0, 1), (1.0, 0.0, 1), (2.0, 0.0, 2), (2.0, 5.0, 3)):
+        (tmp_path / "gaits" / "wave.py").write_text(
+            f"GAIN = {gain} + float(open('gaits/more').read())\nclass Of:\n    GAIN = GAIN"
+        )
+        (tmp_path / "gaits" / "more").write_text(str(more))
+        (tmp_path / "mine.py").write_text(MINE.format(gain + more))
         told = subprocess.check_output([sys.executable, "-B", "script.py"], cwd=tmp_path, env=ENVIRONMENT)
-        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain, kept)
+        assert (float(told), len(list((tmp_path / "kept").iterdir()))) == (gain + more, kept)
 
 
 MINE = """

@@ -28,7 +28,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.environments.alone import Alone
-from hexmj.environments.passes import ROUNDING
+from hexmj.environments.passes import ROUNDING, worth
 from hexmj.environments.task import Actions, Task, action_bounds, action_names, drawn, observation_bounds
 from hexmj.environments.walkers import Acted, Walkers
 from hexmj.errors import InputError
@@ -201,7 +201,8 @@ class Walking(control.Task):
 
     def get_reward(self, physics: InsectPhysics) -> float:
         """See `task`."""
-        return self._acted.reward.item()
+        here = physics.alone
+        return 0.0 if self._acted.terminated else worth(here.qvel[0], here.rotation[0], self.task.command)
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""

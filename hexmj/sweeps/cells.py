@@ -113,8 +113,8 @@ class Cell:
             )
         return {
             "function": label(self.function),
-            "of": plain(self._owner),
-            "settings": {key: plain(one) for key, one in self.settings.items()},
+            "of": plain(self._owner, exact=True),
+            "settings": {key: plain(one, exact=True) for key, one in self.settings.items()},
         }
 
     @property

@@ -22,12 +22,15 @@ from hexmj.reads import placed
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
+ORDER = "\0order"
+"""Key beside those of a dict that are not sorted, for their order; no name that anybody gives."""
+
 NUMBERS = np.bool_, np.int64, np.float64
 """Types of numbers in arrays that are settings."""
 
 
-def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
-    """A setting as JSON can hold it: a frozen dataclass or named tuple with its class, an array with its shape.
+def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
+    """A setting as JSON can hold it: a frozen dataclass or named tuple with its class, an array as a list.
 
     A file is its place and a digest of its content; so is a text with a dot that names one.  Its place is told as it is
     given, from the current folder or those of the class's modules where it lies in one, and by its name alone in this
@@ -37,6 +40,7 @@ def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     Args:
         value: of the setting.
         folders: where files are looked for, beside the current one.
+        exact: tell also the shape of an array and the order of a dict, which code may go by.
 
     Raises:
         InputError: it is none of the things that a setting can be.
@@ -44,9 +48,9 @@ def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     if (names := field_names(value)) is not None:
         _check_fields(value, names)
         of_class = [*folders, *_folders(type(value))]
-        return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class) for name in names}
+        return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class, exact) for name in names}
     if type(value) is np.ndarray and value.dtype in NUMBERS:
-        return {"array": value.tolist(), "shape": list(value.shape)}
+        return {"array": value.tolist(), "shape": list(value.shape)} if exact else value.tolist()
     if isinstance(value, np.generic) and value.dtype in NUMBERS:
         return value.item()
     if type(value) is str and (folders or "." in value) and (held := _held(value, folders)):
@@ -54,10 +58,10 @@ def plain(value: Any, folders: Sequence[Path] = ()) -> Any:
     if value is None or type(value) in (bool, int, float, str):
         return value
     if type(value) is list or type(value) is tuple:
-        return [plain(item, folders) for item in value]
+        return [plain(item, folders, exact) for item in value]
     if type(value) is dict and all(isinstance(key, str) for key in value):
-        told = {key: plain(item, folders) for key, item in value.items()}
-        return told if sorted(value) == list(value) else told | {"order": list(value)}
+        told = {key: plain(item, folders, exact) for key, item in value.items()}
+        return told | {ORDER: list(value)} if exact and sorted(value) != list(value) else told
     if isinstance(value, Path) and not value.is_dir():
         return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
