@@ -190,7 +190,7 @@ def _held(path: str) -> str:
 
 def _counts(name: str) -> bool:
     """Whether a name in a folder is one of data."""
-    return not (name.startswith((".", "__")) or name.lower().endswith(SHOWN) or _KEPT.search(name))
+    return not (name[0] == "." or name == "__pycache__" or name.lower().endswith(SHOWN) or _KEPT.search(name))
 
 
 def _seen(path: str) -> str:
