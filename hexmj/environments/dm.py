@@ -7,7 +7,6 @@ dm_control's PhysicsError.  Contacts are those of the last substep, known once i
 
 import os
 import warnings
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import glfw
@@ -23,13 +22,21 @@ from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import check_home, compile_body
-from hexmj.checks import given, numbers
+from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.environments.alone import Alone
-from hexmj.environments.passes import ROUNDING, worth
-from hexmj.environments.task import Actions, Task, action_bounds, action_names, drawn, observation_bounds
+from hexmj.environments.passes import beyond, worth
+from hexmj.environments.task import (
+    Actions,
+    Task,
+    action_bounds,
+    action_names,
+    checked_actions,
+    drawn,
+    observation_bounds,
+)
 from hexmj.environments.walkers import Acted, Walkers
 from hexmj.errors import InputError
 from hexmj.physics.backend import Diverged
@@ -85,6 +92,7 @@ class InsectPhysics(mujoco.Physics):
 
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
+        self._control = data.ctrl
         self._rows = np.array(data.ctrl, ndmin=2)
         self._alone: Alone | None = None
 
@@ -108,12 +116,12 @@ class InsectPhysics(mujoco.Physics):
     def set_control(self, control: np.ndarray) -> None:
         """Targets of the joints [rad]: (actuator,), or (substep, actuator), one row for each substep to come."""
         self._rows = np.array(control, ndmin=2)
-        super().set_control(self._rows[0])
+        self._control[:] = self._rows[0]
 
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `fine_steps`."""
         rows = self._rows
-        rows[0] = self.data.ctrl
+        rows[0] = self._control
         if len(rows) < nstep:
             rows = np.concatenate([rows, np.repeat(rows[-1:], nstep - len(rows), axis=0)])
         try:
@@ -122,7 +130,7 @@ class InsectPhysics(mujoco.Physics):
             raise control.PhysicsError(f"the simulation diverged: {error.kinds}") from None
         self._rows = rows[min(nstep, len(rows) - 1) :]
         if len(rows) > nstep:
-            super().set_control(self._rows[0])
+            self._control[:] = self._rows[0]
 
     @property
     def alone(self) -> Alone:
@@ -155,23 +163,19 @@ class Walking(control.Task):
         """Settle the next start."""
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
         self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
-        self._low, self._high = self._spec.minimum - ROUNDING, self._spec.maximum + ROUNDING
+        self._bounds = self._spec.minimum, self._spec.maximum
         self._walkers.begin(ONLY, drawn(self._random, self.task))
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
         """Advance the plan by one step and tell the joints where to go."""
         self._walkers.check_begun()
-        spec, action = self._spec, numbers("action", action)
-        if action.shape != spec.shape:
-            raise InputError(f"an action has the shape {action.shape}; expected {spec.shape}")
-        within = (action >= self._low) & (action <= self._high)
-        if not within.all():
-            i = int(np.argmin(within))
+        spec, action = self._spec, checked_actions(action, self._spec.shape)
+        if (i := beyond(action, *self._bounds)) >= 0:
             name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
             raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
         if self._acted.terminated or self._acted.truncated:
             return
-        self._walkers.look(physics.alone)
+        self._look(physics)
         self._walkers.begun = False  # until the step is done
         physics.set_control(self._walkers.control(action[np.newaxis])[0])
 
@@ -187,17 +191,15 @@ class Walking(control.Task):
             low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task))
         )
 
-    def observation_spec(self, physics: InsectPhysics) -> OrderedDict[str, specs.BoundedArray]:
+    def observation_spec(self, physics: InsectPhysics) -> dict[str, specs.BoundedArray]:
         """The specs of all observations by their names."""
         bounds = observation_bounds(physics.compiled, self.task)
-        return OrderedDict(
-            (name, specs.BoundedArray(low.shape, float, low, high, name)) for name, (low, high) in bounds.items()
-        )
+        return {name: specs.BoundedArray(low.shape, float, low, high, name) for name, (low, high) in bounds.items()}
 
-    def get_observation(self, physics: InsectPhysics) -> OrderedDict[str, np.ndarray]:
+    def get_observation(self, physics: InsectPhysics) -> dict[str, np.ndarray]:
         """The observations, in the order of their specs."""
-        self._walkers.look(physics.alone)
-        return OrderedDict(self._walkers.observer.named(self._walkers.observations()[0]))
+        self._look(physics)
+        return self._walkers.observer.named(self._walkers.observations()[0])
 
     def get_reward(self, physics: InsectPhysics) -> float:
         """See `task`."""
@@ -209,3 +211,7 @@ class Walking(control.Task):
         if self._acted.terminated:
             return 0.0
         return 1.0 if self._acted.truncated else None
+
+    def _look(self, physics: InsectPhysics) -> None:
+        if physics.alone is not self._walkers.bodies:
+            self._walkers.look(physics.alone)

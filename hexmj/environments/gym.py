@@ -19,17 +19,14 @@ except ModuleNotFoundError:
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
-from hexmj.checks import numbers, typed
+from hexmj.checks import typed
 from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
-from hexmj.environments.task import Task, action_names, drawn, observation_bounds
+from hexmj.environments.task import Task, action_names, checked_actions, drawn, observation_bounds
 from hexmj.environments.walkers import Walkers
 
 RENDER_MODES = [None, "rgb_array"]
 """How it can be drawn."""
-
-DOUBLE = np.dtype(np.float64)
-"""What actions are computed in; NumPy has one such object, and to ask whether it is that takes no time."""
 
 
 class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
@@ -133,16 +130,3 @@ def checked_options(options: Any, *valid: str) -> dict[str, Any]:
         if name not in valid:
             raise InputError(f"option {name!r:.80}; valid names: {', '.join(valid) or 'none'}")
     return options
-
-
-def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Actions as numbers in their shape; whether they are within bounds is seen when they are carried out.
-
-    Raises:
-        InputError: something else.
-    """
-    if not (type(actions) is np.ndarray and actions.dtype is DOUBLE):
-        actions = numbers("action", actions)
-    if actions.shape != shape:
-        raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
-    return actions

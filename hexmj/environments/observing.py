@@ -61,7 +61,8 @@ class Observer:
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """What was observed, (..., number), by name and in its shape."""
+        before = flat.shape[:-1]
         return {
-            name: flat[columns].reshape(*flat.shape[:-1], *shape) if shape else flat[columns]
+            name: flat[columns].reshape(before + shape) if shape else flat[columns]
             for name, columns, shape in self._fields
         }

@@ -32,6 +32,15 @@ def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
+def beyond(action: Any, low: Any, high: Any) -> int:
+    """Which number of an action, (number,), is the first out of its bounds, or none; -1 if all are within."""
+    for j in range(len(action)):
+        if not low[j] - ROUNDING <= action[j] <= high[j] + ROUNDING:
+            return j
+    return -1
+
+
+@njit(cache=True, nogil=True)
 def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
     """Where the tips of some insects shall be in their next step, (n, substep, leg, axis) [mm].
 

@@ -32,13 +32,13 @@ trunk touches the ground (terminated); or after its duration, or where a foot co
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.grounds import beyond_the_ground
-from hexmj.checks import typed
+from hexmj.checks import numbers, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -48,6 +48,9 @@ from hexmj.timing import Stride, steps_within
 
 Actions = Literal["joints", "tips"]
 """Kinds of actions: targets of the joints, or offsets to the tips."""
+
+DOUBLE = np.dtype(np.float64)
+"""What actions are computed in; NumPy has one such object, and to ask whether it is that takes no time."""
 
 BEYOND_RANGE = 0.5
 """How far joints may be observed beyond their ranges, which give way [rad]."""
@@ -143,6 +146,19 @@ def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.nd
         return low, compiled.home[compiled.columns.qpos], high
     most = np.full(3 * len(LEGS), compiled.body.lengths.largest_tip_offset)
     return -most, np.zeros(len(most)), most
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Actions as numbers in their shape; whether they are within bounds is seen when they are carried out.
+
+    Raises:
+        InputError: something else.
+    """
+    if not (type(actions) is np.ndarray and actions.dtype is DOUBLE):
+        actions = numbers("action", actions)
+    if actions.shape != shape:
+        raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
+    return actions
 
 
 def at_the_end(feet: np.ndarray, task: Task) -> np.ndarray:

@@ -20,15 +20,8 @@ except ModuleNotFoundError:
 
 from hexmj.checks import whole
 from hexmj.environments.frames import Frames
-from hexmj.environments.gym import (
-    checked_actions,
-    checked_mode,
-    checked_options,
-    compiled_for,
-    metadata_of,
-    spaces_of,
-)
-from hexmj.environments.task import Task, action_names, drawn
+from hexmj.environments.gym import checked_mode, checked_options, compiled_for, metadata_of, spaces_of
+from hexmj.environments.task import Task, action_names, checked_actions, drawn
 from hexmj.environments.walkers import Walkers
 from hexmj.physics.backend import MujocoBatch
 from hexmj.physics.fine_steps import FineSteps

@@ -261,8 +261,7 @@ class Walkers:
 
     def _nothing(self) -> Acted:
         """What a step has brought about before anybody is judged."""
-        count = self._count
-        return Acted(np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool))
+        return Acted(np.zeros(self._count), *np.zeros((2, self._count), dtype=bool))
 
     def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """One step of some insects."""
