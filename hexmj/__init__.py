@@ -4,12 +4,12 @@ Units are mm, g, s and radians; velocities V are fractions of the protraction ve
 unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 """
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import hexmj.as_run  # from now on
 import hexmj.reads
+import hexmj.registering  # noqa: F401
 
 if TYPE_CHECKING:
     from hexmj import environments as environments
@@ -94,10 +94,6 @@ _MODULES = {
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
-
-
-if "gymnasium" in sys.modules:  # whoever has imported it finds the environments' ids in it
-    import hexmj.environments  # noqa: F401
 
 
 def __getattr__(name: str) -> Any:

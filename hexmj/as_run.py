@@ -24,6 +24,7 @@ _FOLDERS = *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "pureli
 _NOT_ITS_USERS = (
     *(f"{folder}{os.sep}" for folder in _FOLDERS),
     str(Path(__file__).parents[1] / "assets" / "stick_insect.xml"),
+    str(Path(sysconfig.get_path("stdlib")).with_name(f"python{sysconfig.get_config_var('py_version_nodot')}.zip")),
 )
 
 COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)

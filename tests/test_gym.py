@@ -266,7 +266,7 @@ def test_some_insects_begin_anew_and_the_others_go_on():
     assert many.np_random_seed == (0, 6, 2)
 
 
-def test_make_finds_them_from_the_package_alone():
+def test_make_finds_them_in_whatever_order_of_imports():
     """In a process of its own, as a script would; and neither dm_control nor a GL is there."""
     script = (
         "import gymnasium, sys\n"
@@ -274,9 +274,15 @@ def test_make_finds_them_from_the_package_alone():
         "gymnasium.make_vec('hexmj/StickInsectTips-v0', num_envs=2).reset(seed=0)\n"
         "print([one for one in sys.modules if one.split('.')[0] in ('dm_control', 'OpenGL')])\n"
     )
-    before = "import gymnasium, hexmj\nassert 'hexmj/StickInsect-v0' in gymnasium.registry\n"
+    has = "\nassert 'hexmj/StickInsect-v0' in gymnasium.registry\n"
+    orders = (
+        "import gymnasium, hexmj",
+        "import hexmj, gymnasium",
+        "import hexmj.environments.gym, gymnasium",
+        "import hexmj; import importlib.util as util; util.find_spec('gymnasium'); import gymnasium.spaces",
+    )
     plain = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
-    for code, said in ((script, "[]"), (before, "")):
+    for code, said in ((script, "[]"), *((order + has, "") for order in orders)):
         done = subprocess.run(
             [sys.executable, "-c", code], env=plain | {"PYTHONPATH": os.pathsep.join(sys.path)},
             capture_output=True, text=True,
@@ -306,6 +312,7 @@ def test_nonsensical_actions_are_refused(walking: Any):
         ({"velocity": 1.5}, "velocity = 1.5; expected 0 < V < 1"),
         ({"actions": "feet"}, "actions = 'feet'; valid names: joints, tips"),
         ({"render_mode": "human"}, "render_mode = 'human'; valid names: rgb_array"),
+        ({"velocty": 0.5}, "setting 'velocty'; valid names: velocity, actions, controller"),
         ({"num_envs": 0}, "num_envs = 0; expected a whole number"),
         ({"autoreset_mode": "never"}, "autoreset_mode = 'never'; valid names: NextStep, SameStep, Disabled"),
     ],

@@ -54,7 +54,7 @@ FLOORS = (
     ("measures",),
     ("paper", "search", "studies"),
     ("environments", "plots", "replay", "view"),
-    ("machine",),
+    ("machine", "registering"),
     ("__main__", "cli"),
 )
 """From the ground up; a package stands where the longest name stands that its own begins with."""

@@ -20,8 +20,10 @@ TOY = {
     "helper.py": "",
     "bare/helper.py": "",
     "bare/deep/other.py": "",
+    "gaits/__init__.py": "SIX = 6\n__all__ = ['SIX', 'wave']",
+    "gaits/wave.py": "",
     "fast.pyc": "",
-    "mine.py": "from helper import *\nfrom bare import helper\nimport bare.deep.other\n"
+    "mine.py": "from helper import *\nfrom gaits import *\nfrom bare import helper\nimport bare.deep.other\n"
     "if not True:\n    import fast\n" + MINE,
 }
 

@@ -22,7 +22,7 @@ from hexmj.bodies.loading import compile_body
 from hexmj.checks import typed
 from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
-from hexmj.environments.task import Task, action_names, checked_actions, drawn, observation_bounds
+from hexmj.environments.task import Task, action_names, checked_actions, drawn, observation_bounds, task_of
 from hexmj.environments.walkers import Walkers
 
 RENDER_MODES = [None, "rgb_array"]
@@ -44,7 +44,7 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         Raises:
             InputError: a value that makes no sense.
         """
-        self.task = Task(**task)
+        self.task = task_of(task)
         compiled, self.render_mode = compiled_for(self.task), checked_mode(render_mode)
         self.metadata = metadata_of(self.task)
         self.observation_space, self.action_space = spaces_of(compiled, self.task)

@@ -31,7 +31,8 @@ trunk touches the ground (terminated); or after its duration, or where a foot co
 `observing` and `passes` compute all this, for every face the same.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -104,6 +105,18 @@ class Task:
     def command(self) -> float:
         """Velocity to walk at [mm/s]."""
         return self.velocity * self.conditions.time.vp
+
+
+def task_of(settings: Mapping[str, Any]) -> Task:
+    """A task by its settings' names.
+
+    Raises:
+        InputError: no such name, or a value that makes no sense.
+    """
+    valid = [one.name for one in fields(Task)]
+    if unknown := set(settings) - set(valid):
+        raise InputError(f"setting {min(unknown)!r:.80}; valid names: {', '.join(valid)}")
+    return Task(**settings)
 
 
 def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -21,7 +21,7 @@ except ModuleNotFoundError:
 from hexmj.checks import whole
 from hexmj.environments.frames import Frames
 from hexmj.environments.gym import checked_mode, checked_options, compiled_for, metadata_of, spaces_of
-from hexmj.environments.task import Task, action_names, checked_actions, drawn
+from hexmj.environments.task import action_names, checked_actions, drawn, task_of
 from hexmj.environments.walkers import Walkers
 from hexmj.physics.backend import MujocoBatch
 from hexmj.physics.fine_steps import FineSteps
@@ -56,7 +56,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         Raises:
             InputError: a value that makes no sense.
         """
-        self.task, self.num_envs = Task(**task), whole("num_envs", num_envs, 1, MOST)
+        self.task, self.num_envs = task_of(task), whole("num_envs", num_envs, 1, MOST)
         self._compiled = compiled = compiled_for(self.task)
         self.render_mode = checked_mode(render_mode)
         self.autoreset_mode = _mode(autoreset_mode)

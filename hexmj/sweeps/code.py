@@ -36,6 +36,9 @@ CARRIERS = {
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
 
+_ALL = "*"
+"""Stands for all names of a module."""
+
 _ASSETS = PACKAGE / "assets" if (PACKAGE / "assets").is_dir() else PACKAGE.parent / "assets"
 """Of an installed package, and of one that runs from its repository."""
 
@@ -63,6 +66,8 @@ class _Module:
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
+    listed: tuple[str, ...]
+    """What `__all__` names, which may be modules of a package."""
     bound: dict[str, _Wanted]
     """Name -> the import it comes from, those for types included."""
 
@@ -128,6 +133,8 @@ def _follow(modules: frozenset[str]) -> _Needed:
             read.append((name, file, module.data))
             ours = top == PACKAGE.name
             as_run.FOLLOWED.update([] if ours else [str(file)])
+            listed = [f"{name}.{one}" for one in module.listed] if attribute == _ALL else []
+            inner += [(one, "") for one in listed if _file(one)]
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
             waiting += inner
@@ -213,7 +220,8 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), _data(file, nodes) if ours else [], package == name, imports, bound)
+    data, listed = _data(file, nodes) if ours else [], tuple(_listed(nodes))
+    return _Module(digest(content), data, package == name, imports, listed, bound)
 
 
 def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
@@ -221,6 +229,14 @@ def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
     texts = {one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)}
     names = [one for one in texts if one.endswith((".toml", ".xml"))]
     return [path for name in sorted(names) for folder in (file.parent, _ASSETS) if isfile(path := folder / name)]
+
+
+def _listed(nodes: list[ast.AST]) -> Iterator[str]:
+    """The texts of `__all__`."""
+    values = [one.value for one in nodes if isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == "__all__"]
+    for one in (inner for value in values for inner in ast.walk(value)):
+        if isinstance(one, ast.Constant) and isinstance(one.value, str):
+            yield one.value
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
@@ -234,7 +250,7 @@ def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
         except ImportError:  # nor can it run
             return
         for alias in one.names:
-            yield alias.asname or alias.name, (origin, "" if alias.name == "*" else alias.name)
+            yield alias.asname or alias.name, (origin, alias.name)
 
 
 def _called(one: ast.AST, package: str) -> Iterator[_Wanted]:
