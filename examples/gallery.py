@@ -13,8 +13,8 @@ from xarray import Dataset
 
 import hexmj
 
-FILM = hexmj.Film(width=360, height=270, fps=15.0, slow_motion=2.0)
-SIDE = hexmj.Film(width=480, height=270, fps=15.0, slow_motion=1.0, camera="side")
+FILM = hexmj.Film(width=480, height=360, fps=15.0, slow_motion=2.0)
+SIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=1.0, camera="side")
 GAITS = ("graham", "walknet-reacog", "own-0.5")
 
 
