@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import servo_hexapod
 from imageio_ffmpeg import get_ffmpeg_exe
 from xarray import Dataset
 
@@ -15,6 +16,7 @@ import hexmj
 
 FILM = hexmj.Film(width=480, height=360, fps=15.0, slow_motion=2.0)
 SIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=1.0, camera="side")
+WIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=2.0)
 GAITS = ("graham", "walknet-reacog", "own-0.5")
 
 
@@ -32,11 +34,11 @@ def planned(name: str, velocity: float, duration: float) -> Dataset:
     return hexmj.record_plan(plan, hexmj.Conditions(), hexmj.Stride(), title=f"{name}, planned")
 
 
-def film(recordings: list[Dataset], path: Path, how: hexmj.Film) -> None:
+def film(recordings: list[Dataset], path: Path, how: hexmj.Film, body: hexmj.Body = hexmj.STICK_INSECT) -> None:
     """Render the recordings side by side into an animated picture that begins anew when it ends."""
     with TemporaryDirectory() as folder:
         video = Path(folder) / "film.mp4"
-        frames = hexmj.render(recordings, video, how)
+        frames = hexmj.render(recordings, video, how, body=body)
         convert = ["-i", video, "-loop", "0", "-quality", "50", "-compression_level", "4", path]
         subprocess.run([get_ffmpeg_exe(), "-loglevel", "error", "-y", *map(str, convert)], check=True)
     print(f"{path}: {frames} frames, {path.stat().st_size / 1000:.0f} kB")
@@ -49,6 +51,9 @@ def main() -> None:
     film([walked("uncoordinated", 0.5, 60.0), walked("ldvs", 0.5, 60.0)], out / "fall.webp", FILM)
     film([walked("ldvs", 0.4, 300.0, ground="step", ground_height=3.0, ground_at=60.0)], out / "step.webp", SIDE)
     film([walked(name, 0.5, 80.0) for name in GAITS], out / "gaits.webp", FILM)
+    with TemporaryDirectory() as folder:
+        body = servo_hexapod.robot(Path(folder))
+        film([servo_hexapod.tilting(body)], out / "robot.webp", WIDE, body)
 
 
 if __name__ == "__main__":

@@ -279,6 +279,8 @@ def test_make_finds_them_in_whatever_order_of_imports():
         "import gymnasium, hexmj",
         "import hexmj, gymnasium",
         "import hexmj.environments.gym, gymnasium",
+        "import hexmj, sys; [sys.modules.pop(one) for one in [*sys.modules] if one[:5] == 'hexmj']; import hexmj"
+        "; import gymnasium",
         "import hexmj; import importlib.util as util; util.find_spec('gymnasium'); import gymnasium.spaces",
     )
     plain = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
