@@ -38,6 +38,10 @@ class Unfit(Exception):
     """What is wrong with the machine."""
 
 
+class LeftOut(Exception):
+    """What an extra brings that is not installed."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """What one check has found."""
@@ -48,15 +52,19 @@ class Finding:
     """Whether it is as it should be."""
     found: str
     """What was found, or what went wrong."""
-    remedy: str
+    remedy: str = ""
     """What to do; empty where all is well."""
+    note: bool = False
+    """Whether it was left out, by somebody who may not need it."""
 
 
 def examine() -> Iterator[Finding]:
     """Every check in turn; a check that fails in any way is a finding, and the next one follows."""
     for name, (check, remedy) in CHECKS.items():
         try:
-            yield Finding(name, True, check(), "")
+            yield Finding(name, True, check())
+        except LeftOut as told:
+            yield Finding(name, True, str(told), note=True)
         except Exception as error:  # whatever the library, driver or operating system raises
             yield Finding(name, False, _short(str(error) or type(error).__name__), remedy)
 
@@ -108,7 +116,7 @@ def films() -> str:
     from hexmj.replay.film.encoder import encoder, missing
 
     if reason := missing():
-        raise Unfit(reason)
+        raise LeftOut(reason)
     import imageio_ffmpeg
 
     ffmpeg, frames = imageio_ffmpeg.get_ffmpeg_exe(), np.zeros((2, 48, 64, 3), np.uint8)
@@ -157,7 +165,7 @@ CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "install hexmj into a fresh environment (make test, make compare), Python 3.11 or newer"),
     "threads": (threads, "give --threads with the number of cores that are granted"),
     "rendering": (rendering, f"install {PACKAGES} and leave MUJOCO_GL unset, or set it to egl; only films need it"),
-    "films": (films, "reinstall the extra film, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
+    "films": (films, "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
     "compiled code": (compiled, "set NUMBA_CACHE_DIR to a folder that can be written to"),
     "walking": (walking, "reinstall mujoco and numba within the bounds above; if it stays, report it"),
 }

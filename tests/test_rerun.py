@@ -164,6 +164,13 @@ def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch):
     assert "mine.py, with which out/manifest.json was made, is no file here; expected to run where" in error
 
 
+def test_a_result_of_other_words_in_its_place_is_told(run, tmp_path):
+    words = "compare", "--velocities", "0.5", "--window", "5", "--no-video", "--out", str(tmp_path / "kept"), "--starts"
+    told = [run(*words, starts)[2] for starts in ("2", "3", "3")]
+    assert "kept held what hexmj compare --velocities 0.5 --window 5 --no-video --starts 2 wrote; this has" in told[1]
+    assert all("held what" not in one for one in (told[0], told[2]))
+
+
 def test_a_folder_means_all_its_manifests(run, flss):
     shutil.copy(flss / "manifest.json", flss / "vp-manifest.json")
     code, text, _ = run("rerun", flss, "--json")

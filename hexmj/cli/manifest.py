@@ -88,18 +88,22 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         processor=_processor(),
         files={file.relative_to(path.parent).as_posix(): _written(file) for file in written},
     )
-    for name in _left_by_another(path, told.files):
-        print(f"hexmj: {literal(str(path.parent / name))} is left from an earlier command", file=sys.stderr)
+    before = _before(path)
+    if before and before.command != told.command:
+        was = literal(" ".join(["hexmj", *before.command]))
+        print(f"hexmj: {literal(str(path.parent))} held what {was} wrote; this has taken its place", file=sys.stderr)
+    for name in [one for one in (before.files if before else ()) if one not in told.files]:
+        if (path.parent / name).is_file():
+            print(f"hexmj: {literal(str(path.parent / name))} is left from an earlier command", file=sys.stderr)
     return save_text(json_text({"format": FORMAT} | asdict(told)) + "\n", path)
 
 
-def _left_by_another(path: Path, written: dict[str, str]) -> list[str]:
-    """Files beside a manifest, and named in it as it is now, that are none of those written."""
+def _before(path: Path) -> Manifest | None:
+    """What lies where a manifest is to be written, if that is one."""
     try:
-        before = read_manifest(path).files if path.is_file() else {}
+        return read_manifest(path) if path.is_file() else None
     except InputError:
-        before = {}
-    return [name for name in before if name not in written and (path.parent / name).is_file()]
+        return None
 
 
 def read_manifest(path: Path) -> Manifest:
