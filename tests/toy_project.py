@@ -20,11 +20,15 @@ TOY = {
     "helper.py": "",
     "bare/helper.py": "",
     "bare/deep/other.py": "",
-    "gaits/__init__.py": "SIX = 6\n__all__ = ['SIX', 'wave']",
+    "gaits/__init__.py": "__all__ = 'wave'.split()",
     "gaits/wave.py": "",
+    "gaits/never.py": "this is no Python",
+    "whole/__init__.py": "",
+    "whole/part/__init__.py": "",
+    "whole/part/deep.py": "",
     "fast.pyc": "",
     "mine.py": "from helper import *\nfrom gaits import *\nfrom bare import helper\nimport bare.deep.other\n"
-    "if not True:\n    import fast\n" + MINE,
+    "import whole\nif not True:\n    import fast\n" + MINE,
 }
 
 PRINT_STEM = """

@@ -18,6 +18,7 @@ from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
 from os.path import isfile
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import NamedTuple
 
 from hexmj import as_run
@@ -37,7 +38,7 @@ _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
 
 _ALL = "*"
-"""Stands for all names of a module."""
+"""Stands for all names of a module; of a package they may be its modules, whoever has imported them."""
 
 _ASSETS = PACKAGE / "assets" if (PACKAGE / "assets").is_dir() else PACKAGE.parent / "assets"
 """Of an installed package, and of one that runs from its repository."""
@@ -66,8 +67,6 @@ class _Module:
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
-    listed: tuple[str, ...]
-    """What `__all__` names, which may be modules of a package."""
     bound: dict[str, _Wanted]
     """Name -> the import it comes from, those for types included."""
 
@@ -126,22 +125,22 @@ def _follow(modules: frozenset[str]) -> _Needed:
             raise InputError(f"{name} has no source; to keep what comes of a class or function, write it into a file")
         if CARRIERS & {name, top, name.rpartition(".")[0]}:
             continue
-        inner = [(f"{name}.{attribute}", "")] if attribute and _file(f"{name}.{attribute}") else []
+        inner = [(f"{name}.{attribute}", _ALL)] if attribute.strip(_ALL) and _file(f"{name}.{attribute}") else []
         if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
             sources[module_label(name)] = module.digest
             read.append((name, file, module.data))
             ours = top == PACKAGE.name
             as_run.FOLLOWED.update([] if ours else [str(file)])
-            listed = [f"{name}.{one}" for one in module.listed] if attribute == _ALL else []
-            inner += [(one, "") for one in listed if _file(one)]
+            whole = iter_modules([str(file.parent)]) if attribute == _ALL and module.package and not ours else ()
+            inner += [(f"{name}.{one.name}", _ALL) for one in whole]
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
         elif inner:  # of a folder without an `__init__`
             waiting += inner
         else:
             installed |= {top} - sys.stdlib_module_names
             if file is None and top in installed:
-                missing |= {name, f"{name}.{attribute}" if attribute else name}
+                missing |= {name, f"{name}.{attribute}" if attribute.strip(_ALL) else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())
     from hexmj.sweeps.packages import version
 
@@ -207,7 +206,9 @@ def _read(name: str, file: Path) -> _Module:
     try:
         nodes = list(ast.walk(parsed(python)))
     except (SyntaxError, ValueError) as error:
-        raise InputError(f"{file} cannot be read as Python: {error}") from None
+        if name in sys.modules:
+            raise InputError(f"{file} cannot be read as Python: {error}") from None
+        nodes = list[ast.AST]()
     guarded = [
         one
         for one in nodes
@@ -220,8 +221,7 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    data, listed = _data(file, nodes) if ours else [], tuple(_listed(nodes))
-    return _Module(digest(content), data, package == name, imports, listed, bound)
+    return _Module(digest(content), _data(file, nodes) if ours else [], package == name, imports, bound)
 
 
 def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
@@ -231,19 +231,11 @@ def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
     return [path for name in sorted(names) for folder in (file.parent, _ASSETS) if isfile(path := folder / name)]
 
 
-def _listed(nodes: list[ast.AST]) -> Iterator[str]:
-    """The texts of `__all__`."""
-    values = [one.value for one in nodes if isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == "__all__"]
-    for one in (inner for value in values for inner in ast.walk(value)):
-        if isinstance(one, ast.Constant) and isinstance(one.value, str):
-            yield one.value
-
-
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:
     """The names that an import binds, each with the module and the name in it."""
     if isinstance(one, ast.Import):
         for alias in one.names:
-            yield alias.asname or alias.name, (alias.name, "")
+            yield alias.asname or alias.name, (alias.name, "" if "." in alias.name and not alias.asname else _ALL)
     elif isinstance(one, ast.ImportFrom):
         try:
             origin = resolve_name("." * one.level + (one.module or ""), package)
