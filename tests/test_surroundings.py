@@ -28,6 +28,12 @@ def test_a_terminal_of_few_columns_gets_its_help(columns: str):
     assert done_with(("--help",), COLUMNS=columns).returncode == 0
 
 
+@pytest.mark.parametrize("columns", ["0", "00", "wide"])
+def test_no_width_is_as_wide_as_usual(columns: str):
+    words = "flss", "--velocities", "0.5", "--starts", "4", "--window", "5"
+    assert done_with(words, COLUMNS=columns).stdout == done_with(words, COLUMNS="80").stdout != ""
+
+
 def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):
     done = done_with((*FEW, "--out", str(tmp_path)), MPLBACKEND="nonsense")
     assert done.returncode == 0, done.stderr

@@ -20,8 +20,9 @@ def settle() -> None:
         os.getcwd()
     except FileNotFoundError:
         raise InputError("the current folder is no longer there; expected one that is") from None
-    if shutil.get_terminal_size().columns < NARROWEST:
-        os.environ["COLUMNS"] = str(NARROWEST)
+    columns = shutil.get_terminal_size().columns
+    if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
+        os.environ["COLUMNS"] = str(max(columns, NARROWEST))
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if not (threads.isdecimal() and int(threads) > 0):
         raise InputError(f"NUMBA_NUM_THREADS = {threads:.80}; expected a whole number of at least 1, or nothing")
