@@ -98,7 +98,9 @@ class Search(WalkingCommand):
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
         with progress_bar("searching") as progress:
             found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
-        verdict = fresh.verdict({"found": problem.controller(found.vector)} | beside, self.workers.threads)
+        with progress_bar("judging") as progress:
+            judged = {"found": problem.controller(found.vector)} | beside
+            verdict = fresh.verdict(judged, self.workers.threads, progress)
         settings = {
             "problem": problem.settings(),
             "effort": plain(effort),

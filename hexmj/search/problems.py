@@ -15,6 +15,7 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, OutOfReach
 from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
+from hexmj.progress import Progress, part_of
 from hexmj.search.domain import Domain
 from hexmj.search.forms import Form
 from hexmj.search.network_forms import NetworkForm
@@ -252,18 +253,24 @@ class Sample:
             if one.problem.conditions:
                 one._times(one.problem.controller(vector), [one.problem.window], threads)
 
-    def verdict(self, controllers: Mapping[str, Controller], threads: int | None = None) -> "xr.Dataset":
+    def verdict(
+        self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
+    ) -> "xr.Dataset":
         """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
 
         The interval of a mean over variants is too wide rather than too narrow: as if all lost stability together.
         """
         import xarray as xr
 
-        windows = self.problem.windows
-        lost = self._together([
-            [sample._losses(varied(one, name), windows, threads) for one in controllers.values()]
-            for name, sample in self.variants.items()
-        ])  # fmt: skip
+        windows, told = self.problem.windows, part_of(progress, 1.0 / len(controllers) / len(self.variants))
+
+        def losses(variant: str, controller: Controller) -> np.ndarray:
+            lost = self.variants[variant]._losses(varied(controller, variant), windows, threads)
+            if told:
+                told(1.0)
+            return lost
+
+        lost = self._together([[losses(name, one) for one in controllers.values()] for name in self.variants])
         low, high = wilson_intervals(np.rint(lost), self.n_starts)
         over, unit = ("controller", "window"), {"units": "1"}
         return xr.Dataset(
