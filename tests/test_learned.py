@@ -209,11 +209,3 @@ def test_without_stable_baselines_it_is_said_what_brings_it(monkeypatch):
     monkeypatch.delitem(sys.modules, "hexmj.environments.stable_baselines", raising=False)
     with pytest.raises(hexmj.InputError, match=r'pip install "\.\[rl\]"'):
         importlib.import_module("hexmj.environments.stable_baselines")
-
-
-def test_the_pages_snippets_run():
-    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
-    snippets = [part.split("```")[0] for part in page.split("```python\n")[1:]]
-    assert len(snippets) == 2
-    for snippet in snippets:
-        exec(snippet, {})
