@@ -78,7 +78,7 @@ def main() -> None:
         print(f"generation {generation + 1}: cost {cost.mean():.3f}, best {cost.min():.3f}", flush=True)
     rows = [", ".join(f"{number:.3f}" for number in row) for row in search.mean.reshape(3, 5)]
     FOUND.write_text("weights = [\n" + "".join(f"    [{row}],\n" for row in rows) + "]\n", encoding="utf-8")
-    print(f"{FOUND.name} after {time.monotonic() - began:.0f} s")
+    print(f"{FOUND} after {time.monotonic() - began:.0f} s")
     result = hexmj.compare({"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, window="start", seed=77)
     for name, falls in zip(("ldvs", "reflexes"), result.physical.values[:, 0], strict=True):
         print(f"{name}: physical FLSS of the start at V = {VELOCITY:g} is {falls:.2f} of 200 fresh starts")

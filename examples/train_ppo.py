@@ -75,7 +75,7 @@ def main() -> None:
     kept = {"made by": "python examples/train_ppo.py", "gains": asdict(Righting(*gains.tolist()))}
     FOUND.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
     spent = f"{time.monotonic() - began:.0f} s, {time.process_time() - cpu:.0f} s of processor time"
-    print(f"{FOUND.name} after {agent.num_timesteps} actions in {spent}")
+    print(f"{FOUND} after {agent.num_timesteps} actions in {spent}")
     both = {"ldvs": hexmj.LDVS, "righting": found()}
     result = hexmj.compare(both, [VELOCITY], n_starts=STARTS, window="start", seed=77)
     ends = (result[name].values[:, 0] for name in ("physical", "physical_low", "physical_high"))

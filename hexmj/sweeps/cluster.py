@@ -59,7 +59,9 @@ def _found(address: str) -> dict[str, Any]:
     try:
         told = asyncio.run(asyncio.wait_for(_identity(address), PATIENCE))
     except (OSError, TimeoutError):
-        raise InputError(f"no scheduler answers at {address}; expected an address that is {expected}") from None
+        raise InputError(
+            f"no scheduler answers at {address}; expected the address that `dask scheduler` prints"
+        ) from None
     except (TypeError, ValueError) as error:
         reason = f": {error}" if "address" in str(error) else ""  # else it is Python's own
         raise InputError(f"scheduler = {address!r}{reason}; expected an address that is {expected}") from None
