@@ -108,30 +108,9 @@ def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any,
     joints, foot, centre, command, no_foot = layout
     feet, margin = np.empty((1, 6, 2)), np.empty(1)
     for n in range(len(flat)):
-        seen, turn, q, v, s = flat[n], rotation[n], qpos[n], qvel[n], sensors[n]
-        at = 0
-        for j in range(joints):
-            seen[at + j] = q[ROOT_QPOS + j]
-            seen[at + joints + j] = v[ROOT_QVEL + j]
-        at += 2 * joints
-        for k in range(4):
-            seen[at + k] = q[3 + k]
-        at += 4
-        angle = np.arctan2(turn[1, 0], turn[0, 0])
-        cosine, sine = np.cos(angle), np.sin(angle)
-        seen[at] = cosine * v[0] + sine * v[1]
-        seen[at + 1] = cosine * v[1] - sine * v[0]
-        seen[at + 2] = v[2]
-        at += 3
-        for k in range(3):
-            seen[at + k] = v[3 + k]
-        at += 3
-        lowest = np.inf
-        for c in range(len(corners[0])):
-            corner = corners[0][c]
-            up = turn[2, 0] * corner[0] + turn[2, 1] * corner[1] + turn[2, 2] * corner[2]
-            lowest = min(lowest, q[2] + up - corners[1][c])
-        seen[at] = lowest
+        seen, turn, q, s = flat[n], rotation[n], qpos[n], sensors[n]
+        at = _observe_root(q, qvel[n], turn, joints, seen)
+        seen[at] = _clearance(q, turn, corners)
         at += 1
         for leg in range(6):
             here = s[foot + 3 * leg : foot + 3 * leg + 3]
@@ -143,22 +122,50 @@ def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any,
             feet[0, leg, 0], feet[0, leg, 1] = here[0] - s[centre], here[1] - s[centre + 1]
         for leg in range(6):
             seen[at + leg] = standing[n, leg]
-        at += 6
         margins(feet, standing[n : n + 1], margin)
-        seen[at] = max(margin[0], no_foot)
-        seen[at + 1] = command
-        at += 2
+        seen[at + 6] = max(margin[0], no_foot)
+        seen[at + 7] = command
+        at += 8
         for leg in range(6):
             seen[at + leg] = stance[n, leg]
-        at += 6
-        for leg in range(6):
             for k in range(3):
-                seen[at + k] = tips[n, leg, k]
-            at += 3
+                seen[at + 6 + 3 * leg + k] = tips[n, leg, k]
+        at += 24
         for i in range(at, len(seen)):
             seen[i] = missed[n, i - at]
         for i in range(len(seen)):
             seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
+
+
+@njit(cache=True, nogil=True)
+def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
+    """Write joints, orientation and velocities into the first numbers of `seen`; how many these are."""
+    for j in range(joints):
+        seen[j] = q[ROOT_QPOS + j]
+        seen[joints + j] = v[ROOT_QVEL + j]
+    at = 2 * joints
+    for k in range(4):
+        seen[at + k] = q[3 + k]
+    at += 4
+    angle = np.arctan2(turn[1, 0], turn[0, 0])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    seen[at] = cosine * v[0] + sine * v[1]
+    seen[at + 1] = cosine * v[1] - sine * v[0]
+    seen[at + 2] = v[2]
+    for k in range(3):
+        seen[at + 3 + k] = v[3 + k]
+    return at + 6
+
+
+@njit(cache=True, nogil=True)
+def _clearance(q: Any, turn: Any, corners: Any) -> float:
+    """Height of the trunk's lowest corner [mm]."""
+    lowest = np.inf
+    for c in range(len(corners[0])):
+        corner = corners[0][c]
+        up = turn[2, 0] * corner[0] + turn[2, 1] * corner[1] + turn[2, 2] * corner[2]
+        lowest = min(lowest, q[2] + up - corners[1][c])
+    return lowest
 
 
 @njit(cache=True, nogil=True)
