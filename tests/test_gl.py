@@ -47,6 +47,21 @@ walking.physics.free()
 """
 
 
+TRITON = """
+import sys
+assert not {"OpenGL", "mujoco.egl", "dm_control"} & {*sys.modules}, "there may be a context"
+"""
+
+
+@pytest.mark.parametrize("draws", [FRAME, ENVIRONMENT], ids=["frame", "dm_env"])
+def test_triton_is_there_before_a_context(draws, tmp_path):
+    """Imported later it would end the process."""
+    (tmp_path / "triton.py").write_text(TRITON)
+    code = f"{draws}\nimport sys\nassert 'triton' in sys.modules"
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    subprocess.run([sys.executable, "-c", code], env=KEPT | {"PYTHONPATH": path}, check=True)
+
+
 @pytest.fixture
 def environment(monkeypatch):
     for name in gl.WISHES:

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import glfw
 import numpy as np
 
+from hexmj.replay.film.gl import import_what_clashes
+
 with warnings.catch_warnings():
     if "MUJOCO_GL" not in os.environ:  # without a screen GLFW only warns, and dm_control would never come to EGL
         warnings.simplefilter("error", glfw.GLFWError)
+    import_what_clashes()
     from dm_control import mujoco
 from dm_control.mujoco import wrapper
 from dm_control.rl import control

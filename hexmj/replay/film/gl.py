@@ -9,7 +9,11 @@ import os
 import sys
 import textwrap
 import warnings
+from contextlib import suppress
 from ctypes.util import find_library
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -27,6 +31,15 @@ _VAIN: list[str] = []
 
 WISHES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
 """Variables of the environment by which a GL has been chosen, or a screen is there."""
+
+
+@cache
+def import_what_clashes() -> None:
+    """Import Triton, which torch brings, before there is a context: after Mesa has made one, whoever asked for it, that
+    import ends the process by a segmentation fault."""
+    if find_spec("triton"):
+        with suppress(Exception):  # of whatever it lacks; it is nothing to us
+            import_module("triton")
 
 
 def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Renderer":
@@ -47,6 +60,7 @@ def context_type() -> Any:
     Raises:
         OSError, AttributeError and others, of each library: nothing can be rendered.
     """
+    import_what_clashes()
     if sys.platform != "linux" or any(os.environ.get(name) for name in WISHES):
         import mujoco
 
