@@ -94,7 +94,10 @@ class Terrain(StudyCommand):
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """A table of the obstacles, and the conditions."""
         name = self.controlled.controller(self.model).name
-        yield f"{name}, {self.starts} starts: FLSS once the obstacle has been reached, with 95 % intervals"
+        yield (
+            f"{name}, {self.starts} starts at each velocity: FLSS once the obstacle has been reached, with 95 %"
+            " intervals; who falls on the way to it does not count"
+        )
         yield _table(result, self.conditions.body.trunk)
         walks = replace(self.walks, window=f"{result.attrs['distance']:g} / V")
         yield replace(self, walks=walks).conditions_line(varied=VARIED)
