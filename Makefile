@@ -13,6 +13,7 @@ PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
 TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
+GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
 .PHONY: compare test slow soak bench lint docs gallery system browser
 .DELETE_ON_ERROR:
@@ -20,18 +21,18 @@ GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 compare: .venv/project system
 	.venv/bin/hexmj compare --out results/compare $(ARGS)
 
-test slow: export MUJOCO_GL ?= egl
+test slow: export MUJOCO_GL ?= $(GL)
 test: .venv/dev system
 	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
 
 slow: .venv/dev system browser .venv/rl
 	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
 
-soak: export MUJOCO_GL ?= egl
+soak: export MUJOCO_GL ?= $(GL)
 soak: .venv/dev system
 	.venv/bin/python -m tests.soak $(ARGS)
 
-bench: export MUJOCO_GL ?= egl
+bench: export MUJOCO_GL ?= $(GL)
 bench: .venv/dev system
 	mkdir -p results/bench
 	$(MAKE) .venv-flygym/ready || echo "flygym could not be installed; its rows are left out."

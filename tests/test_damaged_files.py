@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from drawing import drawing
 from hexmj import netcdf
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
@@ -123,6 +124,7 @@ FALSE: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
 
 
 @pytest.mark.parametrize("kind", FALSE)
+@drawing
 def test_a_recording_that_makes_no_sense_is_neither_written_read_nor_filmed(recording, tmp_path, kind):
     change, said = FALSE[kind]
     false, path = change(recording), tmp_path / "recording.nc"

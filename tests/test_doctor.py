@@ -6,6 +6,7 @@ from importlib import metadata
 
 import pytest
 
+from drawing import drawing
 from hexmj import machine, threads
 from hexmj.errors import SimulationError
 from hexmj.machine import CHECKS, Unfit, examine
@@ -16,6 +17,7 @@ def only(monkeypatch, name: str) -> None:
     monkeypatch.setattr(machine, "CHECKS", {name: CHECKS[name]})
 
 
+@drawing
 def test_this_machine_is_fit(run):
     code, out, _ = run("doctor")
     lines = out.splitlines()

@@ -10,13 +10,13 @@ from dm_control.viewer.runtime import Runtime, State
 from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
 
+from drawing import drawing
 from episodes import KINDS, ZEROS, episode
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.environments import dm
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import LEGS
-from hexmj.replay.film import gl
 from hexmj.timing import Stride
 
 
@@ -222,7 +222,7 @@ def test_the_suites_action_noise_wraps_it():
     assert np.array_equal(*first) and not np.array_equal(*then)
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@drawing
 def test_it_is_rendered():
     walking = dm.load()
     walking.reset()

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from drawing import drawing
 from hexmj.replay.film import gl
 
 KEPT = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
@@ -54,6 +55,7 @@ assert not {"OpenGL", "mujoco.egl", "dm_control"} & {*sys.modules}, "there may b
 
 
 @pytest.mark.parametrize("draws", [FRAME, ENVIRONMENT], ids=["frame", "dm_env"])
+@drawing
 def test_triton_is_there_before_a_context(draws, tmp_path):
     """Imported later it would end the process."""
     (tmp_path / "triton.py").write_text(TRITON)
@@ -73,7 +75,7 @@ def without_libraries(name: str) -> None:
     raise OSError(f"{name}: cannot open shared object file")
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@drawing
 @pytest.mark.parametrize("script", [FRAME, ENVIRONMENT], ids=["film", "environment"])
 def test_without_a_screen_frames_are_rendered_though_nobody_asked_for_egl(script):
     path = {"PYTHONPATH": os.pathsep.join(sys.path)}
@@ -86,6 +88,7 @@ def test_without_a_screen_frames_are_rendered_though_nobody_asked_for_egl(script
 
 
 @pytest.mark.parametrize(("name", "value"), [("MUJOCO_GL", "osmesa"), ("DISPLAY", ":0"), ("WAYLAND_DISPLAY", "w")])
+@drawing
 def test_other_wishes_stand(environment, name, value):
     """MuJoCo was imported with them, or with none."""
     import mujoco
@@ -97,6 +100,7 @@ def test_other_wishes_stand(environment, name, value):
     assert gl.context_type() is not wish
 
 
+@drawing
 def test_elsewhere_mujoco_knows_best(environment):
     import mujoco
 

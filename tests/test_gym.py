@@ -17,6 +17,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import hexmj
+from drawing import drawing
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import IDS, dm
@@ -24,7 +25,6 @@ from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
 from hexmj.physics import settling
-from hexmj.replay.film import gl
 from hexmj.timing import Stride
 from tests.episodes import assert_same, some_actions
 from tests.plain_observations import plain_observations, plain_rewards
@@ -56,7 +56,7 @@ def test_it_passes_gymnasiums_checks(name):
     check_mujoco_reset_state(made(name))
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@drawing
 def test_it_is_rendered():
     check_env(made("hexmj/StickInsectTips-v0"))
     walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
@@ -73,7 +73,7 @@ def test_it_is_rendered():
     many.close()
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@drawing
 def test_one_thread_draws_all_frames():
     walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
     walking.reset()
@@ -87,7 +87,7 @@ def test_one_thread_draws_all_frames():
     walking.close()
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="nothing can be rendered here")
+@drawing
 @pytest.mark.parametrize("kind", [StickInsect, StickInsects])
 def test_what_is_drawn_was_compiled_at_first(kind, tmp_path):
     file = tmp_path / "insect.xml"

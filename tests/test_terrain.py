@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
+from drawing import drawing
 from film_reader import read_film
 from hexmj import (
     LDVS,
@@ -235,6 +236,7 @@ def test_obstacles_have_their_names_and_sizes():
     assert found["hurdle 2 mm"] == Conditions.of(ground="hurdle", ground_height=2.0)
 
 
+@drawing
 def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
     path = save_recording(record(walked("step"), 0).isel(step=slice(600, 640)), tmp_path / "recording.nc")
     film, shown = Film(width=160, height=120, slow_motion=1.0), []

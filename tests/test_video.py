@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from PIL import Image, ImageSequence
 
+from drawing import drawing
 from film_reader import read_film
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
@@ -70,6 +71,7 @@ def plan(walked: PhysicalWalk, start: int) -> xr.Dataset:
     return record_plan(walked.planned, walked.conditions, walked.stride, start, "its plan")
 
 
+@drawing
 def test_a_film_has_the_frames_of_its_walk_in_its_colours(fallen, tmp_path):
     """Each frame shows the walk's time; the polygon is green while the margin is positive, then red."""
     path = save_recording(fallen, tmp_path / "recording.nc")
@@ -96,6 +98,7 @@ def test_a_film_has_the_frames_of_its_walk_in_its_colours(fallen, tmp_path):
     assert np.abs(shots[after] - shots[-1]).mean() < 1.0, "it freezes after the fall"
 
 
+@drawing
 def test_slow_motion_multiplies_the_frames(fallen, tmp_path):
     films = [Film(slow_motion=slow, width=320, height=240) for slow in (1.0, 2.0, 3.5)]
     counts = [render([fallen], tmp_path / "film.mp4", film) for film in films]
@@ -103,6 +106,7 @@ def test_slow_motion_multiplies_the_frames(fallen, tmp_path):
     assert len(read_film(tmp_path / "film.mp4")[0]) == counts[-1]
 
 
+@drawing
 def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen, tmp_path):
     film = Film(slow_motion=2.0, width=320, height=240)
     shorter = plan.isel(step=slice(None, 160))
@@ -115,6 +119,7 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen
     assert np.abs(left[5] - left[2]).mean() > 2 * np.abs(left[17] - left[14]).mean(), "the shorter one freezes"
 
 
+@drawing
 def test_a_film_of_a_part_shows_the_moments_that_it_tells(fallen, tmp_path):
     """Its frames are those of the whole film at these times."""
     film, part = Film(slow_motion=5.0, width=320, height=240), fallen.isel(step=slice(80, 160))  # from 0.1 to 0.2 s
@@ -131,6 +136,7 @@ def test_a_film_of_a_part_shows_the_moments_that_it_tells(fallen, tmp_path):
     assert [f"{one:g}" for one in _ticks(0.0, 10.0)] == [str(one) for one in range(11)]
 
 
+@drawing
 def test_a_gif_plays_the_same_walk(fallen, tmp_path):
     frames = render([fallen], tmp_path / "film.gif", Film(width=320, height=240, fps=10, slow_motion=4.0))
     with Image.open(tmp_path / "film.gif") as film:
@@ -171,6 +177,7 @@ def test_what_is_stable_is_told_without_colours(fallen):
     assert (strip[10:300, 0] < 60).argmin() == 101, "20 mm at 5 pixels/mm, from end to end"
 
 
+@drawing
 def test_the_scale_is_that_of_the_camera(plan):
     """From above, a mm near the ground is as many pixels as the MJCF's camera says."""
     take = Take.of(plan)
@@ -182,6 +189,7 @@ def test_the_scale_is_that_of_the_camera(plan):
     assert scale == pytest.approx(480 / (2 * height * np.tan(np.radians(model.cam("top").fovy[0] / 2))), rel=0.05)
 
 
+@drawing
 def test_high_quality_has_shadows(fallen, tmp_path):
     dark = {}
     for film in (Film(quality="fast", slow_motion=0.2), Film(quality="high", slow_motion=0.2)):
@@ -192,6 +200,7 @@ def test_high_quality_has_shadows(fallen, tmp_path):
 
 
 @pytest.mark.parametrize("camera", STICK_INSECT.cameras)
+@drawing
 def test_the_insect_keeps_clear_of_the_diagram(camera, plan, tmp_path):
     """Around the scene, above the diagram and below the caption, there are neither legs nor polygon."""
     render([plan], tmp_path / "film.mp4", Film(camera=camera, slow_motion=0.5))
@@ -200,6 +209,7 @@ def test_the_insect_keeps_clear_of_the_diagram(camera, plan, tmp_path):
             assert np.ptp(strip, axis=-1).max() < 30
 
 
+@drawing
 def test_films_that_make_no_sense(fallen, tmp_path):
     changes: dict[str, Any] = {"width": 641, "height": 0, "quality": "best", "fps": 0.0}
     for name, value in changes.items():
@@ -220,6 +230,7 @@ def test_films_that_make_no_sense(fallen, tmp_path):
         render([unseen], tmp_path / "film.mp4")
 
 
+@drawing
 def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
     path = tmp_path / "film.mp4"
     path.write_text("old")
@@ -233,6 +244,7 @@ def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@drawing
 def test_without_what_encodes_films_it_is_said_what_brings_it(fallen, tmp_path, monkeypatch, run):
     monkeypatch.setitem(sys.modules, "mediapy", None)
     with pytest.raises(RenderingError, match=r'pip install "\.\[film\]"'):
@@ -242,6 +254,7 @@ def test_without_what_encodes_films_it_is_said_what_brings_it(fallen, tmp_path, 
     assert not list(tmp_path.iterdir())
 
 
+@drawing
 def test_whether_anything_can_be_rendered_is_known():
     assert gl.missing() is None
     kept = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
@@ -258,6 +271,7 @@ def test_whether_anything_can_be_rendered_is_known():
         assert done.stderr == ""
 
 
+@drawing
 def test_nothing_is_left_in_memory_of_the_graphics(fallen, tmp_path):
     """Films one after the other: every renderer is closed, and a new context still works."""
     for _ in range(3):

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import hexmj
+from drawing import drawing
 from film_reader import read_film
 
 PNG = b"\x89PNG"
@@ -39,6 +40,7 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
     assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
 
 
+@drawing
 def test_compare_makes_a_video_of_a_gait_and_its_tables_break_no_name(run, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = run(
@@ -121,6 +123,7 @@ def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
     assert recording.seconds.values[-1] == pytest.approx(16 / 40)
 
 
+@drawing
 def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     walk = ["--velocity", 0.5, "--window", 16]
     run("walk", *walk, "--physical", "--out", tmp_path / "walk")
