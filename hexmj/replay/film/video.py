@@ -1,6 +1,7 @@
 """Films of recordings, rendered without a screen: the insect, its support polygon, caption and footfall diagram."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -90,7 +91,8 @@ def _write(
     film: Film,
     progress: Progress | None,
 ) -> None:
-    """Film the takes side by side at some times on their clock, (frame,) [s]."""
+    """Film the takes side by side at some times on their clock, (frame,) [s]; each frame is drawn on and encoded while
+    the scenes of the next one are rendered."""
     rows = 1 if len(takes) <= IN_A_ROW else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
@@ -102,14 +104,22 @@ def _write(
             for conditions, model in worlds.items()
         }
         add = opened.enter_context(encoder.encoder(path, *picture.shape[:2], film.fps))
-        for seconds in times.tolist():
-            for take, overlay, panel in zip(takes, overlays, panels, strict=True):
-                row = take.row(seconds)
-                panel[:], scale = _view(*stages[take.conditions], film.camera, take, row)
-                overlay.draw(panel, row, seconds, scale)
+        finishing = opened.enter_context(ThreadPoolExecutor(1))
+
+        def finish(views: Sequence[tuple[np.ndarray, float]], seconds: float) -> None:
+            for take, overlay, panel, (view, scale) in zip(takes, overlays, panels, views, strict=True):
+                panel[:] = view
+                overlay.draw(panel, take.row(seconds), seconds, scale)
             add(picture)
+
+        finished = finishing.submit(lambda: None)
+        for seconds in times.tolist():
+            views = [_view(*stages[take.conditions], film.camera, take, take.row(seconds)) for take in takes]
+            finished.result()
+            finished = finishing.submit(finish, views, seconds)
             if progress:
                 progress(1 / len(times))
+        finished.result()
 
 
 def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:
