@@ -54,7 +54,7 @@ _FINDS = re.compile(
 _SYSTEMS = tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 _SYSTEMS += "/proc/", "/sys/"
 
-LARGE = 2**26
+LARGE = 2**16
 """Size from which on a file is not read through as it is opened [bytes]."""
 
 _UNREAD = "unread "
