@@ -21,8 +21,8 @@ from scipy.optimize import nnls
 from benchmarks.processor import description
 from hexmj import LDVS, Conditions, Stride, draw_starts, first_loss, flss, physical_flss
 from hexmj.measures.figures import MEASURE_COLOURS
-from hexmj.results import json_text, results_folder, save_figure, save_text
-from hexmj.threads import thread_count
+from hexmj.process.threads import thread_count
+from hexmj.storage.results import json_text, results_folder, save_figure, save_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,7 +26,7 @@ from hexmj.bodies.loading import compile_body
 from hexmj.intervals import wilson_interval
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import Settled, settle
-from hexmj.results import json_text, save_text
+from hexmj.storage.results import json_text, save_text
 
 VELOCITY, DURATION = 0.5, 40.0
 FINEST = "time step / 4"

@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.processor import clock, description, operations
-from hexmj.results import save_text
+from hexmj.storage.results import save_text
 
 COLUMNS = ["what", "hexmj", "bar", "peer", "ratio"]
 ONE_CORE = "FLSS, LDVS, V = 0.1, one core"

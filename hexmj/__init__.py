@@ -7,13 +7,12 @@ unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import hexmj.as_run  # from now on
-import hexmj.reads
-import hexmj.registering  # noqa: F401
+import hexmj.registering
+import hexmj.user_code.as_run  # from now on
+import hexmj.user_code.reads  # noqa: F401
 
 if TYPE_CHECKING:
     from hexmj import environments as environments
-    from hexmj.attributes import settings as settings
     from hexmj.bodies.description import Body as Body
     from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
     from hexmj.conditions import Conditions as Conditions
@@ -47,8 +46,6 @@ if TYPE_CHECKING:
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
     from hexmj.replay.recording import save_recording as save_recording
-    from hexmj.results import load as load
-    from hexmj.results import save as save
     from hexmj.search.forms import FieldsForm as FieldsForm
     from hexmj.search.network_forms import NetworkForm as NetworkForm
     from hexmj.search.problems import Problem as Problem
@@ -58,13 +55,15 @@ if TYPE_CHECKING:
     from hexmj.stability import support_polygon as support_polygon
     from hexmj.stability import walk_margin as walk_margin
     from hexmj.starts import draw_starts as draw_starts
+    from hexmj.storage.attributes import settings as settings
+    from hexmj.storage.results import load as load
+    from hexmj.storage.results import save as save
     from hexmj.timing import Acceleration as Acceleration
     from hexmj.timing import Stride as Stride
     from hexmj.version import __version__ as __version__
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
-    "attributes": ("settings",),
     "bodies.description": ("Body",),
     "bodies.stick_insect": ("STICK_INSECT",),
     "conditions": ("Conditions",),
@@ -81,13 +80,14 @@ _MODULES = {
     "replay.film.video": ("render",),
     "replay.page.page": ("page",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
-    "results": ("load", "save"),
     "search.forms": ("FieldsForm",),
     "search.network_forms": ("NetworkForm",),
     "search.problems": ("Problem",),
     "search.stages": ("Effort",),
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),
     "starts": ("draw_starts",),
+    "storage.attributes": ("settings",),
+    "storage.results": ("load", "save"),
     "timing": ("Acceleration", "Stride"),
     "version": ("__version__",),
     "walks": ("Walk",),

@@ -4,7 +4,7 @@ import os
 import sys
 from contextlib import suppress
 
-from hexmj.signals import hear_stops, ignore_stops, of_stop
+from hexmj.process.signals import hear_stops, ignore_stops, of_stop
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
-from hexmj.parsing import parsed
+from hexmj.user_code.parsing import parsed
 
 
 class FieldDocs:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.checks import numbers, states, typed
 from hexmj.errors import InputError
-from hexmj.threads import run_blocks
+from hexmj.process.threads import run_blocks
 from hexmj.walks import Walk
 
 ROUNDING = 4.0 * 2.0**-53

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hexmj.progress import Progress
+from hexmj.process.progress import Progress
 from hexmj.sweeps import Cell
 
 PATHS = ".", *(str(folder) for folder in Path(__file__).parents[:2])

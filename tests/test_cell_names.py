@@ -19,11 +19,11 @@ import xarray as xr
 import hexmj
 from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
-from hexmj.files import digest_of
-from hexmj.loaded import importable
+from hexmj.storage.files import digest_of
 from hexmj.sweeps import Cell, packages
 from hexmj.sweeps.code import code
 from hexmj.sweeps.packages import NAMES
+from hexmj.user_code.loaded import importable
 from small_cells import ENVIRONMENT, MINE, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
 
@@ -120,7 +120,7 @@ def test_a_helper_with_the_name_of_one_of_pythons_own_counts(toy: Path) -> None:
 
 VERSIONS = """
 import json
-from hexmj.loaded import importable
+from hexmj.user_code.loaded import importable
 from hexmj.sweeps.code import code
 print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
 """

@@ -14,10 +14,10 @@ import pytest
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.files import PART, prepare, remove_leftovers, replacing
 from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
+from hexmj.storage.files import PART, prepare, remove_leftovers, replacing
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import ENVIRONMENT, squares
 from tests.soak.counted import LOG, Counted

@@ -14,13 +14,11 @@ import pytest
 import xarray as xr
 
 from drawing import drawing
-from hexmj import netcdf
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError, SimulationError
-from hexmj.files import MARK, opened, read_sealed, sealed, unsealed
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.paper.found_sets import found_sets
@@ -28,8 +26,10 @@ from hexmj.physics.divergence import replay, save_state
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
-from hexmj.results import results_folder, save_dataset
 from hexmj.starts import draw_starts
+from hexmj.storage import netcdf
+from hexmj.storage.files import MARK, opened, read_sealed, sealed, unsealed
+from hexmj.storage.results import results_folder, save_dataset
 from hexmj.sweeps import Cell, KeptValues, run
 from hexmj.timing import Stride
 from small_cells import squares
@@ -241,7 +241,7 @@ def test_a_file_that_nobody_may_read(tmp_path, monkeypatch):
     def refuse(*_: object) -> int:
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("hexmj.files.os.open", refuse)
+    monkeypatch.setattr("hexmj.storage.files.os.open", refuse)
     with pytest.raises(InputError, match=r"file cannot be read: Permission denied$"), opened(path):
         pass
     with pytest.raises(InputError, match="Permission denied"):

@@ -7,10 +7,11 @@ from importlib import metadata
 import pytest
 
 from drawing import drawing
-from hexmj import machine, threads
+from hexmj.cli import machine
+from hexmj.cli.machine import CHECKS, Unfit, examine
 from hexmj.errors import SimulationError
-from hexmj.machine import CHECKS, Unfit, examine
 from hexmj.measures import physical
+from hexmj.process import threads
 
 
 def only(monkeypatch, name: str) -> None:

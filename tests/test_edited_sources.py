@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.loaded import importable
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps import code as sources
 from hexmj.sweeps.code import code
+from hexmj.user_code.loaded import importable
 from small_cells import ENVIRONMENT, MINE
 from toy_project import write_toy
 
@@ -134,7 +134,7 @@ def test_bytecode_of_another_source_is_refused(tmp_path: Path, when: str) -> Non
 
 SOUND = """
 import sys
-from hexmj.loaded import importable
+from hexmj.user_code.loaded import importable
 from hexmj.sweeps import Cell
 import sound
 print(Cell("sound", sound.cell, {"controller": importable("mine.py").Tripod()}).record())

@@ -10,9 +10,9 @@ import hexmj
 from hexmj.cli.main import options_of
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.rivals.lifted import Legs
-from hexmj.files import read_toml
 from hexmj.gaits import gait
 from hexmj.search.problems import Sample
+from hexmj.storage.files import read_toml
 from hexmj.timing import Stride
 
 L2 = 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import SimulationError
-from hexmj.loaded import importable
+from hexmj.user_code.loaded import importable
 
 
 def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):

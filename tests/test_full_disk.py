@@ -20,9 +20,9 @@ import hexmj
 from hexmj.cli.flss import Flss
 from hexmj.cli.manifest import save_manifest
 from hexmj.errors import InputError
-from hexmj.files import replacing, write_whole
 from hexmj.replay.film.encoder import encoder
-from hexmj.results import save_dataset, save_figure, save_text
+from hexmj.storage.files import replacing, write_whole
+from hexmj.storage.results import save_dataset, save_figure, save_text
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import squares
 

@@ -17,7 +17,7 @@ from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
 from hexmj.errors import InputError
-from hexmj.loaded import importable
+from hexmj.user_code.loaded import importable
 from hexmj.view.live import LiveWalk
 
 ROOT = Path(__file__).parents[1]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.loaded import importable
+from hexmj.user_code.loaded import importable
 from small_cells import MINE
 
 

@@ -269,7 +269,7 @@ def test_starts_out_of_reach_are_refused():
 
 def test_more_starts_than_the_memory_holds_are_refused(tmp_path, monkeypatch):
     (limit := tmp_path / "memory.max").write_text("1000000000\n")
-    monkeypatch.setattr("hexmj.threads.GROUP_LIMIT", limit)
+    monkeypatch.setattr("hexmj.process.threads.GROUP_LIMIT", limit)
     with pytest.raises(InputError, match="10000 starts that walk at once in physics take"):
         settle(np.zeros((10_000, 6)))
 

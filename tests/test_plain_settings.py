@@ -18,10 +18,10 @@ import hexmj
 from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.loaded import importable
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import classes, plain
 from hexmj.timing import Stride
+from hexmj.user_code.loaded import importable
 from small_cells import Wave, odd_bits
 
 

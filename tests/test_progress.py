@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj import progress
 from hexmj.errors import InputError
+from hexmj.process import progress
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.stages import search
 
@@ -101,7 +101,7 @@ def test_a_command_without_a_terminal_prints_lines_on_standard_error():
     words = ["flss", "--starts", "2000", "--velocities", "0.5", "--json"]
     program = f"""
 from time import sleep
-from hexmj import progress
+from hexmj.process import progress
 from hexmj.measures import kinematic
 progress.EVERY, first_loss = 0.01, kinematic.first_loss
 kinematic.first_loss = lambda *of, **how: (sleep(0.5), first_loss(*of, **how))[1]

@@ -15,10 +15,10 @@ import pytest
 import xarray as xr
 
 import hexmj
-from hexmj import reads
 from hexmj.errors import InputError
-from hexmj.loaded import importable
 from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.user_code import reads
+from hexmj.user_code.loaded import importable
 from small_cells import BODY
 
 READER = """

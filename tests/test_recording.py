@@ -9,14 +9,12 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from hexmj import netcdf
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.files import sealed
 from hexmj.legs import FIG1
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import PhysicalWalk, physical_walk, physical_walk_of_plan
@@ -25,6 +23,8 @@ from hexmj.replay.recording import load_recording, record, record_plan, recorded
 from hexmj.replay.take import Take
 from hexmj.rotations import rotated
 from hexmj.starts import draw_starts
+from hexmj.storage import netcdf
+from hexmj.storage.files import sealed
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start, part_of
 

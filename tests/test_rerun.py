@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj import netcdf
 from hexmj.cli.rerun import _Repeated
 from hexmj.cli.words import deciding, files
-from hexmj.files import digest, sealed, write_whole
 from hexmj.paper.protocol import QUICK
-from hexmj.results import save_dataset
-from hexmj.same_numbers import Compared, compared
+from hexmj.storage import netcdf
+from hexmj.storage.files import digest, sealed, write_whole
+from hexmj.storage.results import save_dataset
+from hexmj.storage.same_numbers import Compared, compared
 from hexmj.timing import Acceleration
 
 FLSS = ("flss", "--velocities", "0.5", "--starts", "40", "--window", "start")

@@ -12,8 +12,8 @@ import pytest
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.loaded import importable
 from hexmj.sweeps import Cell, conduct, over_axes, run
+from hexmj.user_code.loaded import importable
 from small_cells import (
     MINE,
     Wave,

@@ -26,13 +26,13 @@ from hexmj import (
     physical_walk,
     render,
 )
-from hexmj.attributes import settings
 from hexmj.bodies.grounds import beyond_the_ground, ground_level
 from hexmj.bodies.loading import compile_body
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.physics.settling import settle
 from hexmj.replay.film.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
+from hexmj.storage.attributes import settings
 from hexmj.studies.terrain.figure import terrain_figure
 from hexmj.studies.terrain.study import Terrain, reach
 from hexmj.sweeps import Cell, conduct

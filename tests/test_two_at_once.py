@@ -14,9 +14,9 @@ import xarray as xr
 
 import hexmj
 from hexmj.errors import InputError
-from hexmj.files import write_whole
-from hexmj.locks import locked
-from hexmj.results import save_dataset
+from hexmj.storage.files import write_whole
+from hexmj.storage.locks import locked
+from hexmj.storage.results import save_dataset
 
 
 def command(*words: str) -> subprocess.Popen[bytes]:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from chromium import tab
-from hexmj import progress
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Symmetric
 from hexmj.controllers.named import load_controller
@@ -22,6 +21,7 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
+from hexmj.process import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
 from hexmj.view.browser import BrowserView, footfall

@@ -18,7 +18,7 @@ from hexmj.bodies.reading import posed
 from hexmj.conditions import ROUNDING, Conditions, Masses
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.mjcf import content
+from hexmj.storage.mjcf import content
 
 HOME_TOLERANCE = 1e-3
 """How far feet and centre of mass may be from where they shall be at home, in lengths of the shortest leg."""

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.attributes import settings
 from hexmj.cli.options import STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
+from hexmj.storage.attributes import settings
 from hexmj.studies.ablation import study
 from hexmj.studies.league.study import FRESH
 

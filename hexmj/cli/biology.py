@@ -11,7 +11,7 @@ from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hidin
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import new_table
 from hexmj.conditions import Conditions
-from hexmj.results import save_text
+from hexmj.storage.results import save_text
 from hexmj.studies.biology import study as biology
 
 if TYPE_CHECKING:

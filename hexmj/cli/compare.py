@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from tyro.conf import arg
 
-from hexmj.attributes import settings
 from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, new_table, physical_report, report_line
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
-from hexmj.progress import progress_bar
+from hexmj.process.progress import progress_bar
 from hexmj.replay.film.film import Film
+from hexmj.storage.attributes import settings
 
 if TYPE_CHECKING:
     import xarray as xr

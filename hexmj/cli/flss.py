@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.attributes import attributes, settings
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Sweepers
 from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset
+from hexmj.process.progress import progress_bar
 from hexmj.starts import SAMPLE
+from hexmj.storage.attributes import attributes, settings
+from hexmj.storage.results import results_folder, save_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

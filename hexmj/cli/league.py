@@ -14,10 +14,10 @@ from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
-from hexmj.literal import literal
-from hexmj.progress import progress_bar
+from hexmj.process.progress import progress_bar
 from hexmj.replay.film.film import Film
-from hexmj.results import save_text
+from hexmj.storage.literal import literal
+from hexmj.storage.results import save_text
 from hexmj.studies.league import study
 from hexmj.studies.league.entrants import EVERYONE, FOUR, entrants
 

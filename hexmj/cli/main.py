@@ -21,8 +21,8 @@ from hexmj.cli.completion import completed
 from hexmj.cli.surroundings import settle
 from hexmj.cli.words import checked, shell, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
-from hexmj.literal import literal
-from hexmj.signals import of_stop
+from hexmj.process.signals import of_stop
+from hexmj.storage.literal import literal
 from hexmj.version import __version__
 
 NUMBA = (

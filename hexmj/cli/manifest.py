@@ -14,11 +14,11 @@ import numpy as np
 
 from hexmj.cli import words
 from hexmj.errors import InputError
-from hexmj.files import WRITTEN, digest, digest_of, read_text
-from hexmj.literal import literal
-from hexmj.loaded import importable, module_name
-from hexmj.results import json_text, save_text
+from hexmj.storage.files import WRITTEN, digest, digest_of, read_text
+from hexmj.storage.literal import literal
+from hexmj.storage.results import json_text, save_text
 from hexmj.sweeps.code import code
+from hexmj.user_code.loaded import importable, module_name
 from hexmj.version import __version__
 
 FORMAT = 2

@@ -25,7 +25,7 @@ from hexmj.conditions import OBEYED, Conditions, Ground
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.signals import STOPS, of_stop, stops_wait, unheard_by_children
+from hexmj.process.signals import STOPS, of_stop, stops_wait, unheard_by_children
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -186,7 +186,7 @@ class Sweepers:
     @property
     def threads_each(self) -> int | None:
         """Threads of each process; None where a single one takes all cores."""
-        from hexmj.threads import thread_count
+        from hexmj.process.threads import thread_count
 
         shared = max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
         return self.threads if self.threads is not None else shared

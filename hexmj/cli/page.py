@@ -9,7 +9,7 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.recorded import walk_summary
 from hexmj.cli.tables import print_json, show
 from hexmj.errors import InputError
-from hexmj.results import results_folder
+from hexmj.storage.results import results_folder
 
 NAME = "walk.html"
 

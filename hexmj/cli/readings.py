@@ -5,16 +5,16 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.attributes import attributes
 from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.study import lists_of
 from hexmj.cli.tables import new_table, print_json, save_figure, show
 from hexmj.errors import InputError
-from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_text
+from hexmj.process.progress import progress_bar
 from hexmj.starts import MOST_DRAWN, check_draw
+from hexmj.storage.attributes import attributes
+from hexmj.storage.results import results_folder, save_dataset, save_text
 
 
 @dataclass(frozen=True)

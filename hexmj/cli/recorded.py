@@ -6,8 +6,8 @@ import numpy as np
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.controllers.protocol import Controller
-from hexmj.progress import progress_bar
-from hexmj.threads import check_memory
+from hexmj.process.progress import progress_bar
+from hexmj.process.threads import check_memory
 from hexmj.timing import observation_time, steps_within
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
-from hexmj.literal import literal
-from hexmj.progress import progress_bar
+from hexmj.process.progress import progress_bar
 from hexmj.replay.film.film import MOST_PANELS, Film
-from hexmj.results import results_folder
+from hexmj.storage.literal import literal
+from hexmj.storage.results import results_folder
 
 if TYPE_CHECKING:
     import xarray as xr

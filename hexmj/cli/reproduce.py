@@ -9,8 +9,8 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.tables import new_table, print_json, show
 from hexmj.errors import InputError
-from hexmj.progress import progress_bar
-from hexmj.results import results_folder
+from hexmj.process.progress import progress_bar
+from hexmj.storage.results import results_folder
 
 
 @dataclass(frozen=True)

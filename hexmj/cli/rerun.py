@@ -16,7 +16,7 @@ from hexmj.cli.manifest import Manifest, changed_files, differences, manifests, 
 from hexmj.cli.tables import new_table, print_json, show
 from hexmj.cli.words import deciding, typed
 from hexmj.errors import InputError, SimulationError
-from hexmj.same_numbers import Compared, compared, holds_numbers
+from hexmj.storage.same_numbers import Compared, compared, holds_numbers
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -11,11 +11,11 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
-from hexmj.files import read_toml
-from hexmj.literal import literal
-from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset, save_text
+from hexmj.process.progress import progress_bar
 from hexmj.starts import SAMPLE
+from hexmj.storage.files import read_toml
+from hexmj.storage.literal import literal
+from hexmj.storage.results import results_folder, save_dataset, save_text
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.attributes import settings
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Figures, Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
-from hexmj.progress import progress_bar
-from hexmj.results import results_folder, save_dataset
+from hexmj.process.progress import progress_bar
+from hexmj.storage.attributes import settings
+from hexmj.storage.results import results_folder, save_dataset
 from hexmj.sweeps import Study, conduct
 
 if TYPE_CHECKING:

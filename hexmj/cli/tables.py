@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj import results
 from hexmj.cli.answers import ANSWERS
-from hexmj.literal import literal
-from hexmj.results import json_text
+from hexmj.storage import results
+from hexmj.storage.literal import literal
+from hexmj.storage.results import json_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ from hexmj.cli.options import Controlled, ControllerName, changed
 from hexmj.cli.tables import show
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.progress import progress_bar
+from hexmj.process.progress import progress_bar
 
 END = "Ctrl-C ends it."
 

@@ -13,7 +13,7 @@ from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, save_figure, short, show
 from hexmj.conditions import FootPath, TimeScale
-from hexmj.results import results_folder
+from hexmj.storage.results import results_folder
 
 SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part))
 """Conditions that the puppet of a plan shows too."""

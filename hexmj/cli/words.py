@@ -8,8 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hexmj.errors import LONGEST, InputError
-from hexmj.files import digest_of, read_toml
-from hexmj.literal import literal
+from hexmj.storage.files import digest_of, read_toml
+from hexmj.storage.literal import literal
 
 INDIFFERENT = {"--out": 1, "--threads": 1, "--processes": 1, "--scheduler": 1, "--range-of": 1, "--json": 0}
 """Options on which no number depends -> how many words follow them."""

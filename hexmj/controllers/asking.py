@@ -16,8 +16,8 @@ from hexmj.checks import typed, whole
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
 from hexmj.errors import InputError, is_of_numbas_cache
 from hexmj.legs import LEGS
+from hexmj.process.threads import check_memory, thread_count
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk, copied
 

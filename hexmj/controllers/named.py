@@ -17,9 +17,9 @@ from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
-from hexmj.files import read_toml
-from hexmj.literal import literal
-from hexmj.loaded import importable
+from hexmj.storage.files import read_toml
+from hexmj.storage.literal import literal
+from hexmj.user_code.loaded import importable
 
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points by which other packages bring controllers: a name and `module:object`."""

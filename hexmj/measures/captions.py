@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from hexmj.attributes import settings
 from hexmj.conditions import unusual
 from hexmj.errors import InputError
-from hexmj.literal import in_figure
+from hexmj.storage.attributes import settings
+from hexmj.storage.literal import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

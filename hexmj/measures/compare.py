@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
@@ -16,6 +15,7 @@ from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
 from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.starts import check_draw, draw_starts
+from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell, Execution, conduct, over_axes
 from hexmj.timing import Acceleration, Stride
 

@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.attributes import settings
 from hexmj.errors import InputError
-from hexmj.literal import in_figure
 from hexmj.measures.captions import caption, conditions
 from hexmj.measures.parts import check_starts
+from hexmj.storage.attributes import settings
+from hexmj.storage.literal import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, typed, whole
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.losses import first_losses
@@ -19,8 +18,9 @@ from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
 from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
 from hexmj.measures.velocities import observed
-from hexmj.progress import Progress
+from hexmj.process.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
+from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell, Execution, conduct
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
 from hexmj.walks import PlannedWalk

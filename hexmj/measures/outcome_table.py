@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.measures.physical import physical_outcomes
-from hexmj.mjcf import content
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
-from hexmj.progress import Progress
+from hexmj.process.progress import Progress
 from hexmj.starts import draw_starts
+from hexmj.storage.mjcf import content
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:

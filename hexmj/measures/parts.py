@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.attributes import settings
 from hexmj.errors import InputError
+from hexmj.storage.attributes import settings
 from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:

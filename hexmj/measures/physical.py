@@ -15,7 +15,7 @@ from hexmj.measures.kinematic import first_loss, walk
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
 from hexmj.physics.settling import Settled, settle
-from hexmj.progress import Progress, shown
+from hexmj.process.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, extent, joined, part_of

@@ -8,7 +8,7 @@ from typing import Any
 from hexmj.controllers.cruse1998 import READINGS, Cruse1998, Reading, Symmetric
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError
-from hexmj.files import read_toml
+from hexmj.storage.files import read_toml
 from hexmj.timing import WINDOWS
 
 TABLE = Path(__file__).with_name("ideal.toml")

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Unpack, get_args, get_type_hints
 
 import numpy as np
 
-from hexmj.attributes import attributes
 from hexmj.controllers.cruse1998 import Order, Reading
 from hexmj.legs import CENTRED, FIG1
 from hexmj.paper.claims import INFERRED_FROM
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.scores import score, score_as_is, score_of_ideals, with_stride
-from hexmj.progress import part_of, shown
+from hexmj.process.progress import part_of, shown
+from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell, Execution, run
 
 if TYPE_CHECKING:

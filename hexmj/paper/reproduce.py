@@ -5,14 +5,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from hexmj import results
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError, check_distinct
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
-from hexmj.results import json_text, results_folder, save_dataset, save_text
+from hexmj.storage import results
+from hexmj.storage.results import json_text, results_folder, save_dataset, save_text
 from hexmj.sweeps import Execution, finish, over_axes, run
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.physics.callbacks import batched
+from hexmj.process.threads import thread_count
 from hexmj.rotations import lowest
-from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
 """What a body goes on from."""

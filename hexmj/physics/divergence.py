@@ -19,10 +19,10 @@ from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
-from hexmj.files import read_sealed, sealed, write_whole
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.fine_steps import FineSteps
 from hexmj.rotations import lean
+from hexmj.storage.files import read_sealed, sealed, write_whole
 
 STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
 

@@ -15,7 +15,7 @@ from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.physics.chunks import Chunk, Insects, Push
 from hexmj.physics.orders import Orders, OrdersFromPlan
 from hexmj.physics.settling import Settled
-from hexmj.progress import Progress
+from hexmj.process.progress import Progress
 from hexmj.timing import steps_within
 
 __all__ = ["Chunk", "Push", "drive"]

@@ -5,16 +5,13 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hexmj import netcdf
 from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.checks import path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.files import read_sealed, sealed, write_whole
 from hexmj.legs import LEGS
-from hexmj.literal import literal
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.foot_path import TipTargets, standing_tips
@@ -22,6 +19,9 @@ from hexmj.physics.orders import hold
 from hexmj.replay.schema import MEASURED, PLANNED, TIMES, check_recording, check_settings, stride_settings
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
+from hexmj.storage import netcdf
+from hexmj.storage.files import read_sealed, sealed, write_whole
+from hexmj.storage.literal import literal
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start
 

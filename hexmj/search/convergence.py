@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from hexmj.literal import in_figure
+from hexmj.storage.literal import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,13 +15,13 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, OutOfReach
 from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
-from hexmj.progress import Progress, part_of
+from hexmj.process.progress import Progress, part_of
+from hexmj.process.threads import thread_count
 from hexmj.search.domain import Domain
 from hexmj.search.forms import Form
 from hexmj.search.network_forms import NetworkForm
 from hexmj.starts import check_draw, checked_velocities, draw_starts
 from hexmj.sweeps.plain import plain
-from hexmj.threads import thread_count
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 from hexmj.variants import variants, varied
 

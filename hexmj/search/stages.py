@@ -14,13 +14,13 @@ import numpy as np
 from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError, without_extra
-from hexmj.locks import locked
-from hexmj.progress import Progress, shown
+from hexmj.process.progress import Progress, shown
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
 from hexmj.search.problems import REFUSED, Problem, Sample
 from hexmj.starts import check_draw
+from hexmj.storage.locks import locked
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps.plain import plain
 

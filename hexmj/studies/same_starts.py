@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from hexmj.attributes import attributes
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import settings
 from hexmj.starts import check_draw
+from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell
 from hexmj.timing import Acceleration, Stride
 

@@ -7,7 +7,7 @@ A folder of a sweep holds
   `settings`, the `sources` of every module within reach (module -> digest) and the `versions` of Python and of the
   packages that compute.  The digest in the name is that of the record, so an edit, another version or another setting
   is another file; none is ever overwritten by other numbers, and one that is damaged or foreign is refused.  Its
-  attribute `read` holds what a user's code read meanwhile (`hexmj.reads`).
+  attribute `read` holds what a user's code read meanwhile (`hexmj.user_code.reads`).
 - `<name>-<digest>.<digest>.nc` where that has changed since: the same cell, made anew.
 - `<name>-<digest>.jsonl` for each `KeptValues`: the same record, then a line for each value.
 - `.part-*` of runs that were killed while they wrote; the next run removes them.

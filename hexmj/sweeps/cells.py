@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 from warnings import warn
 
-from hexmj.as_run import is_users
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-from hexmj.files import digest
-from hexmj.reads import CHANGED, HEARD, changed, computing, reads
+from hexmj.storage.files import digest
 from hexmj.sweeps.code import code, source_files
 from hexmj.sweeps.plain import classes, label, plain
+from hexmj.user_code.as_run import is_users
+from hexmj.user_code.reads import CHANGED, HEARD, changed, computing, reads
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""

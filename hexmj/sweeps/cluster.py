@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from hexmj.errors import InputError, without_extra
-from hexmj.literal import literal
+from hexmj.storage.literal import literal
 
 PATIENCE = 10.0
 """How long an answer of the scheduler is waited for [s]."""

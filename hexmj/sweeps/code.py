@@ -21,16 +21,16 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import NamedTuple
 
-from hexmj import as_run
 from hexmj.errors import InputError
-from hexmj.files import digest, digest_of
-from hexmj.parsing import parsed
+from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.plain import PACKAGE, module_label
+from hexmj.user_code import as_run
+from hexmj.user_code.parsing import parsed
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
-    *("hexmj.as_run", "hexmj.field_docs", "hexmj.files", "hexmj.netcdf", "hexmj.progress"),
-    *("hexmj.reads", "hexmj.sweeps"),
+    *("hexmj.field_docs", "hexmj.process.progress", "hexmj.storage.files", "hexmj.storage.netcdf", "hexmj.sweeps"),
+    *("hexmj.user_code.as_run", "hexmj.user_code.reads"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 

@@ -8,9 +8,9 @@ from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hexmj import netcdf
 from hexmj.errors import InputError
-from hexmj.files import digest, read_sealed, sealed, write_whole
+from hexmj.storage import netcdf
+from hexmj.storage.files import digest, read_sealed, sealed, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import marked, prepare, remove_leftovers
-from hexmj.progress import Progress, shown
-from hexmj.reads import CHANGED, comparable
+from hexmj.process.progress import Progress, shown
+from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.files import check_free, find, write
+from hexmj.user_code.reads import CHANGED, comparable
 
 if TYPE_CHECKING:
     import xarray as xr

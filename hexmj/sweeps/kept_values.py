@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.files import opened
+from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
 from hexmj.sweeps.files import READ
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from hexmj.files import digest, digest_of
+from hexmj.storage.files import digest, digest_of
 
 NAMES = {"PIL": "pillow"}
 """Module -> distribution, of those that this package imports, where the names differ: to look through all that is

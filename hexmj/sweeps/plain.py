@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.as_run import is_users
 from hexmj.checks import short
 from hexmj.errors import InputError
-from hexmj.files import digest
-from hexmj.mjcf import content
-from hexmj.reads import placed
+from hexmj.storage.files import digest
+from hexmj.storage.mjcf import content
+from hexmj.user_code.as_run import is_users
+from hexmj.user_code.reads import placed
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""

@@ -8,8 +8,8 @@ from contextlib import suppress
 from multiprocessing import parent_process
 from threading import Thread
 
-from hexmj.files import WRITING
-from hexmj.signals import STOPS
+from hexmj.process.signals import STOPS
+from hexmj.storage.files import WRITING
 
 GRACE = 0.5
 """Time from a stop to the end [s]."""

@@ -18,10 +18,10 @@ from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.diagrams import spans
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
-from hexmj.literal import literal
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
 from hexmj.replay.take import support_on_ground
+from hexmj.storage.literal import literal
 from hexmj.view.live import LiveWalk, Moment
 from hexmj.view.session import IMPULSE, LiveSession, ticks
 

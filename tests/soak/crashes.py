@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hexmj.files import PART, read_sealed
+from hexmj.storage.files import PART, read_sealed
 from tests.soak.faults import ERRORS, LEFT
 from tests.soak.jobs import JOBS, SIZES, noted
 

@@ -19,10 +19,10 @@ import hexmj
 from hexmj.cli.main import main
 from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import first_loss
-from hexmj.results import results_folder, save_dataset
 from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
+from hexmj.storage.results import results_folder, save_dataset
 from hexmj.sweeps import Cell, over_axes, run
 from tests.soak import counted
 from tests.soak.counted import Counted

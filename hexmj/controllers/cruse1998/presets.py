@@ -18,7 +18,7 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.errors import InputError
-from hexmj.files import read_toml
+from hexmj.storage.files import read_toml
 
 OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import RenderingError, without_extra
-from hexmj.signals import unheard_by_children
+from hexmj.process.signals import unheard_by_children
 
 if TYPE_CHECKING:
     import mediapy

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.literal import in_figure
 from hexmj.measures.captions import caption
+from hexmj.storage.literal import in_figure
 from hexmj.studies.ablation.study import MEASURES
 from hexmj.studies.league.study import REGIMES
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.attributes import attributes
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
 from hexmj.controllers.named import load_controller
@@ -16,6 +15,7 @@ from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw
+from hexmj.storage.attributes import attributes
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.frequencies import came, differences, frequencies, padded

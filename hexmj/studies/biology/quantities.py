@@ -11,11 +11,11 @@ from hexmj.controllers.protocol import Controller
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.legs import SIDE
 from hexmj.physics.settling import settle
+from hexmj.process.threads import check_memory
 from hexmj.rotations import heading, rotated, turned
 from hexmj.starts import draw_starts
 from hexmj.studies.biology.names import EACH, JOINTS, SEGMENTS, UNITS
 from hexmj.studies.biology.strides import Strides, last_strides, onsets
-from hexmj.threads import check_memory
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hexmj.literal import in_figure
 from hexmj.measures.captions import caption
+from hexmj.storage.literal import in_figure
 from hexmj.studies.league.table import MEASURES, by_rank, place
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.attributes import settings
 from hexmj.measures.captions import rules
 from hexmj.measures.parts import check_axes, check_whole, what_parts_may_lack
+from hexmj.storage.attributes import settings
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, SimulationError
 from hexmj.measures.outcome_table import UNITS
 from hexmj.measures.physical import PhysicalWalk, physical_walk
-from hexmj.mjcf import content
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
+from hexmj.storage.mjcf import content
 from hexmj.studies.stability_map.mechanisms import fall_direction, mechanisms, static_plan
 from hexmj.timing import Acceleration, Stride
 

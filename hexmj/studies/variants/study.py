@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.attributes import attributes
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import Cruse1998
@@ -16,8 +15,9 @@ from hexmj.intervals import wilson_intervals
 from hexmj.legs import GEOMETRIES
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.mjcf import content
 from hexmj.starts import check_draw, draw_starts
+from hexmj.storage.attributes import attributes
+from hexmj.storage.mjcf import content
 from hexmj.sweeps import Cell, over_axes
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
 
+from hexmj.process.threads import cores
 from hexmj.replay.film.gl import PACKAGES
-from hexmj.threads import cores
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where Linux tells how much processor time a container gets: microseconds of it, or max, in each period; elsewhere

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 from uuid import uuid4
 
 from hexmj.errors import InputError
-from hexmj.locks import among_writers
+from hexmj.storage.locks import among_writers
 
 MARK = b"\nhexmj, sha256 "
 """Between the content of a sealed file and its checksum."""

@@ -5,7 +5,7 @@ from html import unescape
 from os.path import isfile
 from pathlib import Path
 
-from hexmj.files import opened, read_bytes
+from hexmj.storage.files import opened, read_bytes
 
 NAMED = re.compile(r"""\b(file(?=name)?|meshdir|texturedir|assetdir)(?:name)?\s*=\s*(["'])(.*?)\2""")
 """Files and their folders in an MJCF, or in a URDF, where it is a filename."""

@@ -8,7 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from types import FrameType
 
-from hexmj import as_run, files
+from hexmj.storage import files
+from hexmj.user_code import as_run
 
 LISTS = "os.listdir", "os.scandir"
 """Events of folders that are listed."""
@@ -19,9 +20,10 @@ ANYBODY = "anybody"
 _METADATA = re.compile(r"\bimportlib[._/\\]+metadata\b")
 """In the names of files by which Python and libraries look for what is installed."""
 
-_OURS = f"{Path(__file__).parent}{os.sep}"
+_OURS = f"{Path(__file__).parents[1]}{os.sep}"
 _KEEPS = tuple(
-    f"{_OURS}{one.replace('/', os.sep)}.py" for one in ("reads", "sweeps/cells", "sweeps/files", "sweeps/kept_values")
+    f"{_OURS}{one.replace('/', os.sep)}.py"
+    for one in ("user_code/reads", "sweeps/cells", "sweeps/files", "sweeps/kept_values")
 )
 """What names cells and keeps them: it opens nothing for the user's code."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.checks import typed
-from hexmj.literal import literal
+from hexmj.storage.literal import literal
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.literal import literal
+from hexmj.storage.literal import literal
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,8 +1,8 @@
 """Python files of a user's own, such as `mine.py`, imported from where they lie.
 
-Such a file becomes the module `hexmj.loaded.<its path, quoted>@<digest of its source>`.  The name says where it lies,
-so pickle, which knows classes and functions by the names of their modules, finds them in any process that sees the
-same file; and an edited file is another module, never mistaken for the one that is already loaded.
+Such a file becomes the module `hexmj.user_code.loaded.<its path, quoted>@<digest of its source>`.  The name says where
+it lies, so pickle, which knows classes and functions by the names of their modules, finds them in any process that sees
+the same file; and an edited file is another module, never mistaken for the one that is already loaded.
 """
 
 import os
@@ -17,7 +17,7 @@ from types import ModuleType
 from urllib.parse import quote_from_bytes, unquote_to_bytes
 
 from hexmj.errors import InputError
-from hexmj.files import digest
+from hexmj.storage.files import digest
 
 __path__: list[str] = []
 """Makes this module a package: its modules are the loaded files."""

@@ -14,16 +14,17 @@ from types import CodeType
 from typing import Any
 
 from hexmj.errors import InputError
-from hexmj.files import digest
-from hexmj.parsing import compiled
+from hexmj.storage.files import digest
+from hexmj.user_code.parsing import compiled
 
 INSTALLED = {"site-packages", "dist-packages"}
 """Folders of installed packages, this Python's own or another's."""
 
-_FOLDERS = *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")), Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
+_FOLDERS = *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")), _PACKAGE
 _NOT_ITS_USERS = (
     *(f"{folder}{os.sep}" for folder in _FOLDERS),
-    str(Path(__file__).parents[1] / "assets" / "stick_insect.xml"),
+    str(_PACKAGE.parent / "assets" / "stick_insect.xml"),
     str(Path(sysconfig.get_path("stdlib")).with_name(f"python{sysconfig.get_config_var('py_version_nodot')}.zip")),
 )
 

@@ -9,11 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj import netcdf
-from hexmj.attributes import attributes
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.files import read_sealed, remove_leftovers, sealed, try_writing, write_whole
+from hexmj.storage import netcdf
+from hexmj.storage.attributes import attributes
+from hexmj.storage.files import read_sealed, remove_leftovers, sealed, try_writing, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,12 +14,12 @@ from pathlib import Path
 from traceback import walk_stack
 from typing import Any
 
-from hexmj import as_run
-from hexmj.callers import ANYBODY, LISTS, callers
 from hexmj.errors import InputError
-from hexmj.files import DIGEST, digest, digest_of
-from hexmj.mjcf import parts
-from hexmj.parsing import parsed
+from hexmj.storage.files import DIGEST, digest, digest_of
+from hexmj.storage.mjcf import parts
+from hexmj.user_code import as_run
+from hexmj.user_code.callers import ANYBODY, LISTS, callers
+from hexmj.user_code.parsing import parsed
 
 DATA = (
     *(".toml", ".xml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),

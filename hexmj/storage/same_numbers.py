@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hexmj import netcdf
 from hexmj.errors import InputError
-from hexmj.files import opened, read_text, read_toml, unsealed
+from hexmj.storage import netcdf
+from hexmj.storage.files import opened, read_text, read_toml, unsealed
 
 ATTRIBUTES = "(attributes)"
 """Stands for all attributes of a NetCDF file and of its variables."""

@@ -8,7 +8,7 @@ from time import monotonic
 from typing import Any
 
 from hexmj.checks import typed
-from hexmj.literal import literal
+from hexmj.storage.literal import literal
 
 Progress = Callable[[float], None]
 """Told the fraction of the work that has been done since the last call."""
