@@ -337,6 +337,18 @@ def test_a_step_needs_a_reset_and_a_copy_another_make(walking: Any):
         walking.reset(options={"mask": np.array([True, False])})
 
 
+def test_a_step_after_the_end_is_refused_until_a_reset():
+    """It would go on for ever: nobody ends twice."""
+    walking = made("hexmj/StickInsect-v0", duration=1.0)
+    walking.reset(seed=0)
+    over = steps_of(walking, np.zeros((100, 18)))
+    assert over[-1][3] and len(over) < 100
+    with pytest.raises(InputError, match="a step after the episode's end; expected a reset"):
+        walking.step(np.zeros(18))
+    walking.reset()
+    walking.step(np.zeros(18))
+
+
 def test_seeds_of_many_are_whole_numbers():
     many = StickInsects(2)
     plain = many.reset(seed=3)[0]["tips"]

@@ -67,9 +67,11 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """One step of the plan, with its substeps.
 
         Raises:
-            InputError: an action out of bounds.
+            InputError: an action out of bounds, or the episode is over.
             SimulationError: a simulation that diverged.
         """
+        if self._walkers.over:
+            raise InputError("a step after the episode's end; expected a reset")
         acted = self._walkers.act(checked_actions(action, self._shape)[np.newaxis])
         return self._observation(), float(acted.reward[0]), bool(acted.terminated[0]), bool(acted.truncated[0]), {}
 

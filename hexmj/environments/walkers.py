@@ -192,6 +192,11 @@ class Walkers:
                 "a step before the first reset, or after a step or a reset that failed; expected a reset of all"
             )
 
+    @property
+    def over(self) -> bool:
+        """Whether all episodes that have begun are over."""
+        return self.begun and len(self._ids) == 0
+
     def control(self, wanted: np.ndarray) -> np.ndarray:
         """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,
         (n, number) [rad] or [mm]; a leg that cannot reach its tip keeps its angles."""
