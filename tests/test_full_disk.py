@@ -85,6 +85,12 @@ def test_what_does_not_fit_is_a_sentence_and_leaves_what_was_there(tmp_path, nam
     assert path.stat().st_size > ROOM
 
 
+def test_a_film_that_does_not_fit_says_why(tmp_path):
+    """ffmpeg is ended by a signal then, and says nothing."""
+    with little_room(), pytest.raises(InputError, match=r"film.mp4 cannot be written: ffmpeg ended \(File size limit"):
+        noise(tmp_path / "film.mp4")
+
+
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):
     with little_room(), pytest.raises(InputError, match=r"numbers-1-.*\.nc cannot be written: File too large"):
         run(cells(10_000), tmp_path)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from signal import strsignal
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,7 +65,10 @@ def _close(writer: "mediapy.VideoWriter") -> None:
         except BrokenPipeError:  # ffmpeg has ended; once more, to be told why
             writer.close()
     except RuntimeError as error:
+        code = writer._proc.returncode if writer._proc else 0
         if writer._popen:
             writer._popen.__exit__(None, None, None)  # mediapy leaves its pipes open where ffmpeg fails
-        said = str(error).strip().splitlines()[-1]
-        raise OSError(said.rpartition(": ")[2]) from None
+        if said := str(error).removeprefix(f"Error writing '{writer.path}':").strip():
+            raise OSError(said.splitlines()[-1].rpartition(": ")[2]) from None
+        why = strsignal(-code) if code < 0 else f"with exit code {code}"
+        raise OSError(f"ffmpeg ended ({why})") from None
