@@ -1,7 +1,10 @@
 """Figures that show themselves in a notebook, made without pyplot."""
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+import matplotlib
 from matplotlib.figure import Figure
 
 
@@ -13,6 +16,15 @@ class Picture(Figure):
         drawn = io.BytesIO()
         self.savefig(drawn, format="png", dpi=100)
         return drawn.getvalue()
+
+
+@contextmanager
+def as_shipped() -> Iterator[None]:
+    """Meanwhile matplotlib draws as it is shipped, whatever a file `matplotlibrc` asks for: commands draw the same
+    everywhere."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        yield
 
 
 def picture(width: float, height: float) -> Picture:

@@ -15,7 +15,7 @@ from hexmj.controllers.asking import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
-from hexmj.studies.biology.animals import ANIMALS, SOURCES, SPEEDS, STEP, Animal, timing
+from hexmj.studies.biology.animals import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, timing
 from hexmj.studies.biology.ground_forces import GroundForces
 from hexmj.studies.biology.names import SEGMENTS, UNITS
 from hexmj.studies.biology.quantities import quantities
@@ -108,6 +108,29 @@ def test_a_hop_is_no_swing():
     standing = np.ones(100, dtype=bool)
     standing[10:12] = standing[40:60] = standing[90:] = False
     assert onsets(standing, 0.01).tolist() == [40, 90]
+
+
+def test_stances_begin_with_landing_and_those_that_the_ends_cut_are_put_together(walking):
+    strides = walking[0][0]
+    for leg in range(6):
+        stances = strides.stances(leg)
+        rows = np.concatenate(stances)
+        assert len(set(rows.tolist())) == len(rows)
+        assert strides.standing[:, leg].sum() == strides.standing[rows, leg].sum()
+        assert all(strides.standing[one[[0, -1]], leg].all() for one in stances)
+        assert abs(len(stances) - strides.count) <= 1
+
+
+def test_a_torque_that_rises_and_falls_evenly_is_past_half_its_peak_for_half_a_stance(walking):
+    strides = walking[0][0]
+    torques = np.zeros_like(strides.torques)
+    for leg in range(6):
+        for stance in strides.stances(leg):
+            torques[stance, 3 * leg + 1] = -np.minimum(part := np.linspace(0.0, 1.0, len(stance)), 1.0 - part)
+    told = quantities(replace(strides, torques=torques), settle(draw_starts(1, 0)).compiled)
+    for segment in SEGMENTS:
+        assert told[f"{PAST} from, {segment}"] == pytest.approx(25.0, abs=1.5)
+        assert told[f"{PAST} until, {segment}"] == pytest.approx(75.0, abs=1.5)
 
 
 def test_period_and_duty_factor_follow_from_step_and_swing():

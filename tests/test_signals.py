@@ -177,7 +177,7 @@ def test_while_a_search_evaluates(tmp_path, by):
 def test_a_stop_that_somebody_swallows_comes_once_more():
     script = (
         "import os, signal, time\n"
-        "from hexmj import signals\n"
+        "from hexmj.process import signals\n"
         "signals.SWALLOWED = 0.3\n"
         "signals.hear_stops()\n"
         "for told in ('swallowed', 'heard'):\n"

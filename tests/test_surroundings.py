@@ -40,6 +40,15 @@ def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):
     assert (tmp_path / "flss.png").exists()
 
 
+def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
+    """TeX is not there, and would not take a title with a per cent sign."""
+    (wish := tmp_path / "matplotlibrc").write_text("text.usetex: True\nfont.size: 30\nlines.linewidth: 8\n")
+    for out, around in (("plain", {}), ("asked", {"MATPLOTLIBRC": str(wish)})):
+        done = done_with((*FEW, "--out", str(tmp_path / out)), **around)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "plain" / "flss.png").read_bytes() == (tmp_path / "asked" / "flss.png").read_bytes()
+
+
 @pytest.mark.parametrize("threads", ["0", "-3", "many"])
 def test_threads_of_numba_that_are_none(threads: str):
     done = done_with(FEW, NUMBA_NUM_THREADS=threads)

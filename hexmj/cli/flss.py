@@ -85,7 +85,7 @@ class Flss(WalkingCommand):
 
         files = [
             save_dataset(table, out / "flss.nc"),
-            save_figure(flss_figure(table), out / self.drawn.named("flss.png")),
+            save_figure(flss_figure, table, out / self.drawn.named("flss.png")),
         ]
         return [*files, save_manifest(self, settings(table), files, out / MANIFEST)]
 

@@ -69,7 +69,7 @@ class Readings:
         files = [
             save_text(readings_markdown(scores, readings), out / "readings.md"),
             save_dataset(scores, out / "readings.nc"),
-            save_figure(readings_figure(scores), out / "readings.png"),
+            save_figure(readings_figure, scores, out / "readings.png"),
         ]
         settings = {"protocol": asdict(protocol), "only": self.only or (), "best": best}
         files.append(save_manifest(self, settings, files, out / MANIFEST))

@@ -36,12 +36,13 @@ class Reproduce:
         from hexmj.paper.protocol import FULL, QUICK
         from hexmj.paper.reproduce import reproduce
         from hexmj.paper.table import claims_json, heads, summary, summary_beside
+        from hexmj.pictures import as_shipped
 
         if self.only == ():
             raise InputError("--only without keys; expected at least one, or no --only for all")
         results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
-        with self.sweepers.executor() as executor, progress_bar("reproducing") as progress:
+        with self.sweepers.executor() as executor, progress_bar("reproducing") as progress, as_shipped():
             rows, files = reproduce(
                 self.out,
                 protocol,

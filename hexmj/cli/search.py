@@ -223,7 +223,7 @@ class Search(WalkingCommand):
         files = [
             save_dataset(history, self.out / "history.nc"),
             save_text(text, self.out / FOUND),
-            save_figure(convergence_figure(history), self.out / self._figure),
+            save_figure(convergence_figure, history, self.out / self._figure),
         ]
         return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
 

@@ -76,7 +76,7 @@ class StudyCommand(WalkingCommand):
             result = conduct(study, folder / "walks", **how)
         files = [
             save_dataset(result, folder / outputs.data),
-            *(save_figure(draw(result), folder / name) for name, draw in figures.items()),
+            *(save_figure(draw, result, folder / name) for name, draw in figures.items()),
             *self.write_others(result),
         ]
         files.append(save_manifest(self, settings(result), files, folder / outputs.manifest))

@@ -1,6 +1,6 @@
 """Tables, lines and JSON that the commands print, and the small files they write."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,10 +45,13 @@ def short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def save_figure(figure: "Figure", path: Path) -> Path:
-    """Write a figure; no date stands in it."""
+def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path: Path) -> Path:
+    """Draw some data and write the figure; no date stands in it."""
+    from hexmj.pictures import as_shipped
+
     undated: dict[str, Any] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-    return results.save_figure(figure, path, dpi=150, metadata=undated.get(path.suffix))
+    with as_shipped():
+        return results.save_figure(draw(data), path, dpi=150, metadata=undated.get(path.suffix))
 
 
 def new_table(*columns: str) -> "Table":

@@ -57,7 +57,7 @@ class Walk(WalkingCommand):
         told |= {"conditions": self.conditions.settings()}
         files = [
             save_recording(walked, out / "recording.nc"),
-            save_figure(walk_figure(walked), out / figure),
+            save_figure(walk_figure, walked, out / figure),
         ]
         files.append(save_manifest(self, told, files, out / MANIFEST))
         summary = walk_summary(walked)

@@ -21,6 +21,10 @@ SOURCES = {
     " brake, third legs drive, second do both, vertical peaks are equal, forces point to the coxae",
     "Dallmann et al. 2016": "Dallmann, Duerr, Schmitz, Proc. R. Soc. B 283, 20151708, abstract: Carausius is driven by"
     " depression torques about the coxa-trochanter joint, read as more than half of the work",
+    "Zill et al. 2018": "Zill, Dallmann, Bueschges, Chaudhry, Schmitz, J. Neurophysiol. 120, 1807, abstract: forces in"
+    " the course of joint torques of freely walking stick insects; the coxa-trochanter's stands in Szczecinski's code"
+    " (nss36/campaniformSensillaModeling, CTrTorqueWaveform.csv), scaled, of no named leg: 0.784 s from zero to zero,"
+    " read as a stance, past half its peak from 0.132 to 0.710 s, greatest at 0.432 s",
     "Full et al. 1990": "Full, Zuccarello, Tullis, J. exp. Biol. 150, 233, abstract: 4.6 to 8.5 ml oxygen / g / km of a"
     " beetle, a cricket and a cockroach, at 20.1 J/ml; metabolic, so an upper bound",
     "Full, Tu 1990": "J. exp. Biol. 148, 129, abstract: Blaberus at 80 to 660 mm/s",
@@ -38,6 +42,8 @@ PHASES = {22.0: (0.60, 0.69), 31.0: (0.54, 0.61), 38.0: (0.50, 0.53)}  # at mm/s
 COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # mm, "about"
 ABOUT, APART = 1.0, 28.5  # mm: how "about" is read, and front from hind coxae
 OXYGEN = 20.1  # J/ml
+STANCE = 0.784  # s
+PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # %
 
 SPEED = 24.0
 """Where nothing depends on it in the source [mm/s]; V = 0.3 at V_p = 80 mm/s."""
@@ -95,6 +101,7 @@ ANIMALS = (
     *_each("vertical peak of a leg", source="not read"),
     Animal("vertical peaks: greatest over least", 1.0, 1.0, "Full et al. 1991"),
     *(row for joint in JOINTS for row in _each(f"{joint} torque", source="not read")),
+    *(row for end, at in PAST_HALF.items() for row in _each(f"{PAST} {end}", at, at, "Zill et al. 2018")),
     Animal("work of standing legs at the coxa-trochanter", 50.0, 100.0, "Dallmann et al. 2016"),
     *(Animal(f"{joint} torque against its movement", source="not read") for joint in JOINTS),
     *(Animal("phase, ipsilateral", *seen, _SEEN, speed, depends=True) for speed, seen in PHASES.items()),

@@ -33,6 +33,8 @@ EACH = {
     "inward impulse": "% W",
     "vertical peak of a leg": "W",
     **{f"{joint} torque": "mN mm" for joint in JOINTS},
+    "coxa-trochanter torque past half its peak, from": "% of stance",
+    "coxa-trochanter torque past half its peak, until": "% of stance",
     "height of the coxae": "mm",
 }
 """Quantities of each pair of legs, and their units; impulses are of both legs together."""

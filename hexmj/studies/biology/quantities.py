@@ -124,11 +124,25 @@ def _torques(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     mean = np.abs(torque).mean(axis=0, where=stands)
     against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()
     work = (np.maximum(power, 0.0) * stands).sum(axis=(0, 1))
+    course = [_course(torque[:, leg, 1], strides, leg) for leg in range(6)]
+    past = [np.flatnonzero(one > 0.5 * one.max()) for one in course]
     return {
         **{f"{joint} torque": TO_MN_MM * legs for joint, legs in zip(JOINTS, mean.T, strict=True)},
         **{f"{joint} torque against its movement": 100.0 * one for joint, one in zip(JOINTS, against, strict=True)},
         "work of standing legs at the coxa-trochanter": 100.0 * work[1] / work.sum(),
+        "coxa-trochanter torque past half its peak, from": [one[0] if len(one) else np.nan for one in past],
+        "coxa-trochanter torque past half its peak, until": [one[-1] if len(one) else np.nan for one in past],
     }
+
+
+def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
+    """Of a leg's torque, (row,), at each percent of its stance, (101,), as a force plate would show it: positive where
+    it carries the body, in the mean over whole stances; NaN without one."""
+    seen = np.convolve(torque, np.ones(n := round(PLATE / strides.step)) / n, "same")
+    percent, stances = np.linspace(0.0, 1.0, 101), [seen[rows] for rows in strides.stances(leg)]
+    courses = [np.interp(percent, np.linspace(0.0, 1.0, len(one)), one) for one in stances]
+    mean = np.mean(courses, axis=0) if courses else np.full(101, np.nan)
+    return mean * np.sign(mean.mean())
 
 
 def _posture(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:

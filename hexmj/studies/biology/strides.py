@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -40,6 +41,14 @@ class Strides:
     """Rows from one of `ground` to the next: a step of the plan."""
     ground: np.ndarray
     """(sample, leg, 3) of the ground on the feet, in the world [g mm/s^2]."""
+
+    def stances(self, leg: int) -> list[np.ndarray]:
+        """Rows of each stance of a leg, from its landing until it leaves the ground for longer than it hops; one that
+        the ends of the strides cut is put together of its parts, since a walk repeats itself."""
+        standing, rows = self.standing[:, leg], len(self.standing)
+        lifted = onsets(standing, self.step) if self.count > 1 or leg else np.array([0])
+        strides = [np.arange(a, b) % rows for a, b in pairwise([*lifted, *(lifted[:1] + rows)])]
+        return [stride[standing[stride].argmax() :] for stride in strides]
 
 
 def last_strides(
