@@ -178,6 +178,14 @@ def test_a_folder_means_all_its_manifests(run, flss):
     assert [Path(one["manifest"]).name for one in json.loads(text)["results"]] == ["manifest.json", "vp-manifest.json"]
 
 
+def test_a_film_beside_a_result_is_not_repeated(run, flss):
+    shutil.copy(flss / "manifest.json", film := flss / "film.mp4-manifest.json")
+    edit(film, files={"film.mp4": ""})
+    code, text, _ = run("rerun", flss)
+    assert code == 0
+    assert "film.mp4-manifest.json names no file with numbers, and was not repeated" in " ".join(text.split())
+
+
 OLD = {"settings": {"seed": 0}, "versions": {"numpy": "2.4.6"}, "machine": "x86_64"}
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 UNSEEN = "not compared"
 ABSENT = "not made this time"
+NUMBERLESS = "names no file with numbers"
 NOTHING = "nothing that the manifest knows of differs (files that your code reads it does not know)"
 
 
@@ -31,8 +32,8 @@ class Rerun:
     """Options of `hexmj rerun`, which `main.COMMANDS` describes."""
 
     result: Positional[Path]
-    """A folder that a command wrote results to, or one manifest in it; of several in a folder, every one is repeated.
-    Files that the command named, such as mine.py, are looked for in the current folder."""
+    """A folder that a command wrote results to, or one manifest in it; of several in a folder, every one with numbers
+    is repeated. Files that the command named, such as mine.py, are looked for in the current folder."""
     threads: int | None = None
     """As of the command that is repeated.  No result depends on it."""
     processes: int | None = None
@@ -46,6 +47,11 @@ class Rerun:
     def run(self) -> None:
         """Repeat, compare and print; ends the program, with exit code 1 if anything differs."""
         found = manifests(self.result)
+        pictures = [path for path, manifest in found.items() if not any(map(holds_numbers, manifest.files))]
+        if len(pictures) == len(found):
+            raise InputError(f"{pictures[0]} {NUMBERLESS}; expected a result with NetCDF, JSON or TOML")
+        for path in pictures:
+            del found[path]
         for path, manifest in found.items():
             _check(path, manifest)
         workers = {"--threads": self.threads, "--processes": self.processes, "--scheduler": self.scheduler}
@@ -53,10 +59,11 @@ class Rerun:
         repeated = [_repeat(path, manifest, more) for path, manifest in found.items()]
         equal = all(one.equal for one in repeated)
         if self.json:
-            print_json({"equal": equal, "results": [one.summary() for one in repeated]})
+            print_json({"equal": equal, "results": [one.summary() for one in repeated], "not_repeated": pictures})
         else:
             for one in repeated:
                 show(*one.shown())
+            show(*(f"{path} {NUMBERLESS}, and was not repeated" for path in pictures))
         sys.exit(0 if equal else 1)
 
 
@@ -124,8 +131,6 @@ class _Repeated:
 def _check(path: Path, manifest: Manifest) -> None:
     """Refuse what cannot be repeated or compared, before anything is."""
     numbers = [name for name in manifest.files if holds_numbers(name)]
-    if not numbers:
-        raise InputError(f"{path} names no file with numbers; expected a result with NetCDF, JSON or TOML")
     if missing := [name for name in numbers if not (path.parent / name).is_file()]:
         raise InputError(f"{path} names {missing[0]}, which is not beside it; expected the whole result")
     if missing := [name for name in manifest.own if not Path(name).is_file()]:
