@@ -183,7 +183,7 @@ def test_a_film_beside_a_result_is_not_repeated(run, flss):
     edit(film, files={"film.mp4": ""})
     code, text, _ = run("rerun", flss)
     assert code == 0
-    assert "film.mp4-manifest.json names no file with numbers, and was not repeated" in " ".join(text.split())
+    assert "film.mp4-manifest.jsonnamesnofilewithnumbers,andwasnotrepeated" in "".join(text.split())
 
 
 OLD = {"settings": {"seed": 0}, "versions": {"numpy": "2.4.6"}, "machine": "x86_64"}
