@@ -54,6 +54,29 @@ assert not {"OpenGL", "mujoco.egl", "dm_control"} & {*sys.modules}, "there may b
 """
 
 
+FORKED = """
+import multiprocessing
+from hexmj.replay.film import gl
+
+def told(_):
+    return gl.missing() or "drawn"
+
+fork = multiprocessing.get_context("fork")
+with fork.Pool(1) as pool:
+    assert pool.map_async(told, [0]).get(30) == ["drawn"], "nobody had drawn before"
+assert told(0) == "drawn"
+with fork.Pool(1) as pool:
+    assert "expected one that is spawned" in pool.map_async(told, [0]).get(30)[0]
+assert told(0) == "drawn"
+"""
+
+
+@drawing
+def test_a_child_that_was_forked_after_something_was_drawn_draws_nothing():
+    """Mesa would wait for ever."""
+    subprocess.run([sys.executable, "-c", FORKED], env=KEPT, check=True, timeout=120)
+
+
 @pytest.mark.parametrize("draws", [FRAME, ENVIRONMENT], ids=["frame", "dm_env"])
 @drawing
 def test_triton_is_there_before_a_context(draws, tmp_path):

@@ -35,6 +35,7 @@ class Frames:
 
         Raises:
             InputError: another thread has drawn before, to which the GL belongs until it is freed.
+            RenderingError: the process was forked from one that had drawn.
         """
         renderer = self._begun()
         self._data.qpos[:] = qpos
@@ -52,6 +53,7 @@ class Frames:
         self._renderer = None
 
     def _begun(self) -> "Renderer":
+        gl.check_not_forked()
         if self._renderer is None:
             self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
             atexit.register(self._renderer.close)  # before the GL goes, though nobody closes the environment

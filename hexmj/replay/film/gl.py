@@ -16,6 +16,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from hexmj.errors import RenderingError
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -28,6 +30,14 @@ SURE, NONE = ("glfw", "glx", "enable", "enabled", "on", "true", "1"), ("disable"
 
 _VAIN: list[str] = []
 """What was asked for in vain."""
+
+_DRAWERS: set[int] = set()
+"""The process that has drawn, if it has; a child that was forked since inherits it."""
+
+FORKED = (
+    "this process was forked from one that had drawn, and its GL would wait for ever; expected one that is spawned, as by"
+    " multiprocessing.get_context('spawn')"
+)
 
 WISHES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
 """Variables of the environment by which a GL has been chosen, or a screen is there."""
@@ -42,11 +52,26 @@ def import_what_clashes() -> None:
             import_module("triton")
 
 
+def check_not_forked() -> None:
+    """Refuse to draw in a child of a process that had drawn.
+
+    Raises:
+        RenderingError: it is one.
+    """
+    if _DRAWERS and os.getpid() not in _DRAWERS:
+        raise RenderingError(FORKED)
+
+
 def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Renderer":
-    """A renderer for frames of this many pixels, with a context of `context_type`."""
+    """A renderer for frames of this many pixels, with a context of `context_type`.
+
+    Raises:
+        RenderingError: see `check_not_forked`.
+    """
     import mujoco
     from mujoco.rendering.classic import gl_context
 
+    check_not_forked()
     usual, gl_context.GLContext = gl_context.GLContext, context_type()
     try:
         return mujoco.Renderer(model, height, width)
@@ -61,6 +86,7 @@ def context_type() -> Any:
         OSError, AttributeError and others, of each library: nothing can be rendered.
     """
     import_what_clashes()
+    _DRAWERS.add(os.getpid())
     if sys.platform != "linux" or any(os.environ.get(name) for name in WISHES):
         import mujoco
 
@@ -96,11 +122,14 @@ def missing() -> str | None:
     if os.environ.get("MUJOCO_GL", "").lower().strip() in NONE:
         return _sentence("MUJOCO_GL asks for nothing")
     try:
+        check_not_forked()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context
             context = context_type()(16, 16)
             made = bool(context._context)
             context.free()
+    except RenderingError as error:
+        return str(error)
     except Exception as error:  # each library and driver raises another type of its own
         return _sentence(textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip("."))
     wanted = os.environ.get("MUJOCO_GL")
