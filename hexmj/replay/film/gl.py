@@ -35,8 +35,8 @@ _DRAWERS: set[int] = set()
 """The process that has drawn, if it has; a child that was forked since inherits it."""
 
 FORKED = (
-    "this process was forked from one that had drawn, and its GL would wait for ever; expected one that is spawned, as by"
-    " multiprocessing.get_context('spawn')"
+    "this process was forked from one that had drawn, and its GL would wait for ever; expected one that is spawned, as"
+    " by multiprocessing.get_context('spawn')"
 )
 
 WISHES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
