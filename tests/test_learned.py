@@ -164,6 +164,17 @@ def test_an_action_is_held_and_rewarded_until_the_first_end():
 
 
 @pytest.mark.slow
+def test_what_all_insects_share_is_not_set_for_some():
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    insects = importlib.import_module("hexmj.environments.stable_baselines").FeltInsects(3)
+    assert len(insects.env_method("reset")) == len(insects.get_attr("task")) == 3
+    with pytest.raises(InputError, match=r"indices = \[0\]; expected all 3"):
+        insects.env_method("reset", indices=[0])
+    with pytest.raises(InputError, match="indices = 1; expected all 3"):
+        insects.set_attr("render_mode", None, indices=1)
+
+
+@pytest.mark.slow
 def test_a_fall_is_rewarded_by_what_was_felt_as_it_fell_and_every_insect_is_drawn():
     pytest.importorskip("stable_baselines3", exc_type=ImportError)
     face, fallen = importlib.import_module("hexmj.environments.stable_baselines"), []

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.errors import without_extra
+from hexmj.errors import InputError, without_extra
 
 try:
     from gymnasium import spaces
@@ -72,16 +72,32 @@ class FeltInsects(VecEnv):
         return [getattr(self._insects, attr_name)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute, of all insects."""
+        """Set an attribute, of all insects.
+
+        Raises:
+            InputError: of some of them.
+        """
+        self._all(indices)
         setattr(self._insects, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method, for all insects at once."""
-        return [getattr(self._insects, method_name)(*args, **kwargs)] * len(self._chosen(indices))
+        """Call a method, for all insects at once.
+
+        Raises:
+            InputError: for some of them.
+        """
+        return [getattr(self._insects, method_name)(*args, **kwargs)] * self._all(indices)
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No insect is wrapped by itself."""
         return [False] * len(self._chosen(indices))
+
+    def _all(self, indices: int | Sequence[int] | None) -> int:
+        if {*self._chosen(indices)} != {*range(self.num_envs)}:
+            raise InputError(
+                f"indices = {indices!r:.80}; expected all {self.num_envs} insects, which are one environment"
+            )
+        return self.num_envs
 
     def _chosen(self, indices: int | Sequence[int] | None) -> list[int]:
         return list(self._get_indices(indices))
