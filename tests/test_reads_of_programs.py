@@ -47,6 +47,34 @@ def test_what_a_script_reads_at_its_top_level_and_a_package_beside_it_counts(
     assert not [file for file in (tmp_path / "kept").iterdir() if b"kept/" in file.read_bytes()]
 
 
+ASKED_EARLY = """
+from functools import cache
+import xarray as xr
+@cache
+def gain():
+    return float(open("gain").read())
+def cell():
+    return xr.Dataset({"gain": gain()})
+"""
+ASKS = """
+from pathlib import Path
+from remembers import cell, gain
+from hexmj.sweeps import Cell, run
+gain()
+Path("told").write_text(str(run([Cell("remembered", cell, {})], Path("kept"))[0].gain.item()))
+"""
+
+
+def test_what_a_profiled_script_reads_before_a_sweep_counts(tmp_path: Path) -> None:
+    """Its code has a relative name."""
+    (tmp_path / "remembers.py").write_text(ASKED_EARLY)
+    (tmp_path / "script.py").write_text(ASKS)
+    for gain, how in ((1.0, ["-m", "cProfile", "-o", os.devnull]), (2.0, [])):
+        (tmp_path / "gain").write_text(str(gain))
+        subprocess.run([sys.executable, *how, "script.py"], cwd=tmp_path, env=ENVIRONMENT, check=True)
+        assert float((tmp_path / "told").read_text()) == gain
+
+
 FAR_FETCHED = """
 import importlib, pkgutil
 from concurrent.futures import ThreadPoolExecutor

@@ -86,4 +86,5 @@ def _whose(file: str) -> str:
         return "ours"
     if file.startswith("<frozen importlib") or _METADATA.search(file):
         return "import's"
-    return "user's" if os.path.isabs(file) and as_run.is_users(file) else "a library's"
+    shown = file.startswith("<")  # as <string>
+    return "user's" if not shown and as_run.is_users(os.path.abspath(file)) else "a library's"  # a profiled script's
