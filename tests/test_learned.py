@@ -3,6 +3,7 @@
 import importlib
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -15,7 +16,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.gym import StickInsect
-from hexmj.environments.learned import FELT, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt_in
+from hexmj.environments.learned import FELT, MOST, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt, felt_in
 from hexmj.errors import InputError
 from hexmj.user_code.loaded import importable
 from hexmj.view.live import LiveWalk
@@ -111,6 +112,16 @@ def test_a_policy_feels_the_same_in_a_walk_as_in_the_environment(example, monkey
         action = controller.policy(felt_in({name: values[None] for name, values in observed.items()}))[0]
         observed = walking.step(action)[0]
     assert np.abs(walking.data.qpos - walked.qpos[98, 0]).max() < 0.5
+
+
+def test_a_larger_body_feels_as_a_small_one_does():
+    """Lengths and velocities grow with it, angles and contacts do not."""
+    draw, insect = np.random.default_rng(0), hexmj.STICK_INSECT
+    tilt, velocity, turning, contact, stance, tips = (draw.normal(size=(5, n)) for n in (2, 3, 3, 6, 6, 18))
+    large = replace(insect, standing_height=4 * insect.standing_height)
+    seen = felt(large, tilt, 80 * velocity, turning, contact, stance, 40 * tips)
+    np.testing.assert_array_equal(seen, felt(insect, tilt, 20 * velocity, turning, contact, stance, 10 * tips))
+    assert np.abs(felt(insect, tilt, 1e4 * velocity, turning, contact, stance, 1e4 * tips)).max() == MOST
 
 
 def test_on_paper_it_walks_upright_at_its_velocity(example):

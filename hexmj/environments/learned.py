@@ -11,6 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
+from hexmj.bodies.description import Body
+from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
@@ -27,9 +29,8 @@ CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
 FELT = 38
 """Numbers that are felt."""
 
-USUAL = 0.1, 50.0, 2.0, 1.0, 1.0, 10.0
-"""Usual sizes of tilt [rad], velocity [mm/s], turning [rad/s], contact, stance and tips [mm]; what is felt is of the
-size of 1."""
+MOST = 10.0
+"""Greatest number that is felt, in usual sizes; beyond it nothing is told apart."""
 
 
 class Policy(Protocol):
@@ -40,20 +41,23 @@ class Policy(Protocol):
         ...
 
 
-def felt(*parts: np.ndarray) -> np.ndarray:
+def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
     """What policies see, (n, `FELT`): tilt ahead and to the left, velocity, turning, contact, planned stance and tips.
 
-    Each is (n, ...), and divided by its usual size.
+    Each is (n, ...), and divided by its usual size: 0.1 rad, five standing heights of the body a second, 2 rad/s, and a
+    standing height, so that it is of the size of 1; it ends at `MOST`.
     """
-    count = len(parts[0])
-    return np.concatenate([one.reshape(count, -1) / size for one, size in zip(parts, USUAL, strict=True)], axis=1)
+    count, high = len(parts[0]), body.standing_height
+    usual = 0.1, 5.0 * high, 2.0, 1.0, 1.0, high
+    columns = [one.reshape(count, -1) / size for one, size in zip(parts, usual, strict=True)]
+    return np.concatenate(columns, axis=1).clip(-MOST, MOST)
 
 
-def felt_in(observations: dict[str, np.ndarray]) -> np.ndarray:
-    """The same from the observations of a vector environment."""
+def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
+    """The same from the observations of a vector environment of this body."""
     tilt = np.arcsin(np.clip(lean(observations["orientation"])[0], -1.0, 1.0))
     names = "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
-    return felt(tilt, *(observations[name] for name in names))
+    return felt(body, tilt, *(observations[name] for name in names))
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,9 @@ class OffsetPlan:
             self._plan.sense(sensed)
         self._told[sensed.ids] = True
         planned = self._stance[sensed.ids], self._tips[sensed.ids]
-        self._felt[sensed.ids] = felt(sensed.tilt, sensed.velocity, sensed.turning, sensed.contact, *planned)
+        self._felt[sensed.ids] = felt(
+            self.made_for.body, sensed.tilt, sensed.velocity, sensed.turning, sensed.contact, *planned
+        )
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next steps, each with the offsets that the policy gives for what is felt then."""
@@ -128,4 +134,4 @@ class OffsetPlan:
         """What is felt on paper."""
         still = np.zeros((len(self.starts), 3))
         ahead = np.stack([velocity * self.made_for.time.vp, still[:, 0], still[:, 0]], axis=1)
-        return felt(still[:, :2], ahead, still, self._stance, self._stance, self._tips)
+        return felt(self.made_for.body, still[:, :2], ahead, still, self._stance, self._stance, self._tips)

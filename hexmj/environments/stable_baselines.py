@@ -17,11 +17,8 @@ try:
 except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
-from hexmj.environments.learned import FELT, felt_in
+from hexmj.environments.learned import FELT, MOST, felt_in
 from hexmj.environments.vector import StickInsects
-
-MOST = 10.0
-"""Greatest number that is felt, in usual sizes."""
 
 Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Offsets of the tips, (n, leg * axis), of actions, (n, number), and what is felt, (n, `FELT`)."""
@@ -44,7 +41,7 @@ class FeltInsects(VecEnv):
         """Begin all episodes, by the seeds of `seed` if there are some."""
         observed = self._insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
-        return _seen(observed)
+        return self._seen(observed)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions that `step_wait` will carry out."""
@@ -56,8 +53,8 @@ class FeltInsects(VecEnv):
         done, infos = fell | over, [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(done).tolist():
             final = {name: values[np.newaxis] for name, values in last["final_obs"][i].items()}
-            infos[i] = {"terminal_observation": _seen(final)[0], "TimeLimit.truncated": bool(over[i])}
-        return _seen(observed), reward.astype(np.float32), done, infos
+            infos[i] = {"terminal_observation": self._seen(final)[0], "TimeLimit.truncated": bool(over[i])}
+        return self._seen(observed), reward.astype(np.float32), done, infos
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         """A frame of every insect, (height, width, 3), if they were asked for by `render_mode`."""
@@ -91,6 +88,9 @@ class FeltInsects(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No insect is wrapped by itself."""
         return [False] * len(self._chosen(indices))
+
+    def _seen(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+        return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
     def _all(self, indices: int | Sequence[int] | None) -> int:
         if {*self._chosen(indices)} != {*range(self.num_envs)}:
@@ -142,7 +142,3 @@ class HeldInsects(VecEnvWrapper):
                 infos[i] = told[i] | {"terminal_observation": self._constant[i]}
             done |= ends
         return self._constant, (reward / self._steps).astype(np.float32), done, infos
-
-
-def _seen(observations: dict[str, np.ndarray]) -> np.ndarray:
-    return np.clip(felt_in(observations), -MOST, MOST).astype(np.float32)
