@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -19,14 +20,22 @@ def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):
     assert "(EOFError: Ran out of input)" in error
 
 
-def test_memory_that_runs_out_is_a_sentence(run, monkeypatch):
+@pytest.mark.parametrize(
+    ("failed", "why"),
+    [
+        (MemoryError("Unable to allocate 9 TiB"), "Unable to allocate 9 TiB"),
+        (MemoryError(), "nothing is left"),
+        (mujoco.FatalError("Could not allocate memory"), "Could not allocate memory"),
+    ],
+)
+def test_memory_that_runs_out_is_a_sentence(run, monkeypatch, failed, why):
     def run_out(*_, **__):
-        raise MemoryError("Unable to allocate 9 TiB")
+        raise failed
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", run_out)
     code, text, error = run("flss", "--starts", 5, "--window", 10)
     assert (code, text) == (2, "")
-    assert "hexmj: the memory does not suffice (Unable to allocate 9 TiB); expected fewer starts" in error
+    assert f"hexmj: the memory does not suffice ({why}); expected more of it, or fewer starts" in error
 
 
 def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):

@@ -35,6 +35,8 @@ ABOUT = (
     "hexmj --version tells the version; hexmj --completion bash (zsh, fish) prints what completes words in a shell."
 )
 
+MEMORY = "the memory does not suffice ({}); expected more of it, or fewer starts"
+
 SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
 """What the system has too little of, where no file is named."""
 
@@ -139,7 +141,7 @@ def main() -> None:
     except RenderingError as error:
         sys.exit(_complain(error, 1))
     except MemoryError as error:
-        sys.exit(_complain(f"the memory does not suffice ({error or 'nothing is left'}); expected fewer starts", 2))
+        sys.exit(_complain(MEMORY.format(str(error) or "nothing is left"), 2))
     except BrokenPipeError:  # whoever read the output has gone, as `head` does
         _drop_output()
         sys.exit(141)
@@ -152,6 +154,8 @@ def main() -> None:
     except Exception as error:
         if "can't start new thread" in str(error):
             sys.exit(_complain("the memory, or a limit of processes, does not suffice for a thread", 2))
+        if "Could not allocate memory" in str(error):  # MuJoCo's
+            sys.exit(_complain(MEMORY.format(error), 2))
         if not is_of_numbas_cache(error):
             raise
         sys.exit(_complain(f"{NUMBA} ({type(error).__name__}: {error})", 2))
