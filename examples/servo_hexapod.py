@@ -15,7 +15,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.bodies.description import Servo
-from hexmj.controllers import Controller, Plan
+from hexmj.controllers import Controller, Plan, ReadingPlan
 from hexmj.legs import LEGS, SIDE
 
 HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # ahead of the middle, beside it [mm]
@@ -127,9 +127,11 @@ class Larger:
     name: str = "ldvs, larger"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `hexmj.controllers.Controller`."""
+        """See `hexmj.controllers.Controller`; nothing is handed on of what a plan would read."""
         small = {name: getattr(stride, name) / self.times for name in ("aep0", "pep0", "pep_min", "dt")}
         plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), acceleration, threads)
+        if isinstance(plan, ReadingPlan):
+            raise hexmj.InputError(f"{self.of.name} reads the legs; expected a controller that goes on by itself")
         return LargerPlan(plan, starts, stride, self.times)
 
 
