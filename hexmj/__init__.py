@@ -12,7 +12,10 @@ import hexmj.user_code.as_run  # from now on
 import hexmj.user_code.reads  # noqa: F401
 
 if TYPE_CHECKING:
+    from hexmj import controllers as controllers
     from hexmj import environments as environments
+    from hexmj import gaits as gaits
+    from hexmj import sweeps as sweeps
     from hexmj.bodies.description import Body as Body
     from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
     from hexmj.conditions import Conditions as Conditions
@@ -92,13 +95,14 @@ _MODULES = {
     "version": ("__version__",),
     "walks": ("Walk",),
 }
+_PARTS = ("controllers", "environments", "gaits", "sweeps")
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "environments":
-        return import_module("hexmj.environments")
+    if name in _PARTS:
+        return import_module(f"hexmj.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__dir__())}")
     value = getattr(import_module(f"hexmj.{_HOME[name]}"), name)
@@ -109,4 +113,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "environments"]
+    return [*__all__, *_PARTS]

@@ -4,6 +4,7 @@ said to be."""
 import pydoc
 import re
 import subprocess
+import sys
 import tomllib
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -81,3 +82,10 @@ def test_help_tells_what_fields_are():
     for one in public:
         for field in fields(one):
             assert re.search(rf"^    {field.name}: (?!<class)", one.__doc__ or "", re.MULTILINE), (one, field.name)
+
+
+def test_parts_that_the_pages_name_are_there_by_one_import():
+    code = (
+        "import hexmj; hexmj.gaits.limit_gait, hexmj.sweeps.conduct, hexmj.controllers.Controller, hexmj.environments"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

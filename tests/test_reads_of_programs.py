@@ -65,6 +65,17 @@ Path("told").write_text(str(run([Cell("remembered", cell, {})], Path("kept"))[0]
 """
 
 
+@pytest.mark.parametrize("folder", ["./lib", ".//lib", "lib/../lib"])
+def test_what_a_module_reads_counts_however_its_folder_is_written(tmp_path: Path, folder: str) -> None:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "remembers.py").write_text(ASKED_EARLY)
+    (tmp_path / "script.py").write_text(f"import hexmj, sys\nsys.path.append({folder!r})\n{ASKS}")
+    for gain in (1.0, 2.0):
+        (tmp_path / "gain").write_text(str(gain))
+        subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, check=True)
+        assert float((tmp_path / "told").read_text()) == gain
+
+
 def test_what_a_profiled_script_reads_before_a_sweep_counts(tmp_path: Path) -> None:
     """Its code has a relative name."""
     (tmp_path / "remembers.py").write_text(ASKED_EARLY)

@@ -66,10 +66,16 @@ def is_users(file: str) -> bool:
     return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
 
 
+def plain(file: str) -> str:
+    """A file's name as `Path` writes it, without ``./`` and ``//``, which a path of modules may have."""
+    return str(Path(file))
+
+
 def _note(file: Any, runs: CodeType | None = None) -> None:
     """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
     if not isinstance(file, str) or file.endswith(COMPILED) or not is_users(file):
         return
+    file = plain(file)
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
         if (source := Path(file).read_bytes()) not in (versions := RUN.setdefault(file, [])):
             versions.append(source)

@@ -72,7 +72,7 @@ def _users(frame: FrameType | None, event: str = "") -> tuple[frozenset[str], bo
         if runs and imported and whose == "a library's" and not users:  # it may be of a controller's package
             return frozenset({file}), False, True
         if whose == "user's" or file in as_run.FOLLOWED:
-            users.add(file)
+            users.add(as_run.plain(file))
             if runs and whose == "user's":
                 return frozenset(users), False, True
         calls, frame = whose == "user's", frame.f_back

@@ -213,7 +213,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if path.startswith("<") or whole.startswith(_SYSTEMS) or _CACHES.search(whole) or not as_run.is_users(whole):
             return
         if runs:
-            _note_named(whole, as_run.RUN[whole][-1], 0)
+            _note_named(file := as_run.plain(arguments[0].co_filename), as_run.RUN[file][-1], 0)
         by, called = callers(event, bool(_COMPUTING))
         read, written = _access(*arguments[1:]) if event == "open" else (event != "os.rename", event not in _QUIET)
         if not read and called:
