@@ -6,9 +6,7 @@ A folder of a sweep holds
   attribute `cell` is the record of all that its numbers depend on, as JSON: the `function`, whose it is (`of`), the
   `settings`, the `sources` of every module within reach (module -> digest) and the `versions` of Python and of the
   packages that compute.  The digest in the name is that of the record, so an edit, another version or another setting
-  is another file; none is ever overwritten by other numbers, and one that is damaged or foreign is refused.  Its
-  attribute `read` holds what a user's code read meanwhile (`hexmj.user_code.reads`).
-- `<name>-<digest>.<digest>.nc` where that has changed since: the same cell, made anew.
+  is another file; none is ever overwritten by other numbers, and one that is damaged or foreign is refused.
 - `<name>-<digest>.jsonl` for each `KeptValues`: the same record, then a line for each value.
 - `.part-*` of runs that were killed while they wrote; the next run removes them.
 

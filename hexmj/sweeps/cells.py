@@ -8,17 +8,14 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
-from pathlib import Path
 from typing import Any
-from warnings import warn
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
-from hexmj.sweeps.code import code, source_files
-from hexmj.sweeps.plain import classes, label, plain
-from hexmj.user_code.as_run import is_users
-from hexmj.user_code.reads import CHANGED, HEARD, changed, computing, reads
+from hexmj.sweeps.code import code, files
+from hexmj.sweeps.plain import classes, label, named_files, plain
+from hexmj.user_code.reads import untold
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -49,23 +46,9 @@ class Cell:
             raise InputError(f"settings of {self.name}: {error}; expected arguments of its function") from None
 
     def compute(self, *first: Any, **execution: Any) -> Any:
-        """What the function gives, told how to compute it as far as it asks.
-
-        Raises:
-            InputError: a file that it has read more than once has changed meanwhile.
-
-        Warns:
-            UserWarning: so has one that was opened to be written, too.
-        """
+        """What the function gives, told how to compute it as far as it asks."""
         asked = signature(self.function).parameters
-        with computing() as read:
-            made = self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
-        for path in [path for (path, _), held in read.items() if held == {CHANGED}]:
-            told = f"{self.name}: {path} was opened to be read and written, and has changed; it is made anew each time"
-            warn(told, stacklevel=2)
-        if twice := [path for (path, _), held in read.items() if len(held) > 1]:
-            raise InputError(f"{self.name}: {twice[0]} has changed while it was in use; start again")
-        return made
+        return self.function(*first, **self.settings, **{key: execution[key] for key in execution if key in asked})
 
     def record(self) -> str:
         """All that the cell depends on, as JSON: function, settings, sources and versions.
@@ -83,22 +66,23 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def reads(self) -> str:
-        """What its code has read so far in this process, as JSON; see `reads.reads`.  Nothing if it has no source."""
-        with suppress(InputError):
-            if HEARD:
-                return json.dumps(reads(source_files(frozenset(self._modules())), self._homes()), sort_keys=True)
-        return "{}"
+    def not_kept(self, opened: set[str]) -> str:
+        """Why it cannot be kept, in a sentence, if its code has opened files that its record does not tell; else empty.
 
-    def edited(self, told: str, known: str = "{}") -> list[str]:
-        """Files and folders of `reads` that hold something else by now, but for those of which others know the same."""
-        same = json.loads(known)
-        return changed({place: one for place, one in json.loads(told).items() if same.get(place) != one}, self._homes())
-
-    def _homes(self) -> list[Path]:
-        """Folders that a user's own modules lie in, and the current one."""
-        files = [getattr(sys.modules.get(module), "__file__", None) for module in self._modules()]
-        return [*dict.fromkeys(Path(file).absolute().parent for file in files if file and is_users(file)), Path.cwd()]
+        Args:
+            opened: while it was computed.
+        """
+        try:
+            sources, data = files(frozenset(self._modules()))
+        except InputError:  # it has no source, so that it is named by nothing
+            return ""
+        told = (*data, *named_files([*self.settings.values(), self._owner]))
+        if not sources or not (found := untold(opened, sources, told)):
+            return ""
+        return (
+            f"{self.name} is not kept: its code opens or runs {found[0]}, of which an edit would not be noticed;"
+            " expected a field that names it, or an import"
+        )
 
     def _modules(self) -> list[str]:
         return [one.__module__ for one in (self.function, *classes([self.settings, self._owner]))]

@@ -3,11 +3,12 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from, and TOML files and MJCFs count that its modules name; `reads` hears what a
-user's own read.
+the one module it comes from, and its modules' TOML files count.  MJCFs, which MuJoCo opens where nobody hears it, count
+wherever a module names one.
 """
 
 import ast
+import os
 import sys
 import sysconfig
 from collections.abc import Iterator, Sequence
@@ -16,16 +17,16 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec, resolve_name
-from os.path import isfile
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import NamedTuple
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
+from hexmj.storage.mjcf import content, parts
 from hexmj.sweeps.plain import PACKAGE, module_label
 from hexmj.user_code import as_run
-from hexmj.user_code.parsing import parsed
+from hexmj.user_code.parsing import files_named, parsed
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -33,6 +34,9 @@ CARRIERS = {
     *("hexmj.user_code.as_run", "hexmj.user_code.reads"),
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
+
+MJCF = ".xml", ".mjcf", ".mjb", ".urdf"
+"""Ends of the names of what MuJoCo opens."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -63,7 +67,7 @@ class Code:
 class _Module:
     digest: str
     data: list[Path]
-    """Of this package."""
+    """Files that it names."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -90,18 +94,23 @@ def code(modules: frozenset[str]) -> Code:
     Raises:
         InputError: one has no source, or a source is not what this program ran.
     """
-    needed, data = _needed(modules), dict[str, str]()
+    needed, data = _needed(modules), dict[str, list[str]]()
     for name, file, paths in needed.modules:
-        content = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
-        if content and digest(content) != needed.sources[module_label(name)]:
+        source = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
+        if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        data |= {f"{name}, {path.name}": digest_of(path) for path in paths}
-    return Code(dict(sorted((needed.sources | data).items())), needed.versions)
+        for path in paths:
+            held = digest_of(path) if file in _AT_FIRST else digest(content(path))
+            data.setdefault(f"{module_label(name)}, {path.name}", []).append(held)
+    sources = needed.sources | {name: ",".join(held) for name, held in data.items()}
+    return Code(dict(sorted(sources.items())), needed.versions)
 
 
-def source_files(modules: frozenset[str]) -> set[str]:
-    """The files of all sources that some modules need."""
-    return {str(file) for _, file, _ in _needed(modules).modules}
+def files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
+    """The sources that some modules need, but for this package's, and the data that all name, with their parts."""
+    read = _needed(modules).modules
+    sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
+    return sources, [part for _, _, paths in read for path in paths for part in parts(path)]
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -131,7 +140,6 @@ def _follow(modules: frozenset[str]) -> _Needed:
             sources[module_label(name)] = module.digest
             read.append((name, file, module.data))
             ours = top == PACKAGE.name
-            as_run.FOLLOWED.update([] if ours else [str(file)])
             whole = iter_modules([str(file.parent)]) if attribute == _ALL and module.package and not ours else ()
             inner += [(f"{name}.{one.name}", _ALL) for one in whole]
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]
@@ -196,19 +204,20 @@ def _is_installed(file: Path) -> bool:
 @cache
 def _read(name: str, file: Path) -> _Module:
     try:
-        changed, content = file.stat().st_mtime_ns, as_run.as_run(file, _stamp(name)) or file.read_bytes()
+        changed, held = file.stat().st_mtime_ns, as_run.as_run(file, _stamp(name)) or file.read_bytes()
     except OSError as error:  # as of one in an archive
         raise InputError(f"{file} cannot be read: {error.strerror}; expected sources as files") from None
     if _AT_FIRST.get(file, changed) != changed:
         raise InputError(f"{file} was edited since this program began; start it again")
-    python = b"" if file.name.endswith(as_run.COMPILED) else content  # of a compiled module nothing is followed
+    python = b"" if file.name.endswith(as_run.COMPILED) else held  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
-        nodes = list(ast.walk(parsed(python)))
+        tree = parsed(python)
     except (SyntaxError, ValueError) as error:
         if name in sys.modules:
             raise InputError(f"{file} cannot be read as Python: {error}") from None
-        nodes = list[ast.AST]()
+        tree = parsed(b"")
+    nodes = list(ast.walk(tree))
     guarded = [
         one
         for one in nodes
@@ -221,14 +230,8 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    return _Module(digest(content), _data(file, nodes) if ours else [], package == name, imports, bound)
-
-
-def _data(file: Path, nodes: list[ast.AST]) -> list[Path]:
-    """TOML files and MJCFs that a module of this package names, beside it or in its assets."""
-    texts = {one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)}
-    names = [one for one in texts if one.endswith((".toml", ".xml"))]
-    return [path for name in sorted(names) for folder in (file.parent, _ASSETS) if isfile(path := folder / name)]
+    folders, endings = ((file.parent, _ASSETS), (".toml", ".xml")) if ours else ((file.parent, Path.cwd()), MJCF)
+    return _Module(digest(held), files_named(tree, folders, endings), package == name, imports, bound)
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:

@@ -1,6 +1,5 @@
 """Cells computed one after another or on any executor, kept as they finish, and put together along named axes."""
 
-import json
 import math
 import os
 import pickle
@@ -12,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+from warnings import warn
 
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
@@ -20,13 +20,13 @@ from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.files import check_free, find, write
-from hexmj.user_code.reads import CHANGED, comparable
+from hexmj.user_code.reads import heard
 
 if TYPE_CHECKING:
     import xarray as xr
 
     Made = tuple[xr.Dataset, str]
-    """The data of a cell, and what it read; see `Cell.reads`."""
+    """The data of a cell, and why it is not kept; see `Cell.not_kept`."""
 
 
 class Study(Protocol):
@@ -78,8 +78,11 @@ def finish(
         how: see `Execution`.
 
     Raises:
-        InputError: a cell cannot be named, sent, written or believed, a file that cells read has changed meanwhile or
-            is another where a worker is, or a worker was killed.  And whatever the first cell to fail raises.
+        InputError: a cell cannot be named, sent, written or believed, what it depends on has changed meanwhile or is
+            another where a worker is, or a worker was killed.  And whatever the first cell to fail raises.
+
+    Warns:
+        UserWarning: cells are not kept, since their code opens files that nothing names.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
@@ -94,7 +97,7 @@ def finish(
     if folder:
         finished_all = all(path and os.path.exists(path) for path in paths)
         (remove_leftovers if finished_all else prepare)(folder)
-    share, read = _Share(cells, progress), _Read(cells)
+    share, warned = _Share(cells, progress), False
     if executor is None:
         made = (
             (i, _made(cell, paths[i], records[i], threads=threads, progress=partial(share.tell, i)))
@@ -102,8 +105,10 @@ def finish(
         )
     else:
         made = _elsewhere(executor, cells, records, paths, folder, threads or 1)
-    for i, (data, by_it) in made:
-        read.check(cells[i], by_it)
+    for i, (data, not_kept) in made:
+        if not_kept and not warned:
+            warned = True
+            warn(not_kept, stacklevel=2)
         share.finish(i)
         yield i, data
     if folder:
@@ -147,32 +152,19 @@ class _Share:
         self.tell(i, 1.0 - self._done[i])
 
 
-class _Read:
-    """What the cells of one run have read, which has to be the same for all."""
-
-    def __init__(self, cells: Sequence[Cell]) -> None:
-        before = [one for cell in cells for one in json.loads(cell.reads()).items()]
-        self._held = {place: held for place, (held, _) in before if held != CHANGED}
-        self._known = frozenset(self._held)
-
-    def check(self, cell: Cell, by_it: str) -> None:
-        """Refuse what a cell has read, as `Cell.reads` tells it, if that is something else than before."""
-        for place, (held, path) in json.loads(by_it).items():
-            if (held != CHANGED or place in self._known) and self._held.setdefault(place, held) != held:
-                raise InputError(f"{cell.name}: {path or place} has changed while it was in use; start again")
-
-
 def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
-    if path and (kept := find(path, cell, record)):
-        return kept
+    if path and (kept := find(path, record)) is not None:
+        return kept, ""
     before = record if path else cell.settings_now()
-    data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
-    check_free(cell, data)
+    with heard() as opened:
+        data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
+    check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    return write(path, cell, record, data) if path else (data, cell.reads())
+    not_kept = cell.not_kept(opened)
+    return (write(path, record, data), "") if path and not not_kept else (data, not_kept if path else "")
 
 
 @dataclass(frozen=True)
@@ -221,17 +213,11 @@ def _elsewhere(
     """What is kept, and then what an executor's workers make of the rest."""
     parcels = dict[int, _Parcel]()
     for i, (cell, record, path) in enumerate(zip(cells, records, paths, strict=True)):
-        if path and (kept := find(path, cell, record)):
-            yield i, kept
+        if path and (kept := find(path, record)) is not None:
+            yield i, (kept, "")
         else:
             parcels[i] = _Parcel(_pickled(cell), record or cell.record(), path, threads)
-    for i, made in _by_others(executor, parcels, folder):
-        if other := [file for file in cells[i].edited(made[1], cells[i].reads()) if comparable(file)]:
-            raise InputError(
-                f"{cells[i].name}: a worker has read another {other[0]} than is here; start the workers again, in the"
-                " same folder"
-            )
-        yield i, made
+    yield from _by_others(executor, parcels, folder)
 
 
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:

@@ -5,22 +5,22 @@ import os
 import zlib
 from contextlib import suppress
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
-from hexmj.sweeps.files import READ
+from hexmj.user_code.reads import heard
 
 
 class KeptValues:
     """A function of rows that never computes one twice, in this run or in a later one.
 
     It is called as `function(rows, **settings)`, (row, number) -> (row,), and must treat every row by itself.  The file
-    begins with the cell's record; every further line is a row, its value and a checksum, or what was read for all that
-    follow.  Lines are only ever added, by several runs at once if need be; one that is not whole counts as if it were
-    not there.
+    begins with the cell's record; every further line is a row, its value and a checksum.  Lines are only ever added, by
+    several runs at once if need be; one that is not whole counts as if it were not there.
     """
 
     def __init__(self, cell: Cell, folder: Path | None = None, *, threads: int | None = None) -> None:
@@ -32,12 +32,11 @@ class KeptValues:
             threads: for the function, if it takes them.
 
         Raises:
-            InputError: the file is damaged in its first line, is of another cell, was made of what has changed since,
-                or cannot be read or written.
+            InputError: the file is damaged in its first line, is of another cell, or cannot be read or written.
         """
         self._cell, self._threads = cell, threads
         self._values: dict[bytes, float] = {}
-        self._path, self._seed, self._read = None, 0, "{}"
+        self._path, self._seed = None, 0
         if folder:
             self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
@@ -56,13 +55,15 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
+            with heard() as opened:
+                values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
-                read = self._cell.reads()
-                told = [self._marked(f"{READ} {read}")] if read != self._read else []
-                _add(self._path, "".join(told + [self._line(*one) for one in zip(new, values.tolist(), strict=True)]))
-                self._read = read
+                if why := self._cell.not_kept(opened):
+                    warn(why, stacklevel=2)
+                    self._path = None
+                else:
+                    _add(self._path, "".join(self._line(*one) for one in zip(new, values.tolist(), strict=True)))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])
 
@@ -81,12 +82,6 @@ class KeptValues:
                 lines = file.read().decode(errors="replace").split("\n")
         for line in lines:
             row, _, value = line.rpartition(" ")[0].partition(" ")
-            if row == READ and f"{line}\n" == self._marked(f"{READ} {value}"):
-                self._read = value
-                if files := self._cell.edited(value):
-                    raise InputError(
-                        f"{path} was made of {files[0]} as it was; delete {path.name}, and it is made anew"
-                    )
             with suppress(ValueError):  # of what is no line
                 key, number = bytes.fromhex(row), float.fromhex(value)
                 if f"{line}\n" == self._line(key, number) and math.isfinite(number):
@@ -95,10 +90,8 @@ class KeptValues:
             _add(path, rest, begin=True)
 
     def _line(self, row: bytes, value: float) -> str:
-        return self._marked(f"{row.hex()} {value.hex()}")
-
-    def _marked(self, text: str) -> str:
         """With a checksum that no line of another cell has."""
+        text = f"{row.hex()} {value.hex()}"
         return f"{text} {zlib.crc32(text.encode(), self._seed):08x}\n"
 
 

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from functools import cached_property
 from inspect import getattr_static
@@ -15,9 +16,8 @@ import numpy as np
 from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
-from hexmj.storage.mjcf import content
+from hexmj.storage.mjcf import content, parts
 from hexmj.user_code.as_run import is_users
-from hexmj.user_code.reads import placed
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
@@ -102,18 +102,42 @@ def classes(value: Any) -> Iterator[type]:
             yield from classes(item)
 
 
+def named_files(value: Any, folders: Sequence[Path] = ()) -> Iterator[Path]:
+    """Files that a setting names, with their parts, whether they are there or not; as `plain` finds them."""
+    if (names := field_names(value)) is not None:
+        of_class = [*folders, *_folders(type(value))]
+        for name in names:
+            yield from named_files(getattr(value, name), of_class)
+    elif isinstance(value, Mapping):
+        yield from named_files(list(value.values()), folders)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from named_files(item, folders)
+    elif isinstance(value, Path) or (type(value) is str and (folders or "." in value)):
+        for path in _paths(value, folders):
+            yield from parts(path) if isfile(path) else [path]
+
+
 def _held(name: str | Path, folders: Sequence[Path]) -> str:
     """Digests of what a file holds in the current folder and in others, each empty without it; none if all are."""
-    paths = dict.fromkeys(folder / name for folder in (Path(), *folders))
-    held = [digest(content(path)) if isfile(path) else "" for path in paths]
+    held = [digest(content(path)) if isfile(path) else "" for path in _paths(name, folders)]
     return ",".join(held) if any(held) else ""
+
+
+def _paths(name: str | Path, folders: Sequence[Path]) -> list[Path]:
+    """Where a file may lie that a setting names."""
+    return [*dict.fromkeys(folder / name for folder in (Path(), *folders))]
 
 
 def _place(file: Path, folders: Sequence[Path]) -> str:
     """Where a file lies, as far as that does not change as a project is moved."""
     if not is_users(str(file.absolute())):
         return file.name
-    return placed(str(file), [*folders, Path.cwd()]) if file.is_absolute() else os.path.normpath(file)
+    for i, home in enumerate([*folders, Path.cwd()] if file.is_absolute() else []):
+        with suppress(ValueError):  # of another drive
+            if os.path.commonpath([file, home]) != home.anchor:
+                return f"{i}:{os.path.relpath(file, home)}"
+    return os.path.normpath(file)
 
 
 def _folders(kind: type) -> list[Path]:

@@ -34,9 +34,6 @@ COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
 RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
 
-FOLLOWED: set[str] = set()
-"""Installed files that count by their content, as those of a controller's package."""
-
 _STALE: set[str] = set()
 """Files of which bytecode ran that is not of their source, which Python knows by its time and size alone."""
 

@@ -2,8 +2,11 @@
 that of one.  Nothing is told of their warnings, which whoever imports them hears."""
 
 import ast
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from os.path import isdir, isfile
+from pathlib import Path
 from threading import Lock
 from types import CodeType
 from warnings import catch_warnings, simplefilter
@@ -32,3 +35,23 @@ def _alone() -> Iterator[None]:
     with _ONE, catch_warnings():
         simplefilter("ignore")
         yield
+
+
+def files_named(
+    tree: ast.AST, folders: Sequence[Path], endings: tuple[str, ...], last: int = sys.maxsize
+) -> list[Path]:
+    """Files that are there, and that texts of a source name, as ``f"{folder}/leg.xml"`` does.
+
+    Args:
+        tree: of the source.
+        folders: where they are looked for, and in folders there that texts name.
+        endings: of the names, in small letters.
+        last: line up to which texts count.
+    """
+    texts = dict[str, int]()
+    for one in ast.walk(tree):
+        if isinstance(one, ast.Constant) and isinstance(one.value, str):
+            texts |= dict.fromkeys({one.value, one.value.lstrip("/")} - texts.keys(), one.lineno)
+    names = [text for text, line in texts.items() if line <= last and text.lower().endswith(endings)]
+    within = [folder / text for folder in folders for text in texts if isdir(folder / text)] if names else []
+    return sorted({one for folder in (*folders, *within) for name in names if isfile(one := folder / name)})
