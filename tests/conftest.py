@@ -13,9 +13,11 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, a
 def run(monkeypatch, capsys):
     """Run the command in this process: its exit code, standard output and standard error."""
     from hexmj.cli.main import main
+    from hexmj.cli.options import LOADED
 
     def call(*words: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["hexmj", *map(str, words)])
+        LOADED.clear()
         code = 0
         try:
             main()

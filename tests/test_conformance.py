@@ -165,7 +165,21 @@ def left_leg_ahead(walk: PlannedWalk, _: int) -> dict[str, Any]:
     return {"x": walk.x[0] + np.array([1e-6, 0.0, 0.0, 0.0, 0.0, 0.0])}
 
 
+@dataclass(frozen=True)
+class OtherAtSpeed:
+    """LDVS, but where it is disturbed or steered."""
+
+    name: str = "other at speed"
+
+    def begin(self, *given: Any) -> Any:
+        return hexmj.LDVS.begin(*given)
+
+    def begin_at_speed(self, *given: Any) -> Any:
+        return hexmj.UNCOORDINATED.begin_at_speed(*given)
+
+
 BROKEN: list[tuple[str, Any, str]] = [
+    ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
     ("settings", Melting(), "not frozen"),
     ("settings", Hiding(), "object.*is no setting"),
     ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),

@@ -1,7 +1,7 @@
 """Disturbed walks: the plan that meets a disturbance, the strategies, the frequencies and the experiment."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -88,6 +88,39 @@ def test_a_halt_is_a_new_start_from_where_the_legs_are():
         after = slice(step + PAUSED, step + PAUSED + 500)
         assert np.array_equal(whole.x[after, start], again.x[:, start])
         assert np.array_equal(whole.stance[after, start], again.stance[:, start])
+
+
+@dataclass(frozen=True)
+class Lifts:
+    """LDVS, which lifts its feet itself, and steps beside its lines."""
+
+    name: str = "lifts"
+
+    def begin(self, *given, **how) -> Any:
+        return self.begin_at_speed(*given, **how)
+
+    def begin_at_speed(self, *given, **how) -> Any:
+        plan: Any = LDVS.begin_at_speed(*given, **how)
+        goes_on = plan.advance
+
+        def advance(steps):
+            walk = goes_on(steps)
+            return replace(walk, y=walk.y + 0.01 * walk.x, height=np.where(walk.stance, 0.0, 9.0))
+
+        plan.advance = advance
+        return plan
+
+
+def test_a_halted_start_puts_its_feet_down_where_they_are():
+    disturbed = Disturbed(Lifts(), disturbance("halt"))
+    walk = disturbed.begin(STABLE.starts, np.full(6, V), STRIDE).advance(STEPS)
+    for start, step in enumerate(STABLE.step):
+        rest = slice(step, step + PAUSED)
+        assert np.isnan(walk.height[rest, start]).all() and walk.stance[rest, start].all()
+        assert (walk.y[rest, start] == walk.y[step - 1, start]).all() and (
+            walk.y[:step, start] != walk.y[0, start]
+        ).any()
+        assert not np.isnan(walk.height[step + PAUSED :, start]).any()
 
 
 def test_a_stopped_leg_retracts_and_the_others_go_on():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.controllers.cruse1998.network import NetworkPlan
 from hexmj.controllers.losses import first_losses, planned_losses
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Own
@@ -104,3 +105,36 @@ def test_losses_that_make_no_sense_are_refused(steps, monkeypatch):
     monkeypatch.setattr(plan, "first_losses", lambda _: np.array(steps))
     with pytest.raises(hexmj.InputError, match="expected the number of a step, from 0 on, for each start"):
         first_losses(plan, np.array(10))
+
+
+class Lamed(NetworkPlan):
+    """The network's plan, of which leg L2 never stands."""
+
+    def advance(self, steps: int) -> PlannedWalk:
+        walk = super().advance(steps)
+        return replace(walk, stance=walk.stance & (np.arange(6) != 1))
+
+
+class Wrapped:
+    """The same around a plan, whose other names it hands on."""
+
+    def __init__(self, plan: Any) -> None:
+        self._plan = plan
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._plan, name)
+
+    def advance(self, steps: int) -> PlannedWalk:
+        return Lamed.advance(self._plan, steps)
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_losses_that_another_plan_tells_are_not_believed(wrapped):
+    """One that is wrapped, or whose class this one changes."""
+    starts = hexmj.draw_starts(20, 0)
+    plan: Any = LDVS.begin(starts, np.full(20, 0.3), STRIDE)
+    plan.__class__ = Lamed
+    plan = Wrapped(plan) if wrapped else plan
+    steps = np.full(20, 900)
+    own = LDVS.begin(starts, np.full(20, 0.3), STRIDE).first_losses(steps)
+    assert (first_losses(plan, steps) > 0).sum() > (own > 0).sum() + 5

@@ -1,5 +1,6 @@
 """Files of a user's own are modules: loaded once until they are edited, or refused in one sentence."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,3 +35,22 @@ def test_a_file_that_does_not_load_is_refused_in_one_sentence(tmp_path: Path, te
 def test_what_a_file_tries_in_vain_does_not_stop_it(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("try:\n    from . import foo\nexcept ImportError:\n    foo = 3")
     assert importable(tmp_path / "mine.py").foo == 3
+
+
+@pytest.mark.parametrize("helper", ["helper.py", "helper/__init__.py"])
+def test_a_helper_of_another_folder_is_refused_where_one_lies_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, helper: str
+) -> None:
+    """Two versions of a project in one program: Python knows one module of a name."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "helper", raising=False)
+    for version in ("v1", "v2"):
+        (file := tmp_path / version / helper).parent.mkdir(parents=True)
+        file.write_text(f"GAIN = {version!r}")
+        finds = f"import sys\nsys.path.insert(0, {str(tmp_path / version)!r})\nfrom helper import GAIN\nimport json"
+        (tmp_path / version / "mine.py").write_text(finds)
+    assert importable(tmp_path / "v1" / "mine.py").GAIN == "v1"
+    with pytest.raises(InputError, match=r"v2.mine\.py imports helper, which is .*v1.* in this program, though .*v2"):
+        importable(tmp_path / "v2" / "mine.py")
+    monkeypatch.delitem(sys.modules, "helper")
+    assert importable(tmp_path / "v2" / "mine.py").GAIN == "v2"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.cli import options
 from hexmj.controllers import Sensed, Step, stepwise
 from hexmj.controllers.conformance import check_controller
 from hexmj.gaits import CYCLES, limit_gait
@@ -22,6 +23,7 @@ from hexmj.physics.settling import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
 from hexmj.search.problems import Sample
+from hexmj.studies.league.entrants import entrants
 from hexmj.walks import PlannedWalk
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -316,3 +318,15 @@ def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome(tmp_path):
         hexmj.physical_flss(far, [0.5], n_starts=2, window=5.0)
     problem = hexmj.Problem(hexmj.FieldsForm(far), 0.5, 0.5, window=5.0, conditions=hexmj.Conditions())
     assert Sample(problem, 2, 0).costs(np.array([[1e6], [5.0]])).tolist() == [1.0, 0.0]
+
+
+def test_a_command_uses_a_controller_as_it_was_loaded_whatever_becomes_of_its_file(tmp_path, monkeypatch):
+    """So a recording is of the controller that was compared, and no half saved file ends a run."""
+    monkeypatch.setattr(options, "LOADED", {})
+    (mine := tmp_path / "mine.py").write_text((EXAMPLES / "tripod.py").read_text())
+    name = f"{mine}:Tripod"
+    controlled = options.Controlled()
+    first = controlled.controller(name)
+    mine.write_text("def half(")
+    assert controlled.controllers([name])[first.name] is first
+    assert entrants((name,), options.loaded)["tripod"].controller is first

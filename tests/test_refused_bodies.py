@@ -108,6 +108,7 @@ def test_a_centre_of_mass_elsewhere_is_said_and_stays_there(tmp_path: Path):
         ({"mass": 2.0}, "mass = 2 g, but its MJCF weighs 1 g"),
         ({"legs": changed_leg(joints=("L2_hip", *SECOND.joints[1:]))}, "no joint 'L2_hip'; valid names: root, L1_"),
         ({"legs": changed_leg(joints=SECOND.joints[::-1])}, "expected them leg by leg"),
+        ({"legs": changed_leg(parts=SECOND.parts[1:])}, "is moved by 'L2_thorax_coxa'; expected it among the parts of"),
         ({"legs": (*STICK_INSECT.legs[3:], *STICK_INSECT.legs[:3])}, "expected them leg by leg"),
         ({"legs": changed_leg(foot="L2_tip")}, "no geom 'L2_tip'; valid names"),
         ({"legs": changed_leg(foot="L2_knee")}, "no site 'L2_knee'; valid names: L1_foot"),

@@ -82,6 +82,13 @@ def _in_legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
                 f"from {body.root!r} to foot {leg.foot!r} lead the joints {', '.join(chain) or 'none'};"
                 f" expected {', '.join(leg.joints)}"
             )
+        moved = np.zeros(model.nbody, dtype=bool)
+        for i in range(1, model.nbody):
+            one = model.body(i)
+            joints = {model.joint(one.jntadr[0] + n).name for n in range(one.jntnum[0])}
+            moved[i] = moved[one.parentid[0]] or not joints.isdisjoint(leg.joints)
+            if moved[i] and model.body_mass[i] > 0 and joints.issubset(leg.joints) and one.name not in leg.parts:
+                yield f"{one.name!r} is moved by {leg.joints[0]!r}; expected it among the parts of that leg"
     if len(radii) > 1:
         yield f"its feet have the radii {sorted(radii)} mm; expected one for all"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding
+from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding, loaded
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import tables_that_fit
@@ -88,7 +88,7 @@ class League(StudyCommand):
             if asked[part] is None:
                 sizes[part] = min(sizes.get(part, getattr(study.League, part)), there)
         return study.League(
-            entrants(self.names),
+            entrants(self.names, loaded),
             **sizes,
             tried_at=self.trial_velocity,
             window=self.walks.time,
@@ -143,7 +143,7 @@ class League(StudyCommand):
 
         if sentence := missing():
             raise RenderingError(sentence)
-        takes_part, v = entrants(self.names), result.attrs["tried_at"]
+        takes_part, v = entrants(self.names, loaded), result.attrs["tried_at"]
         best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]
         shown = []
         for name in best:

@@ -38,10 +38,19 @@ CONTROLLER = (
 MOST_PROCESSES = 1000
 """More than any machine has cores."""
 
-_LOADED: dict[str, Controller] = {}
-"""Controllers as they were loaded: a file may have been edited since, and is not run again."""
+LOADED: dict[str, Controller] = {}
+"""Controllers as the command has loaded them: a file that is edited while it runs is not run again."""
 
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
+
+
+def loaded(name: str) -> Controller:
+    """A controller by its name, see `load_controller`, as the command has loaded it first."""
+    from hexmj.controllers.named import load_controller
+
+    if name not in LOADED:
+        LOADED[name] = load_controller(name)
+    return LOADED[name]
 
 
 @dataclass(frozen=True)
@@ -110,10 +119,9 @@ class Controlled:
             InputError: no such controller, or one that has no order of updates or reading, or not this one.
         """
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.named import load_controller
         from hexmj.controllers.reads_legs import ReadsLegs
 
-        found = _LOADED[name] = load_controller(name)
+        found = loaded(name)
         for rule, value in self.rules.items():
             if not isinstance(found, Cruse1998):
                 raise InputError(
@@ -135,7 +143,7 @@ class Controlled:
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.readings import in_words
 
-        found = _LOADED.get(name)
+        found = LOADED.get(name)
         if not isinstance(found, Cruse1998):
             return ""
         rules = {"order": found.order, "reading": in_words(found.reading)}

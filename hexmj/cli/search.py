@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Controlled, Figures, Workers
+from hexmj.cli.options import Controlled, Figures, Workers, loaded
 from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
@@ -145,10 +145,9 @@ class Search(WalkingCommand):
         """Planning with the order of updates and the reading of the set that the search begins with, unless given."""
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.readings import reading_name
-        from hexmj.controllers.named import load_controller
         from hexmj.search.network_forms import FORMS
 
-        begun = load_controller(self.begin) if self.begin and self.form in FORMS else None
+        begun = loaded(self.begin) if self.begin and self.form in FORMS else None
         if not isinstance(begun, Cruse1998):
             return self.controlled
         rules = {"order": begun.order, "reading": reading_name(begun.reading)}
@@ -156,7 +155,6 @@ class Search(WalkingCommand):
         return replace(self.controlled, **taken)
 
     def _form(self) -> "Form":
-        from hexmj.controllers.named import load_controller
         from hexmj.search.forms import FieldsForm
         from hexmj.search.network_forms import FORMS, NetworkForm
 
@@ -165,18 +163,17 @@ class Search(WalkingCommand):
         for name in self.controlled.rules:
             raise InputError(f"--{name} with {self.form}; expected it with {', '.join(FORMS)}")
         try:
-            return FieldsForm(load_controller(self.form))
+            return FieldsForm(loaded(self.form))
         except InputError as error:
             raise InputError(f"--form: {error}; forms of the 1998 network: {', '.join(FORMS)}") from None
 
     def _effort(self) -> "Effort":
-        from hexmj.controllers.named import load_controller
         from hexmj.search.stages import Effort
 
         same = "algorithm", "population", "domain", "budget", "refine_budget"
         return Effort(
             **{name: getattr(self, name) for name in same},
-            begin=load_controller(self.begin) if self.begin else None,
+            begin=loaded(self.begin) if self.begin else None,
             starts=self._size(self.starts, 500, 50),
             refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
             seed=self.walks.seed,
@@ -251,9 +248,8 @@ class Search(WalkingCommand):
     def _show(
         self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
     ) -> None:
-        from hexmj.controllers.named import load_controller
 
-        vectors = {name: _numbers(problem.form, load_controller(one)) for name, one in self._beside.items()}
+        vectors = {name: _numbers(problem.form, loaded(one)) for name, one in self._beside.items()}
         parameters = new_table("parameter", "found", *vectors)
         for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
             parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))

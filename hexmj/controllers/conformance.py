@@ -15,13 +15,13 @@ import numpy as np
 
 from hexmj.checks import given
 from hexmj.controllers.asking import advanced, begin, place, said, tell
-from hexmj.controllers.losses import first_losses, planned_losses
+from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import (
     Controller,
-    FastLosses,
     Plan,
     ReadingPlan,
     Sensed,
+    SteerableController,
     check_controller_type,
     claims_mirrored,
     settings_of,
@@ -241,11 +241,19 @@ def _batch(trial: Trial) -> None:
 
 
 def _fast_losses(trial: Trial) -> None:
-    if isinstance(plan := trial.begin(), FastLosses):
+    if tells_losses(plan := trial.begin()):
         steps = STEPS - 50 * np.arange(len(trial.starts))
         fast, planned = first_losses(plan, steps), planned_losses(trial.begin(), steps)
         if not np.array_equal(fast, planned):
             raise InputError(f"first_losses gives the steps {fast}; expected those of the plan, {planned}")
+
+
+def _at_speed(trial: Trial) -> None:
+    if isinstance(trial.controller, SteerableController):
+        with said("a controller, begin_at_speed"):
+            plan = trial.controller.begin_at_speed(trial.starts, trial.velocity, trial.stride, trial.acceleration, 1)
+        usual = replace(trial, acceleration=None).walk
+        _same(usual, advanced(plan, STEPS), "begin without an acceleration, and begin_at_speed,")
 
 
 def _mirrored(trial: Trial) -> None:
@@ -285,6 +293,7 @@ LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "side by side": (_side_by_side, "two plans that go on in turn do not feel each other"),
     "batch": (_batch, "a start walks alike alone, in another order and among others"),
     "first losses": (_fast_losses, "first_losses, where plans have it, are those of the plan"),
+    "at speed": (_at_speed, "begin_at_speed, where there is one, walks as begin does without an acceleration"),
     "mirrored": (_mirrored, "mirrored starts give mirrored walks, where it claims that"),
     "sense": (_reading, "a plan that reads the legs can be told of some starts, and the others do not feel it"),
 }

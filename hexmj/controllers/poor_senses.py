@@ -14,7 +14,10 @@ from hexmj.walks import PlannedWalk
 
 @dataclass(frozen=True)
 class PoorSenses:
-    """A controller whose plans read the legs, told of them inexactly or late."""
+    """A controller whose plans read the legs, told of their tips inexactly, or of everything late.
+
+    What reads loads or contacts alone, as some rivals do, feels no noise.
+    """
 
     controller: Controller
     """Plans and reads."""

@@ -11,20 +11,17 @@ from typing import Any
 import numpy as np
 
 from hexmj.bodies.grounds import beyond_the_ground
-from hexmj.checks import numbers
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import FineSteps, Shown
 from hexmj.physics.orders import Orders
+from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
 from hexmj.physics.watch import check_landed, explosion
 from hexmj.walks import PlannedWalk, joined
-
-PUSH_LASTS = 0.025
-"""How long a push lasts [s]."""
 
 SHOWN = ("qpos", "sensors", "standing", "targets", "force", "depth")
 """What is shown of every start, see `Chunk`."""
@@ -58,40 +55,6 @@ class Chunk:
     """(n,) whether the trunk touched the ground."""
     unreachable: np.ndarray
     """(n,) targets out of reach."""
-
-
-@dataclass(frozen=True, eq=False)
-class Push:
-    """A push from the side at the root, for each start; it lasts `PUSH_LASTS`, in whole steps of the plan."""
-
-    impulse: np.ndarray
-    """(start,) to the left [g mm/s]."""
-    time: np.ndarray
-    """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
-
-    def __post_init__(self) -> None:
-        for name, given in vars(self).items():
-            values = numbers(f"a push's {name}", given)
-            if not np.isfinite(values).all():
-                raise InputError(f"a push's {name} = {values[~np.isfinite(values)][0]}; expected a finite number")
-            object.__setattr__(self, name, values)
-
-    def check_within(self, duration: float, n_starts: int) -> None:
-        """Refuse a push that is not of so many starts, or does not begin while its start is watched [time units].
-
-        Raises:
-            InputError: it is of others, or begins before or after that.
-        """
-        for name, values in vars(self).items():
-            if values.shape != (n_starts,):
-                raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
-        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time >= duration))
-        if beside.any():
-            start = int(np.argmax(beside))
-            raise InputError(
-                f"the push of start {start} is at {self.time[start]:g} time units;"
-                f" expected 0 to below {duration:g}, where the walk ends"
-            )
 
 
 class Insects:
@@ -188,7 +151,7 @@ class Insects:
         """Push with the part of the impulse that falls within the `steps` of the plan that begin with the orders."""
         if self._push:
             stride, seconds = self.settled.stride, self.settled.conditions.time.seconds(self.settled.stride)
-            first, lasts = orders.first // self.settled.substeps, max(1, round(PUSH_LASTS / seconds))
+            first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions.time, stride)
             begin = np.floor(self._push.time / stride.dt + 1e-9) // lasts * lasts
             within = np.minimum(begin + lasts, first + steps) - np.maximum(begin, first)
             self._batch.push[:] = np.maximum(within, 0.0) / lasts * self._push.impulse / (steps * seconds)

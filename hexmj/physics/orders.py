@@ -40,9 +40,10 @@ class Orders:
         return replace(self, **few)
 
 
-def steps_in_chunk(substeps: int) -> int:
-    """Steps of a plan in a chunk, of so many physics steps each."""
-    return max(1, CHUNK // substeps)
+def steps_in_chunk(substeps: int, push: int = 0) -> int:
+    """Steps of a plan in a chunk, of so many physics steps each; of a push of so many steps a whole part."""
+    most = max(1, CHUNK // substeps)
+    return next(steps for steps in range(most, 0, -1) if push % steps == 0)
 
 
 class OrdersFromPlan:
@@ -51,8 +52,14 @@ class OrdersFromPlan:
     tips: np.ndarray
     """(start, leg, 3) where the tips shall be now, in the root frame [mm]."""
 
-    def __init__(self, settled: Settled, plan: Plan, duration: float) -> None:
-        """All legs hold their starts; `plan` is at time 0 and ends at `duration` [time units].
+    def __init__(self, settled: Settled, plan: Plan, duration: float, push: int = 0) -> None:
+        """All legs hold their starts.
+
+        Args:
+            settled: the starts.
+            plan: of them, at time 0.
+            duration: at which it ends [time units].
+            push: steps that a push lasts, which chunks shall not cut.
 
         Raises:
             InputError: a plan of other starts, with another stride, not at time 0, or made for other conditions.
@@ -60,13 +67,14 @@ class OrdersFromPlan:
         check_plan(plan, settled.starts, settled.stride)
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._steps = plan, settled, int(steps_within(duration, settled.stride))
+        self._chunk = steps_in_chunk(settled.substeps, push)
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
 
     def steps_ahead(self) -> int:
         """Steps of the plan in the next chunk, 0 where the walk has ended."""
-        return min(steps_in_chunk(self._settled.substeps), self._steps - self._plan.done)
+        return min(self._chunk, self._steps - self._plan.done)
 
     def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
         """The orders of some starts for the next steps, none where the walk has ended.

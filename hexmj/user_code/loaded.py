@@ -5,6 +5,7 @@ it lies, so pickle, which knows classes and functions by the names of their modu
 the same file; and an edited file is another module, never mistaken for the one that is already loaded.
 """
 
+import ast
 import os
 import sys
 from collections.abc import Sequence
@@ -18,6 +19,8 @@ from urllib.parse import quote_from_bytes, unquote_to_bytes
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
+from hexmj.user_code.as_run import is_users
+from hexmj.user_code.parsing import parsed
 
 __path__: list[str] = []
 """Makes this module a package: its modules are the loaded files."""
@@ -59,6 +62,23 @@ class _Source(SourceLoader):
         if not module.__name__.endswith(f"@{digest(self.get_data(path))}"):
             raise InputError(f"{path} was edited while it was in use; start again")
         super().exec_module(module)
+        _check_helpers(Path(path), self.get_data(path))
+
+
+def _check_helpers(file: Path, source: bytes) -> None:
+    """Refuse a file that has imported a user's module of another folder, though one of that name lies beside it: Python
+    knows a single module by each name, and took the one that it met first."""
+    nodes = [*ast.walk(parsed(source))]
+    names = [alias.name for one in nodes if isinstance(one, ast.Import) for alias in one.names]
+    names += [one.module for one in nodes if isinstance(one, ast.ImportFrom) and one.module and not one.level]
+    for name in dict.fromkeys(name.partition(".")[0] for name in names):
+        taken = getattr(sys.modules.get(name), "__file__", None)
+        for beside in (file.with_name(f"{name}.py"), file.with_name(name) / "__init__.py"):
+            if taken and is_users(taken) and beside.is_file() and not beside.samefile(taken):
+                raise InputError(
+                    f"{file} imports {name}, which is {taken} in this program, though {beside} lies beside it; expected"
+                    " one module of a name: rename one, or run them one after the other"
+                )
 
 
 class _Finder(MetaPathFinder):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS
-from hexmj.checks import typed
+from hexmj.checks import numbers, typed
 from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.asking import begin, tell
 from hexmj.controllers.protocol import (
@@ -20,9 +20,10 @@ from hexmj.controllers.protocol import (
     SteerableController,
     SteerablePlan,
 )
-from hexmj.physics.chunks import PUSH_LASTS, Chunk, Insects, Push
+from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
+from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.settling import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
@@ -142,7 +143,7 @@ class LiveWalk:
         Raises:
             InputError: a value that makes no sense.
         """
-        self.controller, self.velocity, self.start = controller, velocity, np.array(in_order(start), dtype=float)
+        self.controller, self.velocity, self.start = controller, velocity, numbers("start", in_order(start))
         self.conditions, self.stride = conditions or Conditions(), stride or Stride()
         self.begin()
 
@@ -158,6 +159,7 @@ class LiveWalk:
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
         self._insects = Insects(settled, self._push, threads=1)
+        self._lasts = steps_pushed(conditions.time, self.stride)
         self.start, self.conditions, self.settled = start, conditions, settled
         self.trace, self.fell_on = [], ""
         self._before: PlannedWalk | None = None
@@ -186,7 +188,7 @@ class LiveWalk:
         return False
 
     def push(self, impulse: float) -> None:
-        """Push from the side at the root, within the next `PUSH_LASTS` or two.
+        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two.
 
         Args:
             impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
@@ -195,9 +197,8 @@ class LiveWalk:
             InputError: one of more than 80.
         """
         PUSHES.check("impulse", impulse := typed("impulse", impulse, float))
-        vp, lasts = self.conditions.time.vp, max(1, round(PUSH_LASTS / self.conditions.time.seconds(self.stride)))
-        self._push.impulse[:] = impulse * self.conditions.body.mass * vp
-        self._push.time[:] = (self._plan.done // lasts + 1) * lasts * self.stride.dt
+        self._push.impulse[:] = impulse * self.conditions.body.mass * self.conditions.time.vp
+        self._push.time[:] = (self._plan.done // self._lasts + 1) * self._lasts * self.stride.dt
 
     def advance(self, seconds: float) -> Moment:
         """Walk on by so much time, in whole steps of the plan; what is left over is made up for by later calls.
@@ -216,7 +217,7 @@ class LiveWalk:
         steps = int(self._left / step + 1e-9)
         self._left -= steps * step
         while steps > 0 and not self.fell_on:
-            now = min(steps, steps_in_chunk(self.settled.substeps))
+            now = min(steps, steps_in_chunk(self.settled.substeps), self._lasts - self._plan.done % self._lasts)
             self._walk(now)
             steps -= now
         return self.moment

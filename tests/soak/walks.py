@@ -29,8 +29,8 @@ from hexmj.controllers.cruse1998 import PRESETS, Cruse1998, Weights
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics.chunks import Push
 from hexmj.physics.outcomes import NUMBERS, Outcomes
+from hexmj.physics.pushes import Push
 from hexmj.physics.settling import settle
 from tests.other_bodies import renamed
 

@@ -1,6 +1,6 @@
 """A controller that meets a disturbance: its plan until then, what becomes of it, and its plan again."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance
 from hexmj.studies.disturbance.strategies import Postures, Rest, reorganise, stand
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, joined
+from hexmj.walks import PlannedWalk, copied, joined
 
 PAUSE = 4.0
 """Time for which a halted body stands before anything else happens [time units], longer than a foot is lowered."""
@@ -84,6 +84,8 @@ class DisturbedPlan:
         self._rests: dict[int, Rest] = {}
         shape = self.starts.shape
         self._tips, self._standing = np.empty(shape), np.empty(shape, dtype=bool)
+        self._beside = np.tile(np.array(self.stride.geometry.y, dtype=float), (len(self.starts), 1))
+        self._held = self._beside.copy()
         self.resumed = np.full(shape[0], NEVER)
         """(start,) steps before the plan goes on again, known as soon as the start has been disturbed."""
 
@@ -122,7 +124,7 @@ class DisturbedPlan:
     def _disturb(self, which: np.ndarray) -> None:
         """Let it happen to these starts, (start,): how long they rest, and the legs with which they go on."""
         tips, standing = self._disturbance.legs(self._plan.tips, self._plan.standing)
-        self._tips[which], self._standing[which] = tips[which], standing[which]
+        self._tips[which], self._standing[which], self._held[which] = tips[which], standing[which], self._beside[which]
         self.resumed[which] = self.done
         for start in np.flatnonzero(which & self._stops).tolist():
             rest = self._rest(tips[start])
@@ -154,14 +156,14 @@ class DisturbedPlan:
     def _go_on(self, steps: int) -> PlannedWalk:
         """Steps in which nothing new happens; what is planned for a start that rests is not used."""
         before = self.done
-        walk = self._plan.advance(steps)
-        walk = replace(walk, aep=walk.aep.copy())
-        self.done += steps
+        walk = copied(self._plan.advance(steps))
+        self.done, self._beside = self.done + steps, walk.y[-1].copy()
         for start, rest in self._rests.items():
             if before < self.resumed[start]:
                 rows = slice(before - self._disturbance.step[start], before - self._disturbance.step[start] + steps)
                 walk.velocity[:, start] = 0.0
                 walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
+                walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
                 walk.aep[:, start] = np.where(rest.moves_back[rows], np.nan, self.stride.aep0)
         return walk
 

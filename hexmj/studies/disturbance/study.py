@@ -74,10 +74,10 @@ class DisturbedWalks(SameStarts):
 
     @property
     def grid(self) -> int:
-        """Steps of which every time of a disturbance is a multiple."""
-        from hexmj.physics.orders import steps_in_chunk
+        """Steps of which every time of a disturbance is a multiple: those of a push."""
+        from hexmj.physics.pushes import steps_pushed
 
-        return steps_in_chunk(self.conditions.substeps(self.stride))
+        return steps_pushed(self.conditions.time, self.stride)
 
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""

@@ -1,8 +1,9 @@
 """Who takes part, by name."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from hexmj.controllers.named import load_controller
+from hexmj.controllers.protocol import Controller
 from hexmj.controllers.rivals.table import RIVALS
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.short_names import short_names
@@ -20,16 +21,17 @@ FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
 """For a quick look."""
 
 
-def entrants(names: tuple[str, ...]) -> Mapping[str, Entrant]:
+def entrants(names: tuple[str, ...], load: Callable[[str], Controller] = load_controller) -> Mapping[str, Entrant]:
     """Entrants by short names, see `short_names`, in their order.
 
     Args:
         names: of controllers, which end with `IDEAL` where they begin at an ideal start.
+        load: gives a controller by its name.
 
     Raises:
         InputError: no such controller, or one without an ideal start.
     """
-    found = {name: load_controller(name.removesuffix(IDEAL)) for name in names}
+    found = {name: load(name.removesuffix(IDEAL)) for name in names}
     short = short_names({name.removesuffix(IDEAL): one for name, one in found.items()})
     shown = [short[name.removesuffix(IDEAL)] + (IDEAL if name.endswith(IDEAL) else "") for name in names]
     keys = shown if len({*shown}) == len(names) else names

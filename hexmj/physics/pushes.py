@@ -1,0 +1,52 @@
+"""Pushes from the side: how strong, when, and for how many steps of the plan."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexmj.checks import numbers
+from hexmj.conditions import TimeScale
+from hexmj.errors import InputError
+from hexmj.timing import Stride
+
+PUSH_LASTS = 0.025
+"""How long a push lasts [s]."""
+
+
+def steps_pushed(time: TimeScale, stride: Stride) -> int:
+    """Steps of the plan that a push lasts."""
+    return max(1, round(PUSH_LASTS / time.seconds(stride)))
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A push from the side at the root, for each start; it lasts `PUSH_LASTS`, in whole steps of the plan."""
+
+    impulse: np.ndarray
+    """(start,) to the left [g mm/s]."""
+    time: np.ndarray
+    """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
+
+    def __post_init__(self) -> None:
+        for name, given in vars(self).items():
+            values = numbers(f"a push's {name}", given)
+            if not np.isfinite(values).all():
+                raise InputError(f"a push's {name} = {values[~np.isfinite(values)][0]}; expected a finite number")
+            object.__setattr__(self, name, values)
+
+    def check_within(self, duration: float, n_starts: int) -> None:
+        """Refuse a push that is not of so many starts, or does not begin while its start is watched [time units].
+
+        Raises:
+            InputError: it is of others, or begins before or after that.
+        """
+        for name, values in vars(self).items():
+            if values.shape != (n_starts,):
+                raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
+        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time >= duration))
+        if beside.any():
+            start = int(np.argmax(beside))
+            raise InputError(
+                f"the push of start {start} is at {self.time[start]:g} time units;"
+                f" expected 0 to below {duration:g}, where the walk ends"
+            )
