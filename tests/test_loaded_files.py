@@ -37,20 +37,25 @@ def test_what_a_file_tries_in_vain_does_not_stop_it(tmp_path: Path) -> None:
     assert importable(tmp_path / "mine.py").foo == 3
 
 
-@pytest.mark.parametrize("helper", ["helper.py", "helper/__init__.py"])
+@pytest.mark.parametrize("helper", ["helper.py", "helper/__init__.py", "helper/gains.py", "deep.py"])
 def test_a_helper_of_another_folder_is_refused_where_one_lies_beside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, helper: str
 ) -> None:
     """Two versions of a project in one program: Python knows one module of a name."""
     monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.delitem(sys.modules, "helper", raising=False)
+    names = "helper", "helper.gains", "deep", "by_v1", "by_v2"
+    for name in names:
+        monkeypatch.delitem(sys.modules, name, raising=False)
     for version in ("v1", "v2"):
         (file := tmp_path / version / helper).parent.mkdir(parents=True)
         file.write_text(f"GAIN = {version!r}")
-        finds = f"import sys\nsys.path.insert(0, {str(tmp_path / version)!r})\nfrom helper import GAIN\nimport json"
+        (tmp_path / version / f"by_{version}.py").write_text("from deep import GAIN")
+        of = {"helper/gains.py": "helper.gains", "deep.py": f"by_{version}"}.get(helper, "helper")
+        finds = f"import sys\nsys.path.insert(0, {str(tmp_path / version)!r})\nfrom {of} import GAIN\nimport json"
         (tmp_path / version / "mine.py").write_text(finds)
     assert importable(tmp_path / "v1" / "mine.py").GAIN == "v1"
-    with pytest.raises(InputError, match=r"v2.mine\.py imports helper, which is .*v1.* in this program, though .*v2"):
+    with pytest.raises(InputError, match=r"v2.*\.py imports .*, which is .*v1.* in this program, though .*v2"):
         importable(tmp_path / "v2" / "mine.py")
-    monkeypatch.delitem(sys.modules, "helper")
+    for name in names:
+        monkeypatch.delitem(sys.modules, name, raising=False)
     assert importable(tmp_path / "v2" / "mine.py").GAIN == "v2"

@@ -14,6 +14,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.user_code import reads
 from hexmj.user_code.loaded import importable
 
 READER = """
@@ -111,14 +112,15 @@ def test_what_reads_a_file_that_nothing_names_is_not_kept(
 
 
 @pytest.mark.parametrize(("file", "gain"), READS)
-def test_what_a_field_names_counts(computed: Callable[..., tuple[float, int]], file: str, gain: str) -> None:
+def test_what_a_field_names_counts(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, file: str, gain: str
+) -> None:
     named = f"one/{file}"
     assert [computed(gain, named), computed(gain, named)] == 2 * [(1.0, 1)]
     write_all("7.0")
-    sys.modules.pop(importable("reader.py").__name__)  # which may remember
+    monkeypatch.setattr(reads, "_AT_FIRST", {})  # as of another program
+    sys.modules.pop(importable("reader.py").__name__)
     assert [computed(gain, named), computed(gain, named)] == 2 * [(7.0, 2)]
-    write_all("1.0")
-    assert computed(gain, named) == (1.0, 2)
     assert len(list(Path("kept").glob("*.nc"))) == 2
 
 
@@ -131,11 +133,39 @@ def test_what_it_remembers_of_an_earlier_call_is_not_forgotten(computed: Callabl
         assert computed(gain) == (1.0, 2)
 
 
-def test_a_file_that_is_missing_counts_too(computed: Callable[..., tuple[float, int]]) -> None:
+def test_what_it_remembers_of_a_file_that_a_field_names_is_not_kept_once_that_has_changed(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = 'remembered(f"{at}/gain")'
+    assert computed(gain, "one/gain") == (1.0, 1)
+    Path("one/gain").write_text("7.0")
+    with pytest.warns(UserWarning, match=r"^reader is not kept: .*one.gain has changed since it was opened first"):
+        assert computed(gain, "one/gain") == (1.0, 2)
+    assert len(list(Path("kept").glob("*.nc"))) == 1
+
+
+@pytest.mark.parametrize("name", ["libm.so.6", "libc.so.6"])
+def test_a_library_that_the_system_finds_does_not_count(computed: Callable[..., tuple[float, int]], name: str) -> None:
+    gain = f"__import__('ctypes').CDLL({name!r}) and 1.0"
+    assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+
+
+@pytest.mark.parametrize("folder", [".worktrees", ".gains"])
+def test_what_is_hidden_counts(computed: Callable[..., tuple[float, int]], folder: str) -> None:
+    Path(folder).mkdir()
+    Path(folder, "gain").write_text("1.0")
+    with pytest.warns(UserWarning, match="not kept"):
+        assert computed(f"float(Path('{folder}/gain').read_text())") == (1.0, 1)
+
+
+def test_a_file_that_is_missing_counts_too(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.warns(UserWarning, match="not kept: its code opens or runs .*new, of"):
         assert computed("tried('new')") == (0.0, 1)
     assert [computed("tried('new')", "new"), computed("tried('new')", "new")] == 2 * [(0.0, 2)]
     Path("new").write_text("5.0")
+    monkeypatch.setattr(reads, "_AT_FIRST", {})  # as of another program
     assert computed("tried('new')", "new") == (5.0, 3)
 
 

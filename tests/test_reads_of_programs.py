@@ -66,10 +66,11 @@ def test_however_a_modules_folder_is_written(tmp_path: Path, folder: str) -> Non
     assert (gain, kept) == (2.0, 0) and "not kept" in complaint
 
 
-def test_what_a_thread_opens_at_import_is_noticed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("load", ["load", "__import__('numpy').loadtxt"])
+def test_what_a_thread_opens_at_import_is_noticed(tmp_path: Path, load: str) -> None:
     (tmp_path / "gain").write_text("2.0")
     threads = "from concurrent.futures import ThreadPoolExecutor as Threads\n"
-    mine = f"{threads}{LOADS}".replace("load('ga' + 'in')", "Threads(1).submit(load, 'gain').result()")
+    mine = f"{threads}{LOADS}".replace("load('ga' + 'in')", f"float(Threads(1).submit({load}, 'gain').result())")
     gain, kept, complaint = sweep(tmp_path, mine=mine, script=SCRIPT)
     assert (gain, kept) == (2.0, 0) and "not kept" in complaint
 
@@ -81,6 +82,15 @@ def test_what_code_remembers_of_an_earlier_walk_is_noticed(tmp_path: Path) -> No
     mine = f"{remembers}def cell():\n    return xr.Dataset({{'gain': load('gain')}})\n"
     script = f"import hexmj\n{NEW}from mine import cell\n{SWEEPS}".replace("print", "run([Cell('a', cell, {})]); print")
     gain, kept, complaint = sweep(tmp_path, mine=mine, script=script)
+    assert (gain, kept) == (2.0, 0) and "not kept" in complaint
+
+
+def test_what_a_helper_remembers_of_a_scripts_own_call_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "gain").write_text("2.0")
+    helper = f"{NEW}from functools import cache\n@cache\n{READS}"
+    mine = f"{NEW}import helper\ndef cell():\n    return xr.Dataset({{'gain': helper.load('gain')}})\n"
+    script = f"import hexmj, helper\n{NEW}from mine import cell\nhelper.load('gain')\n{SWEEPS}"
+    gain, kept, complaint = sweep(tmp_path, helper=helper, mine=mine, script=script)
     assert (gain, kept) == (2.0, 0) and "not kept" in complaint
 
 

@@ -41,8 +41,9 @@ def first_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> n
 
 def tells_losses(plan: Plan) -> TypeGuard[FastLosses]:
     """Whether a plan tells first losses of its own: not those of one that it wraps, or whose class it changes."""
-    if "first_losses" in getattr(plan, "__dict__", {}):
-        return True
+    own = getattr(plan, "__dict__", {})
+    if "first_losses" in own or "advance" in own:
+        return "first_losses" in own
     tells, plans = (
         next((one for one in type(plan).__mro__ if name in vars(one)), None) for name in ("first_losses", "advance")
     )

@@ -15,7 +15,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.sweeps.code import code, files
 from hexmj.sweeps.plain import classes, label, named_files, plain
-from hexmj.user_code.reads import untold
+from hexmj.user_code.reads import changed, untold
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -76,13 +76,20 @@ class Cell:
             sources, data = files(frozenset(self._modules()))
         except InputError:  # it has no source, so that it is named by nothing
             return ""
-        told = (*data, *named_files([*self.settings.values(), self._owner]))
-        if not sources or not (found := untold(opened, sources, told)):
+        told = [*data, *named_files([*self.settings.values(), self._owner])]
+        if not sources:
             return ""
-        return (
-            f"{self.name} is not kept: its code opens or runs {found[0]}, of which an edit would not be noticed;"
-            " expected a field that names it, or an import"
-        )
+        if found := untold(opened, sources, told):
+            return (
+                f"{self.name} is not kept: its code opens or runs {found[0]}, of which an edit would not be noticed;"
+                " expected a field that names it, or an import"
+            )
+        if found := changed(told):
+            return (
+                f"{self.name} is not kept: {found[0]} has changed since it was opened first, and code may remember it;"
+                " start the program again"
+            )
+        return ""
 
     def _modules(self) -> list[str]:
         return [one.__module__ for one in (self.function, *classes([self.settings, self._owner]))]

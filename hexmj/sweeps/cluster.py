@@ -1,6 +1,5 @@
 """Cells on a cluster: the workers of a Dask scheduler as an executor, whatever becomes of either."""
 
-import asyncio
 import logging
 import sys
 import warnings
@@ -55,6 +54,8 @@ def has_given_up(executor: Executor) -> bool:
 
 def _found(address: str) -> dict[str, Any]:
     """What a scheduler tells of itself; one that does not answer is not waited for, as a client would."""
+    import asyncio
+
     expected = "a scheduler's, such as tcp://127.0.0.1:8786"
     try:
         told = asyncio.run(asyncio.wait_for(_identity(address), PATIENCE))

@@ -9,6 +9,7 @@ import ast
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.abc import MetaPathFinder, SourceLoader
 from importlib.machinery import ModuleSpec
@@ -66,19 +67,38 @@ class _Source(SourceLoader):
 
 
 def _check_helpers(file: Path, source: bytes) -> None:
-    """Refuse a file that has imported a user's module of another folder, though one of that name lies beside it: Python
-    knows a single module by each name, and took the one that it met first."""
-    nodes = [*ast.walk(parsed(source))]
-    names = [alias.name for one in nodes if isinstance(one, ast.Import) for alias in one.names]
-    names += [one.module for one in nodes if isinstance(one, ast.ImportFrom) and one.module and not one.level]
-    for name in dict.fromkeys(name.partition(".")[0] for name in names):
-        taken = getattr(sys.modules.get(name), "__file__", None)
-        for beside in (file.with_name(f"{name}.py"), file.with_name(name) / "__init__.py"):
-            if taken and is_users(taken) and beside.is_file() and not beside.samefile(taken):
-                raise InputError(
-                    f"{file} imports {name}, which is {taken} in this program, though {beside} lies beside it; expected"
-                    " one module of a name: rename one, or run them one after the other"
-                )
+    """Refuse a file that imports a user's module of another folder, though one of that name lies beside it, and such
+    helpers of it: Python knows one module by each name, and takes the one that it met first."""
+    waiting, seen = [(file, source)], {file}
+    while waiting:
+        file, source = waiting.pop()
+        for name in _imported(source):
+            taken = Path(getattr(sys.modules.get(name), "__file__", None) or os.devnull)
+            if not taken.is_file() or not is_users(str(taken)):
+                continue
+            stem = file.parent.joinpath(*name.split("."))
+            for beside in (stem.with_name(f"{stem.name}.py"), stem / "__init__.py"):
+                if beside.is_file() and not beside.samefile(taken):
+                    raise InputError(
+                        f"{file} imports {name}, which is {taken} in this program, though {beside} lies beside it;"
+                        " expected one module of a name: rename one, or run them one after the other"
+                    )
+            if taken not in seen:
+                seen.add(taken)
+                waiting.append((taken, taken.read_bytes()))
+
+
+def _imported(source: bytes) -> list[str]:
+    """Names of the modules that a source may import, with those that they lie in."""
+    names = list[str]()
+    with suppress(SyntaxError, ValueError):  # of what is no Python
+        for one in ast.walk(parsed(source)):
+            if isinstance(one, ast.Import):
+                names += [alias.name for alias in one.names]
+            elif isinstance(one, ast.ImportFrom) and one.module and not one.level:
+                names += [one.module, *(f"{one.module}.{alias.name}" for alias in one.names)]
+    parts = [name.split(".") for name in names]
+    return list(dict.fromkeys(".".join(part[:n]) for part in parts for n in range(1, len(part) + 1)))
 
 
 class _Finder(MetaPathFinder):

@@ -31,10 +31,14 @@ _PATH = {"open": 0, "exec": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlo
 _URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
 
-_NO_DATA = re.compile(r"(^|[/\\])(\.[^./\\]|__pycache__([/\\]|$))|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$")
-"""In a path from the current folder: what is hidden, what Python and numba keep of their own, kept cells and values."""
+_NO_DATA = re.compile(
+    r"[/\\](__pycache__|[^/\\]*\.(egg|dist)-info|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv)|\.part-[^/\\]*)([/\\]|$)"
+    r"|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
+)
+"""In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
-_SYSTEMS = ("/dev/", "/etc/", "/proc/", "/sys/", "/usr/lib/", "/usr/share/")
+_SYSTEMS = "/etc/", "/proc/", "/sys/", "/usr/lib/", "/usr/share/"
+_SYSTEMS += tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 
 _OURS = f"{Path(__file__).parents[1]}{os.sep}"
 
@@ -42,13 +46,16 @@ _READS_SOURCES = "tokenize.py", "<frozen importlib._bootstrap_external>"
 """Ends of the names of the code that reads sources to import them or to show their lines."""
 
 _OPENED: dict[str, set[str]] = {}
-"""Source -> what was opened or ran while it was imported or this package called it, if no cell told it."""
+"""Source -> what was opened or ran while it was imported or called, if no cell told it."""
 
 _COMPUTING: dict[int, set[str]] = {}
 """Thread that computes a cell -> what was opened or ran meanwhile."""
 
 _WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
+
+_AT_FIRST: dict[str, tuple[int, ...]] = {}
+"""File -> its size and times as anybody but this package opened it first."""
 
 
 @contextmanager
@@ -81,6 +88,12 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
     return sorted(found)
 
 
+def changed(told: Iterable[Path]) -> list[str]:
+    """Those of some files that have changed since they were first opened, as which the code may remember them."""
+    files = {os.path.abspath(file) for file in told}
+    return sorted(file for file in files & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
+
+
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event not in _PATH:
         return
@@ -90,28 +103,42 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             path = path.co_filename if path.co_name == "<module>" else None
         if not isinstance(path, str | bytes | os.PathLike) or os.fsdecode(path).startswith("<"):
             return  # an open file, or a code of no file
+        if event == "ctypes.dlopen" and os.sep not in os.fsdecode(path):
+            return  # the system's linker looks for it
         file = os.path.abspath(_URI.sub(r"\1", os.fsdecode(path)))
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            _note(file, event == "os.rename" or (event == "open" and _only_writes(*arguments[1:])))
+            _note(file, event == "os.rename" or (event == "open" and _only_writes(*arguments[1:])), event == "open")
 
 
-def _note(file: str, written: bool) -> None:
+def _note(file: str, written: bool, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     if written:
         _WRITTEN.update([file] if _COMPUTING else [])
-    elif by is not None:
+        return
+    if read and not opener.f_code.co_filename.startswith(_OURS):
+        _AT_FIRST.setdefault(file, _stamp(file))
+    if by is not None:
         by.add(file)
     elif not _COMPUTING:
-        for one in _openers(opener):
+        main = sys._current_frames().get(threading.main_thread().ident or 0)
+        for one in _openers(opener, file) or (_openers(main, file) if main is not opener else ()):
             _OPENED.setdefault(one, set()).add(file)
     elif not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
         for opened in _COMPUTING.values():  # whose thread it is nobody knows
             opened.add(file)
 
 
+def _stamp(file: str) -> tuple[int, ...]:
+    """What tells whether a file has changed; nothing of one that is not there."""
+    with suppress(OSError):
+        told = os.stat(file)
+        return told.st_size, told.st_mtime_ns, told.st_ino
+    return ()
+
+
 def _is_data(file: str) -> bool:
-    """Whether a file may be data of a user's own, or a module."""
-    return is_users(file) and not file.startswith(_SYSTEMS) and not _NO_DATA.search(os.path.relpath(file))
+    """Whether a path may be one of data of a user's own, or of a module."""
+    return is_users(file) and not (file.startswith(_SYSTEMS) or _NO_DATA.search(file) or os.path.isdir(file))
 
 
 def _reads_a_source(file: str, by: FrameType) -> bool:
@@ -125,17 +152,23 @@ def _only_writes(mode: str | None, flags: int) -> bool:
     return flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY or bool(flags & (os.O_TRUNC | os.O_EXCL))
 
 
-def _openers(frame: FrameType | None) -> set[str]:
-    """The module that runs at the moment, or else the user's code that this package, or a thread, has called."""
-    called = set[str]()
-    while frame and not (called and frame.f_code.co_filename.startswith(_OURS)):
-        file = frame.f_code.co_filename
-        if frame.f_code.co_name == "<module>":
-            return {plain(os.path.abspath(file))}
-        if is_users(os.path.abspath(file)):
-            called.add(plain(os.path.abspath(file)))
+def _openers(frame: FrameType | None, file: str) -> set[str]:
+    """The user's code that opens a file, up to the module that runs at the moment, or to this package's call.  Where
+    this package opens it for them, that module alone, and no script for a controller that it loads."""
+    found, ours = set[str](), False
+    while frame:
+        by = frame.f_code.co_filename
+        if by.startswith(_OURS):
+            if found:
+                return found
+            ours = True
+        elif frame.f_code.co_name == "<module>":
+            loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith((".py", ".toml"))
+            return set() if loads else {plain(os.path.abspath(by)), *found}
+        elif not ours and is_users(os.path.abspath(by)):
+            found.add(plain(os.path.abspath(by)))
         frame = frame.f_back
-    return called
+    return found
 
 
 def _note_before() -> None:

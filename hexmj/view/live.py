@@ -153,7 +153,8 @@ class LiveWalk:
         Raises:
             InputError: the insect cannot walk so; the walk goes on as it was.
         """
-        start, conditions = self.start if start is None else start, conditions or self.conditions
+        start = self.start if start is None else numbers("start", in_order(start))
+        conditions = conditions or self.conditions
         settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
         plan = Steered(self.controller, settled.starts, self.velocity, self.stride)
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
@@ -181,14 +182,18 @@ class LiveWalk:
         wanted: float = typed("velocity", self.velocity if velocity is None else velocity, float)
         controller = controller or self.controller
         begin(controller, self.start[np.newaxis], wanted, self.stride, threads=1)  # refuses what makes no sense
-        self.velocity, self.controller = wanted, controller
+        before, self.velocity, self.controller = (self.velocity, self.controller), wanted, controller
         if self._plan.hand_over(controller, wanted):
             return True
-        self.begin()
+        try:
+            self.begin()
+        except Exception:
+            self.velocity, self.controller = before
+            raise
         return False
 
     def push(self, impulse: float) -> None:
-        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two.
+        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two, in place of an earlier push.
 
         Args:
             impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
