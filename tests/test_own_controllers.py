@@ -17,6 +17,7 @@ from hexmj.cli import options
 from hexmj.controllers import Sensed, Step, stepwise
 from hexmj.controllers.conformance import check_controller
 from hexmj.gaits import CYCLES, limit_gait
+from hexmj.measures.kinematic import KinematicFlss
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
@@ -330,3 +331,27 @@ def test_a_command_uses_a_controller_as_it_was_loaded_whatever_becomes_of_its_fi
     mine.write_text("def half(")
     assert controlled.controllers([name])[first.name] is first
     assert entrants((name,), options.loaded)["tripod"].controller is first
+
+
+def test_a_file_that_a_controller_names_may_not_change_while_a_command_is_at_work(tmp_path, monkeypatch, run):
+    """A verdict, a recording or a film would be of another one than the numbers."""
+    monkeypatch.chdir(tmp_path)
+    text = (EXAMPLES / "tripod.py").read_text()
+    Path("mine.py").write_text(re.sub(r"( +)name: str", r"\1gains: str = 'gains.txt'\n\1name: str", text, count=1))
+    Path("gains.txt").write_text("1")
+    result = "hexmj.measures.kinematic.KinematicFlss.result"
+    frequencies = KinematicFlss.result
+    command = ("flss", "--model", "mine.py:Tripod", "--velocities", 0.5, "--starts", 5, "--window", 5, "--out", "out")
+    assert run(*command)[0] == 0
+
+    def edited(self, data):
+        Path("gains.txt").write_text("2")
+        return frequencies(self, data)
+
+    monkeypatch.setattr(result, edited)
+    code, _, said = run(*command)
+    assert code == 2 and "gains of" in said and "has changed while it was in use; start again" in said
+    options.loaded("mine.py:Tripod")
+    Path("gains.txt").write_text("3")
+    with pytest.raises(hexmj.InputError, match=r"a file that mine\.py:Tripod names has changed while the command was"):
+        options.check_loaded()

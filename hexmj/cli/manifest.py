@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.cli import words
+from hexmj.cli.options import check_loaded
 from hexmj.errors import InputError
 from hexmj.storage.files import WRITTEN, digest, digest_of, read_text
 from hexmj.storage.literal import literal
@@ -74,8 +75,9 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         path: of the manifest.
 
     Raises:
-        InputError: the code was edited meanwhile, or a file cannot be written or read.
+        InputError: the code, or what a controller names, was edited meanwhile, or a file cannot be written or read.
     """
+    check_loaded()
     typed = words.command()
     own = {str(file): one for file, one in words.own().items()}
     made = code(frozenset({type(command).__module__, *_modules(typed)}))

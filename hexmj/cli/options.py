@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
 
@@ -26,6 +26,7 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.legs import GEOMETRIES, Geometry
 from hexmj.process.signals import STOPS, of_stop, stops_wait, unheard_by_children
+from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -38,8 +39,9 @@ CONTROLLER = (
 MOST_PROCESSES = 1000
 """More than any machine has cores."""
 
-LOADED: dict[str, Controller] = {}
-"""Controllers as the command has loaded them: a file that is edited while it runs is not run again."""
+LOADED: dict[str, tuple[Controller, Any]] = {}
+"""Controllers as the command has loaded them, and their settings then: a file that is edited while it runs is not run
+again."""
 
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
 
@@ -49,8 +51,25 @@ def loaded(name: str) -> Controller:
     from hexmj.controllers.named import load_controller
 
     if name not in LOADED:
-        LOADED[name] = load_controller(name)
-    return LOADED[name]
+        LOADED[name] = (found := load_controller(name)), _settings(found)
+    return LOADED[name][0]
+
+
+def _settings(controller: Controller) -> Any:
+    """A controller's settings as plain data; none where they are no such."""
+    with suppress(InputError):
+        return plain(controller)
+
+
+def check_loaded() -> None:
+    """Refuse that a file has changed, while the command was at work, which a field of a controller names.
+
+    Raises:
+        InputError: it has.
+    """
+    for name, (controller, settings) in LOADED.items():
+        if _settings(controller) != settings:
+            raise InputError(f"a file that {name} names has changed while the command was at work; start it again")
 
 
 @dataclass(frozen=True)
@@ -143,7 +162,7 @@ class Controlled:
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.readings import in_words
 
-        found = LOADED.get(name)
+        found, _ = LOADED.get(name, (None, None))
         if not isinstance(found, Cruse1998):
             return ""
         rules = {"order": found.order, "reading": in_words(found.reading)}

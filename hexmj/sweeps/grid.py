@@ -55,7 +55,12 @@ class Execution(TypedDict, total=False):
 
 def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """The result of a study; arguments and errors as of `finish`."""
-    return study.result(run(study.cells(), folder, **how))
+    cells = study.cells()
+    before = [cell.settings_now() for cell in cells]
+    result = study.result(run(cells, folder, **how))
+    for cell, settings in zip(cells, before, strict=True):
+        check_unchanged(cell, settings, cell.settings_now())
+    return result
 
 
 def run(cells: Sequence[Cell], folder: Path | None = None, **how: Unpack[Execution]) -> list["xr.Dataset"]:
