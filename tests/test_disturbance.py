@@ -319,6 +319,25 @@ def test_some_starts_alone_go_as_among_all(kind):
     assert alone.identical(every.isel(start=[2, 0]))
 
 
+@dataclass(frozen=True)
+class HandsOn:
+    """Plans in a way of its own, and hands on all else that it is asked for."""
+
+    inner: Any = LDVS
+    name: str = "hands on"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        return UNCOORDINATED.begin(*given, **how)
+
+
+def test_a_controller_that_hands_on_begin_at_speed_of_another_is_not_disturbed_as_that():
+    with pytest.raises(InputError, match="a disturbance of hands on; expected a controller whose plans can go on from"):
+        begin(Disturbed(HandsOn(), disturbance("halt")), STABLE.starts, V, STRIDE)  # pyright: ignore[reportArgumentType]
+
+
 def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():
     frozen: Any = dataclass(frozen=True)(type("Rigid", (), {"name": "rigid", "begin": LDVS.begin}))()
     with pytest.raises(InputError, match="a disturbance of rigid; expected a controller whose plans can go on"):

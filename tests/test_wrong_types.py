@@ -23,6 +23,8 @@ from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
 from hexmj.legs import LEGS
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
+from hexmj.paper.protocol import FULL
+from hexmj.paper.reproduce import measure
 from hexmj.physics.settling import settle
 from hexmj.search import problems, stages
 from hexmj.walks import one_start, part_of
@@ -276,6 +278,12 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: save(extra=None), "NetCDF cannot hold this: "),
     (lambda: save(extra={"a": 1}), "NetCDF cannot hold this: "),
     (lambda: of_centred_lines(), "the plan's lines are Geometry("),
+    (lambda: hexmj.physical_flss({"u": LDVS}, 0.5), "controller = {'u': "),  # pyright: ignore
+    (lambda: replace(FULL, looks="step"), "looks = 'step'; valid names: steps, periods"),
+    (lambda: replace(FULL, stride=0.1), "stride = 0.1; expected a Stride"),
+    (lambda: replace(FULL, velocities=()), "velocities = (); expected a list of at least one"),
+    (lambda: replace(FULL, samples=0), "samples = 0; expected a whole number of at least 1"),
+    (lambda: measure("typo", FULL), "measurement 'typo'; valid names: "),
 ]
 
 

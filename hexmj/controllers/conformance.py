@@ -21,9 +21,9 @@ from hexmj.controllers.protocol import (
     Plan,
     ReadingPlan,
     Sensed,
-    SteerableController,
     check_controller_type,
     claims_mirrored,
+    is_steerable,
     settings_of,
 )
 from hexmj.errors import InputError
@@ -249,7 +249,7 @@ def _fast_losses(trial: Trial) -> None:
 
 
 def _at_speed(trial: Trial) -> None:
-    if isinstance(trial.controller, SteerableController):
+    if is_steerable(trial.controller):
         with said("a controller, begin_at_speed"):
             plan = trial.controller.begin_at_speed(trial.starts, trial.velocity, trial.stride, trial.acceleration, 1)
         usual = replace(trial, acceleration=None).walk

@@ -6,7 +6,7 @@ what a robot would know.
 """
 
 from dataclasses import dataclass, is_dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 
@@ -168,6 +168,11 @@ class SteerableController(Controller, Protocol):
     ) -> SteerablePlan:
         """A plan that walks at its final velocity at once; an acceleration takes place only after `slow_down`."""
         ...
+
+
+def is_steerable(controller: object) -> TypeGuard[SteerableController]:
+    """Whether a controller is a `SteerableController` itself: one that hands on `begin_at_speed` of another is not."""
+    return isinstance(controller, SteerableController) and hasattr(type(controller), "begin_at_speed")
 
 
 def check_controller_type(controller: object) -> None:

@@ -166,6 +166,7 @@ def physical_flss(
     """
     from hexmj.measures.frequency import frequency_table, losses_by_sample
 
+    check_controller_type(controller)
     result = compare(
         controller, velocities, n_starts=n_starts, window=window, seed=seed, conditions=conditions, stride=stride,
         acceleration=acceleration, folder=folder, **how,

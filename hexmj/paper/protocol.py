@@ -6,11 +6,13 @@ A measurement is taken velocity by velocity.
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from hexmj.checks import check_types, whole
 from hexmj.controllers.cruse1998 import PRESETS, READINGS, Cruse1998, Order, Reading
+from hexmj.errors import InputError
 from hexmj.paper.found_sets import found_set
 from hexmj.paper.measurements import Looks, footfalls, limit_regimes, losses
 from hexmj.paper.obstacles import Answer, losses_after
-from hexmj.starts import SAMPLE
+from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweeps import Cell
 from hexmj.timing import WINDOWS, Acceleration, Stride
 
@@ -60,6 +62,13 @@ class Protocol:
     """When it is looked whether a walk is stable (Eq. 7)."""
     margin: float = 0.0
     """By how much S is narrower than ]PEP_0, AEP_0[ at either end [mm]."""
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        for name in ("velocities", "gait_velocities", "footfall_velocities", "obstacle_velocities"):
+            checked_list(getattr(self, name))
+        for name in ("samples", "sample", "gait_starts", "obstacle_starts"):
+            whole(name, getattr(self, name), 1, MOST_STARTS)
 
     def network(self, name: str, window: str, velocity: float) -> Cruse1998 | None:
         """The network of a measurement at a velocity, as this protocol reads it.
@@ -230,7 +239,13 @@ SECONDS = {
 
 
 def cells(name: str, protocol: Protocol) -> list[Cell]:
-    """One of `MEASUREMENTS`, a cell for each velocity."""
+    """One of `MEASUREMENTS`, a cell for each velocity.
+
+    Raises:
+        InputError: no such measurement.
+    """
+    if name not in MEASUREMENTS:
+        raise InputError(f"measurement {name!r:.80}; valid names: {', '.join(MEASUREMENTS)}")
     measurement = MEASUREMENTS[name]
     velocities = measurement.velocities(protocol)
     work = SECONDS.get(name, 1.0) / len(velocities)

@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from hexmj.checks import path_of
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError, check_distinct
 from hexmj.paper.claims import CLAIMS, Claim
@@ -49,7 +50,7 @@ def reproduce(
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
     check_distinct("readings beside", ["printed", *beside])
     readings = {name: named_reading(name) for name in beside}
-    results_folder(out, TABLES)
+    results_folder(out := path_of(out), TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
     measured = dict(_measurements(_needed(claims, figures=not only), protocol, out / KEPT, how))
     rows = [judge(claim, measured) for claim in claims]

@@ -17,8 +17,8 @@ from hexmj.controllers.protocol import (
     Plan,
     ReadingPlan,
     Sensed,
-    SteerableController,
     SteerablePlan,
+    is_steerable,
 )
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
@@ -104,7 +104,7 @@ class Steered:
         Returns:
             Whether both the last plan and the controller can do so; else nothing has changed.
         """
-        if not (isinstance(self._plan, SteerablePlan) and isinstance(controller, SteerableController)):
+        if not (isinstance(self._plan, SteerablePlan) and is_steerable(controller)):
             return False
         tips, standing = self._plan.tips, self._plan.standing
         plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)

@@ -4,7 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.controllers.protocol import ReadingPlan, Sensed, SteerableController, SteerablePlan, check_controller_type
+from hexmj.controllers.protocol import (
+    ReadingPlan,
+    Sensed,
+    SteerableController,
+    SteerablePlan,
+    check_controller_type,
+    is_steerable,
+)
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance
 from hexmj.studies.disturbance.strategies import Postures, Rest, reorganise, stand
@@ -65,7 +72,7 @@ def check_steerable(controller: object) -> None:
         InputError: it has no `begin_at_speed`.
     """
     check_controller_type(controller)
-    if not isinstance(controller, SteerableController):
+    if not is_steerable(controller):
         raise InputError(
             f"a disturbance of {getattr(controller, 'name', '')}; expected a controller whose plans can go on from"
             " other legs, with begin_at_speed, as the 1998 network has"

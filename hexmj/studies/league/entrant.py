@@ -7,7 +7,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.controllers.asking import begin, said
-from hexmj.controllers.protocol import Controller, ReadingPlan, SteerableController, check_controller_type
+from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type, is_steerable
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
@@ -65,4 +65,4 @@ class Entrant:
     @property
     def steerable(self) -> bool:
         """Whether it can be halted, and a leg of it stopped."""
-        return isinstance(self.controller, SteerableController)
+        return is_steerable(self.controller)
