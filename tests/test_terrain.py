@@ -34,7 +34,7 @@ from hexmj.replay.film.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
 from hexmj.storage.attributes import settings
 from hexmj.studies.terrain.figure import terrain_figure
-from hexmj.studies.terrain.study import Terrain, reach
+from hexmj.studies.terrain.study import FARTHER, Terrain, reach
 from hexmj.sweeps import Cell, conduct
 
 GROUNDS = {
@@ -213,6 +213,11 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
         ({"n_starts": 0}, "starts = 0; expected a whole number"),
         ({"conditions": Conditions.of(ground="step")}, "ground = step; expected grounds"),
         ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected grasps"),
+        (
+            {"grounds": ("gap",), "conditions": FARTHER.but(ground_length=7.0)},
+            "ground_length = 7.0; only hurdle has it",
+        ),
+        ({"grounds": ("step",), "conditions": FARTHER.but(ground_seed=7)}, "ground_seed = 7; only rough has it"),
     ],
 )
 def test_what_makes_no_sense_is_refused(wrong, said):

@@ -1,13 +1,14 @@
 """What a figure's title tells of a result: who walked, from how many starts, how long, under which conditions."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from hexmj.conditions import unusual
 from hexmj.errors import InputError
 from hexmj.storage.attributes import settings
 from hexmj.storage.literal import in_figure
+from hexmj.timing import Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +42,9 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 WALKS = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
 """What is told of the walks."""
 
+STRIDE = {"aep0": "AEP$_0$ = {:g} mm", "pep0": "PEP$_0$ = {:g} mm", "pep_min": "PEP_min = {:g} mm", "dt": "dt = {:g}"}
+"""Field of a stride -> how it is told."""
+
 NAMED = "controller", "entrant"
 """Axes of controllers by name."""
 
@@ -49,14 +53,16 @@ FEW = 3
 
 
 def caption(result: "xr.Dataset") -> str:
-    """One line for the title of a figure: all that was chosen, and of the conditions V_p and what is not as usual.
+    """One line for the title of a figure: who walked, and of stride and conditions V_p and what is not as usual.
 
     Raises:
         InputError: a controller that the result's settings do not tell of.
     """
     told = settings(result)
     told["controllers"] = _shown(result, told)
-    return "; ".join(filter(None, [controllers(told), *_walks(told), conditions(told)]))
+    return "; ".join(
+        filter(None, [controllers(told), *_walks(told), _stride(told.get("stride") or {}), conditions(told)])
+    )
 
 
 def _shown(result: "xr.Dataset", told: Mapping[str, Any]) -> dict[str, Any]:
@@ -104,11 +110,21 @@ def conditions(told: dict[str, Any]) -> str:
     return ", ".join(words)
 
 
+def _stride(told: Mapping[str, Any]) -> str:
+    """What is not as usual of a stride's settings."""
+    usual = asdict(Stride())
+    words = [word.format(told[name]) for name, word in STRIDE.items() if told.get(name, usual[name]) != usual[name]]
+    lines = {name: [*values] for name, values in usual["geometry"].items()}
+    other = told.get("geometry", lines) != lines
+    return ", ".join(word.replace(" ", NO_BREAK) for word in [*words, *(["other lines of the tips"] if other else [])])
+
+
 def _walks(told: dict[str, Any]) -> list[str]:
     """Starts, window, seed and acceleration, as far as a result has them."""
     window = told.get("window")
     own = {"window": f"of {window:g} time units"} if isinstance(window, float) else {}
     found = [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
+    found = ["1 start" if word == "1 starts" else word for word in found]
     if acceleration := told.get("acceleration"):
         found.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
     return found

@@ -152,9 +152,9 @@ class Insects:
         if self._push:
             stride, seconds = self.settled.stride, self.settled.conditions.time.seconds(self.settled.stride)
             first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions.time, stride)
-            begin = np.floor(self._push.time / stride.dt + 1e-9) // lasts * lasts
+            begin = self._push.begins(stride)
             within = np.minimum(begin + lasts, first + steps) - np.maximum(begin, first)
-            self._batch.push[:] = np.maximum(within, 0.0) / lasts * self._push.impulse / (steps * seconds)
+            self._batch.push[:] = np.maximum(within, 0) / lasts * self._push.impulse / (steps * seconds)
 
 
 def _joined(values: list[np.ndarray]) -> np.ndarray:

@@ -14,7 +14,7 @@ from hexmj.controllers.asking import tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan
-from hexmj.physics.pushes import Push, steps_pushed
+from hexmj.physics.pushes import Push
 from hexmj.physics.settling import Settled
 from hexmj.process.progress import Progress
 from hexmj.timing import steps_within
@@ -49,8 +49,8 @@ def drive(
     """
     if push:
         push.check_within(duration, len(settled.starts))
-    lasts = steps_pushed(settled.conditions.time, settled.stride) if push else 0
-    insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration, lasts)
+    divisor = push.divisor(settled.conditions.time, settled.stride) if push else 0
+    insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
     total = int(steps_within(duration, settled.stride)) * settled.substeps
     told, walking = 0.0, np.arange(len(settled.starts))
     for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):

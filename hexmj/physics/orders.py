@@ -40,10 +40,10 @@ class Orders:
         return replace(self, **few)
 
 
-def steps_in_chunk(substeps: int, push: int = 0) -> int:
-    """Steps of a plan in a chunk, of so many physics steps each; of a push of so many steps a whole part."""
+def steps_in_chunk(substeps: int, multiple: int = 0) -> int:
+    """Steps of a plan in a chunk, of so many physics steps each, of which `multiple` is a whole number."""
     most = max(1, CHUNK // substeps)
-    return next(steps for steps in range(most, 0, -1) if push % steps == 0)
+    return next(steps for steps in range(most, 0, -1) if multiple % steps == 0)
 
 
 class OrdersFromPlan:
@@ -52,14 +52,14 @@ class OrdersFromPlan:
     tips: np.ndarray
     """(start, leg, 3) where the tips shall be now, in the root frame [mm]."""
 
-    def __init__(self, settled: Settled, plan: Plan, duration: float, push: int = 0) -> None:
+    def __init__(self, settled: Settled, plan: Plan, duration: float, multiple: int = 0) -> None:
         """All legs hold their starts.
 
         Args:
             settled: the starts.
             plan: of them, at time 0.
             duration: at which it ends [time units].
-            push: steps that a push lasts, which chunks shall not cut.
+            multiple: steps that are a whole number of chunks, see `Push.divisor`.
 
         Raises:
             InputError: a plan of other starts, with another stride, not at time 0, or made for other conditions.
@@ -67,7 +67,7 @@ class OrdersFromPlan:
         check_plan(plan, settled.starts, settled.stride)
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._steps = plan, settled, int(steps_within(duration, settled.stride))
-        self._chunk = steps_in_chunk(settled.substeps, push)
+        self._chunk = steps_in_chunk(settled.substeps, multiple)
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)

@@ -1,6 +1,7 @@
 """Pushes from the side: how strong, when, and for how many steps of the plan."""
 
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
 
@@ -20,12 +21,12 @@ def steps_pushed(time: TimeScale, stride: Stride) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A push from the side at the root, for each start; it lasts `PUSH_LASTS`, in whole steps of the plan."""
+    """A push from the side at the root, for each start; it lasts `PUSH_LASTS`, to the nearest step of the plan."""
 
     impulse: np.ndarray
     """(start,) to the left [g mm/s]."""
     time: np.ndarray
-    """(start,) when it begins, rounded down to a multiple of how long it lasts [time units]."""
+    """(start,) when it begins, rounded down to a step of the plan [time units]."""
 
     def __post_init__(self) -> None:
         for name, given in vars(self).items():
@@ -33,6 +34,14 @@ class Push:
             if not np.isfinite(values).all():
                 raise InputError(f"a push's {name} = {values[~np.isfinite(values)][0]}; expected a finite number")
             object.__setattr__(self, name, values)
+
+    def begins(self, stride: Stride) -> np.ndarray:
+        """(start,) steps of the plan before it."""
+        return np.floor(self.time / stride.dt + 1e-9).astype(int)
+
+    def divisor(self, time: TimeScale, stride: Stride) -> int:
+        """The most steps of which beginnings and ends are multiples: chunks of these cut no push."""
+        return gcd(steps_pushed(time, stride), *self.begins(stride)[self.impulse != 0.0].tolist())
 
     def check_within(self, duration: float, n_starts: int) -> None:
         """Refuse a push that is not of so many starts, or does not begin while its start is watched [time units].

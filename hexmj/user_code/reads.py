@@ -153,8 +153,8 @@ def _only_writes(mode: str | None, flags: int) -> bool:
 
 
 def _openers(frame: FrameType | None, file: str) -> set[str]:
-    """The user's code that opens a file, up to the module that runs at the moment, or to this package's call.  Where
-    this package opens it for them, that module alone, and no script for a controller that it loads."""
+    """The user's function that opens a file, and the module that runs at the moment unless this package has called it.
+    Where this package opens it for them, that module alone, and no script for a controller that it loads."""
     found, ours = set[str](), False
     while frame:
         by = frame.f_code.co_filename
@@ -165,7 +165,7 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
         elif frame.f_code.co_name == "<module>":
             loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith((".py", ".toml"))
             return set() if loads else {plain(os.path.abspath(by)), *found}
-        elif not ours and is_users(os.path.abspath(by)):
+        elif not (ours or found) and is_users(os.path.abspath(by)):
             found.add(plain(os.path.abspath(by)))
         frame = frame.f_back
     return found

@@ -25,6 +25,9 @@ SETTLED = 3
 MOST_DRAWN = 200_000
 """Starts among which walks are looked for that are stable until they are disturbed."""
 
+GRID = 20
+"""Steps of which every time of a disturbance is a multiple: 25 ms at the usual V_p, as long as a push lasts."""
+
 CHUNK = 50
 """Steps planned at a time while a leg that protracts is looked for."""
 

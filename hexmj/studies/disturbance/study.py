@@ -14,6 +14,7 @@ from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import checked_list
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
+from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Acceleration
@@ -72,19 +73,12 @@ class DisturbedWalks(SameStarts):
         """Velocities and observation times [time units], both (velocity,)."""
         return observed(self.velocities, self.window, self.stride)
 
-    @property
-    def grid(self) -> int:
-        """Steps of which every time of a disturbance is a multiple: those of a push."""
-        from hexmj.physics.pushes import steps_pushed
-
-        return steps_pushed(self.conditions.time, self.stride)
-
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""
         from hexmj.studies.disturbance.stable_walks import StableWalks
 
         def walks(velocity: float) -> StableWalks:
-            return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, self.grid)
+            return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
 
         def cell(walks: StableWalks, case: Case, window: float) -> Cell:
             grasping = self.conditions.but(grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
@@ -117,4 +111,4 @@ class DisturbedWalks(SameStarts):
         )
         drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
         own = {"recovery": asdict(self.recovery), "adhesion": self.adhesion, "physical": self.physical}
-        return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=self.grid, **own)
+        return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=GRID, **own)

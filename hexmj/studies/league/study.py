@@ -187,16 +187,15 @@ class League:
 
     def _tried(self, entrant: Entrant) -> dict[str, Cell]:
         """Every trial that the entrant can take."""
-        from hexmj.physics.pushes import steps_pushed
+        from hexmj.studies.disturbance.disturbances import GRID
         from hexmj.studies.league import physics
 
         found: dict[str, Cell] = {}
         at = {"velocity": self.tried_at, "window": self.window, "n_starts": self.n_tried}
         way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
-        grid = steps_pushed(self.conditions.time, self.stride)
         for trial in TRIALS:
             if trial in DISTURBED and entrant.steerable:
-                how = at | {"case": DISTURBED[trial], "conditions": self.conditions, "grid": grid}
+                how = at | {"case": DISTURBED[trial], "conditions": self.conditions, "grid": GRID}
                 found[trial] = self._cell(trial, physics.disturbed, 300, entrant, how)
             elif trial in DISTURBED or (trial in GROUNDS and way < CROSSED):
                 continue

@@ -40,6 +40,10 @@ SIZED = {"heights": {"step", "hurdle", "rough"}, "lengths": {"gap"}}
 """Name of a list of sizes -> the obstacles that have them."""
 
 
+TOLD = {"ground_length": "hurdle", "ground_seed": "rough"}
+"""Condition that is the same for all obstacles -> the one that has it."""
+
+
 @dataclass(frozen=True)
 class Terrain(SameStarts):
     """The same starts on flat ground and to every obstacle, with and without grasping feet, at every velocity."""
@@ -70,6 +74,9 @@ class Terrain(SameStarts):
         for name, grounds in SIZED.items():
             if not grounds & {*self.grounds} and [*getattr(self, name)] != [*getattr(Terrain, name)]:
                 raise InputError(f"{name} = {getattr(self, name)}; only {', '.join(sorted(grounds))} have them")
+        for name, ground in TOLD.items():
+            if ground not in self.grounds and (told := self.conditions.flat()[name]) != FARTHER.flat()[name]:
+                raise InputError(f"{name} = {told}; only {ground} has it")
         for grasp in self.grasps:
             self.conditions.but(grasp=grasp)
         _ = self.obstacles
