@@ -65,7 +65,7 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     if isinstance(value, Path) and not value.is_dir():
         return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     if isinstance(value, Path):
-        raise InputError(f"{value} is a folder; expected files, each in a field, or the folder's name as a text")
+        raise InputError(f"{value}, a folder, is no setting; expected files, each in a field, or its name as a text")
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"
         " tuple, dict or array (float64, int64, bool) of these"
