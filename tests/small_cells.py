@@ -79,6 +79,17 @@ def of_object(controller: object, n: int) -> xr.Dataset:
     return xr.Dataset({"steps": ("step", controller.steps(n))})  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def numbers(seed: int) -> xr.Dataset:
+    return xr.Dataset({"x": ("n", np.random.default_rng(seed).standard_normal(3))})
+
+
+def moves(folder: str, to: str, seed: int) -> xr.Dataset:
+    """A cell in the middle of which the folder is renamed, by a person or by another program."""
+    if seed:
+        Path(folder).rename(to)
+    return numbers(seed)
+
+
 def squares(rows: np.ndarray) -> np.ndarray:
     return (rows**2).sum(axis=1)
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from hexmj.errors import InputError
 from hexmj.search.forms import FieldsForm
@@ -19,7 +18,7 @@ from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.storage.files import PART, prepare, remove_leftovers, replacing
 from hexmj.sweeps import Cell, KeptValues, run
-from small_cells import ENVIRONMENT, squares
+from small_cells import ENVIRONMENT, moves, numbers, squares
 from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
 from tests.soak.faults import KINDS
@@ -84,10 +83,6 @@ def test_what_is_finished_is_read_from_such_a_folder(tmp_path: Path, monkeypatch
 
 
 # What the killed left behind
-
-
-def numbers(seed: int) -> xr.Dataset:
-    return xr.Dataset({"x": ("n", np.random.default_rng(seed).standard_normal(3))})
 
 
 def test_the_next_run_removes_what_a_killed_writer_left(tmp_path: Path) -> None:
@@ -157,13 +152,6 @@ def test_a_process_that_is_killed_is_a_sentence(nursery: Nursery) -> None:
 
 
 # Folders that go away
-
-
-def moves(folder: str, to: str, seed: int) -> xr.Dataset:
-    """A cell in the middle of which the folder is renamed, by a person or by another program."""
-    if seed:
-        Path(folder).rename(to)
-    return numbers(seed)
 
 
 def test_a_folder_that_is_renamed_in_the_middle(tmp_path: Path) -> None:

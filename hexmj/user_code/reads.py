@@ -32,8 +32,8 @@ _URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
 
 _NO_DATA = re.compile(
-    r"[/\\](__pycache__|[^/\\]*\.(egg|dist)-info|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv)|\.part-[^/\\]*)([/\\]|$)"
-    r"|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
+    r"[/\\](__pycache__|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv))[/\\]"
+    r"|\.(egg|dist)-info[/\\]|[/\\]\.part-|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
 )
 """In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
@@ -80,12 +80,15 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
         sources: its files.
         told: other files that the cell's name tells.
     """
-    opened = opened.union(*(_OPENED.get(file, ()) for file in sources)) - _WRITTEN
     known = {os.path.realpath(file) for file in (*sources, *told)}
-    found = {file for file in opened if os.path.realpath(file) not in known}
+
+    def beyond(files: set[str]) -> set[str]:
+        return {file for file in files - _WRITTEN if os.path.realpath(file) not in known}
+
+    found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
     for file in sources:
         _OPENED.setdefault(file, set()).update(found)
-    return sorted(found)
+    return sorted(found | earlier)
 
 
 def changed(told: Iterable[Path]) -> list[str]:
@@ -120,8 +123,10 @@ def _note(file: str, written: bool, read: bool) -> None:
     if by is not None:
         by.add(file)
     elif not _COMPUTING:
-        main = sys._current_frames().get(threading.main_thread().ident or 0)
-        for one in _openers(opener, file) or (_openers(main, file) if main is not opener else ()):
+        found, main = _openers(opener, file), threading.main_thread()
+        if not found and threading.current_thread() is not main:
+            found = _openers(sys._current_frames().get(main.ident or 0), file)
+        for one in found:
             _OPENED.setdefault(one, set()).add(file)
     elif not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
         for opened in _COMPUTING.values():  # whose thread it is nobody knows
