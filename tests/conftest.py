@@ -5,8 +5,17 @@ import sys
 
 import pytest
 
+from hexmj.user_code import reads
+
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, and so would what tests start
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def a_program_of_its_own():
+    """What tests before this one have opened is nothing to it."""
+    for known in (reads._OPENED, reads._AT_FIRST, reads._WRITTEN):
+        known.clear()
 
 
 @pytest.fixture
