@@ -83,7 +83,7 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
 
 
 READS = [
-    ("gain.npy", 'float(np.load(f"{at}/gain.npy"))'),
+    ("gain.npy", 'float(np.load(f"{at}/gain" + ".npy"))'),
     ("gain", 'float(Path(at, "gain").read_text())'),
     ("gain", 'float(np.loadtxt(os.path.join(at, "gain")))'),
     ("gain", 'float(os.read(os.open(f"{at}/gain".encode(), os.O_RDONLY), 9))'),

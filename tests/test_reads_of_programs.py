@@ -95,14 +95,25 @@ def test_what_a_helper_remembers_of_a_scripts_own_call_is_noticed(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["gain.toml", "GAIN.CSV", "gain.txt"])
-def test_of_what_ran_before_the_package_texts_tell(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("first", ["import hexmj", ""])
+def test_a_file_of_data_counts_that_a_text_names(tmp_path: Path, name: str, first: str) -> None:
+    """Whoever is imported first; another in a folder that another text names."""
     (tmp_path / "data").mkdir()
-    (tmp_path / "data" / name).write_text("2.0")
     mine = f"{NEW}{READS}HERE = Path(__file__).parent / 'data'\nGAIN = load(HERE / '{name}')\n{GAIN}"
-    script = f"from mine import cell\n{NEW}{SWEEPS}Path('later.toml')\n"
-    (tmp_path / "later.toml").write_text("")
-    gain, kept, complaint = sweep(tmp_path, mine=mine, script=script)
-    assert (gain, kept) == (2.0, 0) and f"{name}, of which" in complaint
+    for gain, kept in (("2.0", 1), ("2.0", 1), ("3.0", 2)):
+        (tmp_path / "data" / name).write_text(gain)
+        assert sweep(tmp_path, mine=mine, script=f"{first}\n{NEW}from mine import cell\n{SWEEPS}") == (
+            float(gain),
+            kept,
+            "",
+        )
+
+
+def test_a_log_that_a_cell_writes_is_no_reason_to_refuse_it(tmp_path: Path) -> None:
+    mine = f"{NEW}def cell():\n    with open('log.txt', 'a') as log:\n        log.write('.')\n"
+    mine += "    return xr.Dataset({'gain': 2.0})\n"
+    for kept in (1, 2):
+        assert sweep(tmp_path, mine=mine, script=SCRIPT) == (2.0, kept, "")
 
 
 def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) -> None:

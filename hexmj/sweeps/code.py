@@ -3,8 +3,7 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from, and its modules' TOML files count.  MJCFs, which MuJoCo opens where nobody hears it, count
-wherever a module names one.
+the one module it comes from.  Data files count that texts of the modules name.
 """
 
 import ast
@@ -27,6 +26,7 @@ from hexmj.storage.mjcf import content, parts
 from hexmj.sweeps.plain import PACKAGE, module_label
 from hexmj.user_code import as_run
 from hexmj.user_code.parsing import files_named, parsed
+from hexmj.user_code.reads import WRITTEN
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -35,8 +35,11 @@ CARRIERS = {
 }
 """What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
 
-MJCF = ".xml", ".mjcf", ".mjb", ".urdf"
-"""Ends of the names of what MuJoCo opens."""
+DATA = (
+    *(".toml", ".xml", ".mjcf", ".mjb", ".urdf", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
+    *(".npy", ".npz", ".pt", ".pth", ".pkl"),
+)
+"""Ends of the names of data files, in small letters or capitals."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -86,6 +89,7 @@ class _Needed(NamedTuple):
 
 _KNOWN: dict[frozenset[str], _Needed] = {}
 _FILES: dict[str, Path] = {}
+_HELD: dict[Path, str] = {}
 
 
 def code(modules: frozenset[str]) -> Code:
@@ -100,17 +104,23 @@ def code(modules: frozenset[str]) -> Code:
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         for path in paths:
-            held = digest_of(path) if file in _AT_FIRST else digest(content(path))
-            data.setdefault(f"{module_label(name)}, {path.name}", []).append(held)
+            data.setdefault(f"{module_label(name)}, {path.name}", []).append(_held(path, ours=file in _AT_FIRST))
     sources = needed.sources | {name: ",".join(held) for name, held in data.items()}
     return Code(dict(sorted(sources.items())), needed.versions)
+
+
+def _held(path: Path, ours: bool) -> str:
+    """A digest of a data file, none of one that is gone; of one that the user's code writes itself, as it was."""
+    if str(path) not in WRITTEN or path not in _HELD:
+        _HELD[path] = digest_of(path) if ours else digest(content(path)) if path.is_file() else ""
+    return _HELD[path]
 
 
 def files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
     """The sources that some modules need, but for this package's, and the data that all name, with their parts."""
     read = _needed(modules).modules
     sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
-    return sources, [part for _, _, paths in read for path in paths for part in parts(path)]
+    return sources, [part for _, _, paths in read for path in paths if path.is_file() for part in parts(path)]
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -230,7 +240,7 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in followed for wanted in _called(one, package))
     bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
-    folders, endings = ((file.parent, _ASSETS), (".toml", ".xml")) if ours else ((file.parent, Path.cwd()), MJCF)
+    folders, endings = ((file.parent, _ASSETS), (".toml", ".xml")) if ours else ((file.parent, Path.cwd()), DATA)
     return _Module(digest(held), files_named(tree, folders, endings), package == name, imports, bound)
 
 

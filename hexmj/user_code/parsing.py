@@ -2,7 +2,6 @@
 that of one.  Nothing is told of their warnings, which whoever imports them hears."""
 
 import ast
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from os.path import isdir, isfile
@@ -37,21 +36,16 @@ def _alone() -> Iterator[None]:
         yield
 
 
-def files_named(
-    tree: ast.AST, folders: Sequence[Path], endings: tuple[str, ...], last: int = sys.maxsize
-) -> list[Path]:
+def files_named(tree: ast.AST, folders: Sequence[Path], endings: tuple[str, ...]) -> list[Path]:
     """Files that are there, and that texts of a source name, as ``f"{folder}/leg.xml"`` does.
 
     Args:
         tree: of the source.
         folders: where they are looked for, and in folders there that texts name.
         endings: of the names, in small letters.
-        last: line up to which texts count.
     """
-    texts = dict[str, int]()
-    for one in ast.walk(tree):
-        if isinstance(one, ast.Constant) and isinstance(one.value, str):
-            texts |= dict.fromkeys({one.value, one.value.lstrip("/")} - texts.keys(), one.lineno)
-    names = [text for text, line in texts.items() if line <= last and text.lower().endswith(endings)]
+    constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    texts = dict.fromkeys(text for one in constants for text in (one, one.lstrip("/")))
+    names = [text for text in texts if text.lower().endswith(endings)]
     within = [folder / text for folder in folders for text in texts if isdir(folder / text)] if names else []
     return sorted({one for folder in (*folders, *within) for name in names if isfile(one := folder / name)})

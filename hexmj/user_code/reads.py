@@ -2,7 +2,7 @@
 
 What a cell is named by tells its settings, with the files that they name, and its sources.  What its code opens beyond
 these no name tells: such a cell is not kept, and a sentence says why.  Opens are noted from the first import of this
-package on; of modules that ran before, the data files count that their texts name.
+package on.
 """
 
 import os
@@ -16,14 +16,7 @@ from traceback import walk_stack
 from types import FrameType
 from typing import Any
 
-from hexmj.user_code.as_run import RUN, is_users, plain
-from hexmj.user_code.parsing import files_named, parsed
-
-DATA = (
-    *(".toml", ".xml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
-    *(".npy", ".npz", ".pt", ".pth", ".pkl"),
-)
-"""Ends of the names of data files, in small letters or capitals."""
+from hexmj.user_code.as_run import is_users, plain
 
 _PATH = {"open": 0, "exec": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
@@ -51,7 +44,7 @@ _OPENED: dict[str, set[str]] = {}
 _COMPUTING: dict[int, set[str]] = {}
 """Thread that computes a cell -> what was opened or ran meanwhile."""
 
-_WRITTEN: set[str] = set()
+WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
@@ -83,7 +76,7 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
     known = {os.path.realpath(file) for file in (*sources, *told)}
 
     def beyond(files: set[str]) -> set[str]:
-        return {file for file in files - _WRITTEN if os.path.realpath(file) not in known}
+        return {file for file in files - WRITTEN if os.path.realpath(file) not in known}
 
     found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
     for file in sources:
@@ -116,7 +109,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
 def _note(file: str, written: bool, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     if written:
-        _WRITTEN.update([file] if _COMPUTING else [])
+        WRITTEN.update([file] if _COMPUTING else [])
         return
     if read and not opener.f_code.co_filename.startswith(_OURS):
         _AT_FIRST.setdefault(file, _stamp(file))
@@ -176,15 +169,4 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
     return found
 
 
-def _note_before() -> None:
-    """Take what modules name that ran before as opened by them, a script's up to the line that it has reached."""
-    stack = walk_stack(sys._getframe())
-    reached = {frame.f_code.co_filename: line for frame, line in stack if frame.f_code.co_name == "<module>"}
-    for file, (source, *_) in RUN.items():
-        with suppress(SyntaxError, ValueError):  # of what is no Python
-            named = files_named(parsed(source), [Path(file).parent, Path()], DATA, reached.get(file, sys.maxsize))
-            _OPENED[file] = {os.path.abspath(one) for one in named}
-
-
-_note_before()
 sys.addaudithook(_hear)
