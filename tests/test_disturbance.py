@@ -1,7 +1,7 @@
 """Disturbed walks: the plan that meets a disturbance, the strategies, the frequencies and the experiment."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -88,39 +88,6 @@ def test_a_halt_is_a_new_start_from_where_the_legs_are():
         after = slice(step + PAUSED, step + PAUSED + 500)
         assert np.array_equal(whole.x[after, start], again.x[:, start])
         assert np.array_equal(whole.stance[after, start], again.stance[:, start])
-
-
-@dataclass(frozen=True)
-class Lifts:
-    """LDVS, which lifts its feet itself, and steps beside its lines."""
-
-    name: str = "lifts"
-
-    def begin(self, *given, **how) -> Any:
-        return self.begin_at_speed(*given, **how)
-
-    def begin_at_speed(self, *given, **how) -> Any:
-        plan: Any = LDVS.begin_at_speed(*given, **how)
-        goes_on = plan.advance
-
-        def advance(steps):
-            walk = goes_on(steps)
-            return replace(walk, y=walk.y + 0.01 * walk.x, height=np.where(walk.stance, 0.0, 9.0))
-
-        plan.advance = advance
-        return plan
-
-
-def test_a_halted_start_puts_its_feet_down_where_they_are():
-    disturbed = Disturbed(Lifts(), disturbance("halt"))
-    walk = disturbed.begin(STABLE.starts, np.full(6, V), STRIDE).advance(STEPS)
-    for start, step in enumerate(STABLE.step):
-        rest = slice(step, step + PAUSED)
-        assert np.isnan(walk.height[rest, start]).all() and walk.stance[rest, start].all()
-        assert (walk.y[rest, start] == walk.y[step - 1, start]).all() and (
-            walk.y[:step, start] != walk.y[0, start]
-        ).any()
-        assert not np.isnan(walk.height[step + PAUSED :, start]).any()
 
 
 def test_a_stopped_leg_retracts_and_the_others_go_on():
@@ -317,25 +284,6 @@ def test_some_starts_alone_go_as_among_all(kind):
     asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
     every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
     assert alone.identical(every.isel(start=[2, 0]))
-
-
-@dataclass(frozen=True)
-class HandsOn:
-    """Plans in a way of its own, and hands on all else that it is asked for."""
-
-    inner: Any = LDVS
-    name: str = "hands on"
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.inner, name)
-
-    def begin(self, *given: Any, **how: Any) -> Any:
-        return UNCOORDINATED.begin(*given, **how)
-
-
-def test_a_controller_that_hands_on_begin_at_speed_of_another_is_not_disturbed_as_that():
-    with pytest.raises(InputError, match="a disturbance of hands on; expected a controller whose plans can go on from"):
-        begin(Disturbed(HandsOn(), disturbance("halt")), STABLE.starts, V, STRIDE)  # pyright: ignore[reportArgumentType]
 
 
 def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():

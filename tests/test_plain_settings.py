@@ -240,5 +240,5 @@ def test_an_mjcf_in_folders_is_looked_for_beside_each_file(tmp_path: Path) -> No
 
 
 def test_a_folder_is_said_to_be_one(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a folder, is no setting; expected files, each in a field"):
+    with pytest.raises(InputError, match="a folder, is no setting; expected files in fields, or"):
         plain({"tables": tmp_path})

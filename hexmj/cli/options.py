@@ -47,7 +47,7 @@ ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
 
 
 def loaded(name: str) -> Controller:
-    """A controller by its name, see `load_controller`, as the command has loaded it first."""
+    """A controller by its name as the command has loaded it first; names and errors as of `load_controller`."""
     from hexmj.controllers.named import load_controller
 
     if name not in LOADED:

@@ -248,7 +248,6 @@ class Search(WalkingCommand):
     def _show(
         self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
     ) -> None:
-
         vectors = {name: _numbers(problem.form, loaded(one)) for name, one in self._beside.items()}
         parameters = new_table("parameter", "found", *vectors)
         for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):

@@ -13,7 +13,7 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
-from hexmj.sweeps.code import code, files
+from hexmj.sweeps.code import code, needed_files
 from hexmj.sweeps.plain import classes, label, named_files, plain
 from hexmj.user_code.reads import changed, untold
 
@@ -73,12 +73,12 @@ class Cell:
             opened: while it was computed.
         """
         try:
-            sources, data = files(frozenset(self._modules()))
+            sources, data = needed_files(frozenset(self._modules()))
         except InputError:  # it has no source, so that it is named by nothing
             return ""
-        told = [*data, *named_files([*self.settings.values(), self._owner])]
         if not sources:
             return ""
+        told = [*data, *named_files([*self.settings.values(), self._owner])]
         if found := untold(opened, sources, told):
             return (
                 f"{self.name} is not kept: its code opens or runs {found[0]}, of which an edit would not be noticed;"

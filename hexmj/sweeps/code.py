@@ -116,8 +116,12 @@ def _held(path: Path, ours: bool) -> str:
     return _HELD[path]
 
 
-def files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
-    """The sources that some modules need, but for this package's, and the data that all name, with their parts."""
+def needed_files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
+    """The sources that some modules need, but for this package's, and the data that all name, with their parts.
+
+    Raises:
+        InputError: a module has no source.
+    """
     read = _needed(modules).modules
     sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
     return sources, [part for _, _, paths in read for path in paths if path.is_file() for part in parts(path)]

@@ -62,10 +62,10 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     if type(value) is dict and all(isinstance(key, str) for key in value):
         told = {key: plain(item, folders, exact) for key, item in value.items()}
         return told | {ORDER: list(value)} if exact and sorted(value) != list(value) else told
-    if isinstance(value, Path) and not value.is_dir():
-        return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     if isinstance(value, Path):
-        raise InputError(f"{value}, a folder, is no setting; expected files, each in a field, or its name as a text")
+        if value.is_dir():
+            raise InputError(f"{value}, a folder, is no setting; expected files in fields, or its name as a text")
+        return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"
         " tuple, dict or array (float64, int64, bool) of these"

@@ -1,0 +1,73 @@
+"""Controllers of a user's own that are disturbed: ones that lift feet themselves, and ones that hand on another's."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexmj import LDVS, UNCOORDINATED, InputError, Stride
+from hexmj.controllers.asking import begin
+from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
+from hexmj.studies.disturbance.plan import PAUSE, Disturbed
+
+STRIDE, V = Stride(), 0.5
+STABLE = find_stable_starts(LDVS, V, 6, 0, STRIDE, 20)
+STEPS = int(STABLE.step.max()) + 900
+PAUSED = round(PAUSE / STRIDE.dt)
+
+
+def disturbance(kind: Any) -> Disturbance:
+    return disturbance_of(STABLE, kind, LDVS, V, STRIDE)
+
+
+@dataclass(frozen=True)
+class Lifts:
+    """LDVS, which lifts its feet itself, and steps beside its lines."""
+
+    name: str = "lifts"
+
+    def begin(self, *given, **how) -> Any:
+        return self.begin_at_speed(*given, **how)
+
+    def begin_at_speed(self, *given, **how) -> Any:
+        plan: Any = LDVS.begin_at_speed(*given, **how)
+        goes_on = plan.advance
+
+        def advance(steps):
+            walk = goes_on(steps)
+            return replace(walk, y=walk.y + 0.01 * walk.x, height=np.where(walk.stance, 0.0, 9.0))
+
+        plan.advance = advance
+        return plan
+
+
+def test_a_halted_start_puts_its_feet_down_where_they_are():
+    disturbed = Disturbed(Lifts(), disturbance("halt"))
+    walk = disturbed.begin(STABLE.starts, np.full(6, V), STRIDE).advance(STEPS)
+    for start, step in enumerate(STABLE.step):
+        rest = slice(step, step + PAUSED)
+        assert np.isnan(walk.height[rest, start]).all() and walk.stance[rest, start].all()
+        assert (walk.y[rest, start] == walk.y[step - 1, start]).all() and (
+            walk.y[:step, start] != walk.y[0, start]
+        ).any()
+        assert not np.isnan(walk.height[step + PAUSED :, start]).any()
+
+
+@dataclass(frozen=True)
+class HandsOn:
+    """Plans in a way of its own, and hands on all else that it is asked for."""
+
+    inner: Any = LDVS
+    name: str = "hands on"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        return UNCOORDINATED.begin(*given, **how)
+
+
+def test_a_controller_that_hands_on_begin_at_speed_of_another_is_not_disturbed_as_that():
+    with pytest.raises(InputError, match="a disturbance of hands on; expected a controller whose plans can go on from"):
+        begin(Disturbed(HandsOn(), disturbance("halt")), STABLE.starts, V, STRIDE)  # pyright: ignore[reportArgumentType]
