@@ -135,6 +135,31 @@ def test_an_mjcf_counts_that_a_text_names_with_what_it_includes(tmp_path: Path, 
         assert told == (float(mass), cells, "")
 
 
+def test_a_command_says_in_one_line_what_is_not_kept(tmp_path: Path) -> None:
+    (tmp_path / "gain").write_text("2.0")
+    tripod = (Path(__file__).parents[1] / "examples" / "tripod.py").read_text()
+    (tmp_path / "mine.py").write_text(f"{tripod}\nGAIN = open('ga' + 'in').read()\n")
+    words = [
+        "flss",
+        "--model",
+        "mine.py:Tripod",
+        "--velocities",
+        "0.5",
+        "--starts",
+        "5",
+        "--window",
+        "5",
+        "--out",
+        "out",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "hexmj", *words], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True
+    )
+    said = [line for line in done.stderr.splitlines() if "not kept" in line]
+    assert len(said) == 1 and said[0].startswith("hexmj: tripod-V-0.5-from-0 is not kept: its code opens or runs ")
+    assert "UserWarning" not in done.stderr and not list((tmp_path / "out" / "walks").iterdir())
+
+
 def test_what_a_script_writes_is_no_scratch_of_its_controllers(tmp_path: Path) -> None:
     script = f"{NEW}from hexmj.sweeps import Cell, run\n"
     script += "def cell():\n    return xr.Dataset({'gain': float(Path('ga' + 'in').read_text())})\n"

@@ -2,16 +2,24 @@
 
 import os
 import shutil
+import warnings
+from pathlib import Path
+from typing import Any
 
 from hexmj.errors import InputError
 from hexmj.replay.film.gl import drop_vain_wish
+from hexmj.storage.literal import literal
 
 NARROWEST = 40
 """Columns of a terminal; in a few, boxes of help are never done."""
 
+_PACKAGE = Path(__file__).parents[1]
+_USUAL = warnings.formatwarning
+
 
 def settle() -> None:
-    """Settle the folder, the terminal's width, threads of numba, and where figures and frames are drawn.
+    """Settle the folder, the terminal's width, threads of numba, how warnings of this package are shown, and where
+    figures and frames are drawn.
 
     Raises:
         InputError: the current folder has gone, or numba's number of threads is none.
@@ -26,5 +34,13 @@ def settle() -> None:
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if not (threads.isdecimal() and int(threads) > 0):
         raise InputError(f"NUMBA_NUM_THREADS = {threads:.80}; expected a whole number of at least 1, or nothing")
+    warnings.formatwarning = _shown
     os.environ["MPLBACKEND"] = "agg"  # figures go to files
     drop_vain_wish()
+
+
+def _shown(message: Warning | str, category: type[Warning], filename: str, *place: Any) -> str:
+    """A warning as it is printed: one of this package as its other sentences."""
+    if Path(filename).is_relative_to(_PACKAGE):
+        return f"hexmj: {literal(str(message))}\n"
+    return _USUAL(message, category, filename, *place)
