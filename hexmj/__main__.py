@@ -1,5 +1,6 @@
 """The command `hexmj`, also as `python -m hexmj`: it can be stopped from its first moment on."""
 
+import gc
 import os
 import sys
 from contextlib import suppress
@@ -14,6 +15,7 @@ def main() -> None:
     """
     try:
         hear_stops()
+        gc.set_threshold(10_000)  # not while modules are imported: a command takes 5 % less time
         from hexmj.cli.main import main as command
 
         command()

@@ -140,3 +140,24 @@ def test_losses_that_another_plan_tells_are_not_believed(how):
     steps = np.full(20, 900)
     own = LDVS.begin(starts, np.full(20, 0.3), STRIDE).first_losses(steps)
     assert (first_losses(plan, steps) > 0).sum() > (own > 0).sum() + 5
+
+
+def begun(how: str) -> NetworkPlan:
+    """The network's plan of the same starts, which its controller has put elsewhere."""
+    plan = LDVS.begin(hexmj.draw_starts(20, 0), np.full(20, 0.3), STRIDE)
+    if how == "legs in the air":
+        plan.see(plan.tips, np.arange(6) > np.ones((20, 1)))
+    elif how == "walked in":
+        plan.advance(700)
+        plan.done = 0
+    else:
+        plan.restart(np.arange(20) < 10, plan.tips[::-1])
+    return plan
+
+
+@pytest.mark.parametrize("how", ["legs in the air", "walked in", "other starts"])
+def test_losses_of_a_plan_that_was_put_elsewhere_are_of_where_it_is(how):
+    steps, plain = np.full(20, 900), LDVS.begin(hexmj.draw_starts(20, 0), np.full(20, 0.3), STRIDE)
+    losses = first_losses(begun(how), steps)
+    assert np.array_equal(losses, planned_losses(begun(how), steps))
+    assert not np.array_equal(losses, first_losses(plain, steps))

@@ -231,21 +231,25 @@ def _read(name: str, file: Path) -> _Module:
         if name in sys.modules:
             raise InputError(f"{file} cannot be read as Python: {error}") from None
         tree = parsed(b"")
-    nodes = list(ast.walk(tree))
-    guarded = [
-        one
-        for one in nodes
-        if isinstance(one, ast.If) and ast.unparse(one.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
-    ]
-    types = {inner for one in guarded for statement in one.body for inner in ast.walk(statement)}
-    followed = nodes if package == name else [one for one in nodes if one not in types]
-    imports = tuple(wanted for one in followed for _, wanted in _imports(one, package))
-    ours = file.is_relative_to(PACKAGE)
+    of_package, ours = package == name, file.is_relative_to(PACKAGE)
+    imports = tuple(wanted for one in _statements(tree, types=of_package) for _, wanted in _imports(one, package))
     if not ours:
-        imports += tuple(wanted for one in followed for wanted in _called(one, package))
-    bound = {as_name: wanted for one in nodes for as_name, wanted in _imports(one, package)}
+        imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
+    bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
     folders, endings = ((file.parent, _ASSETS), (".toml", ".xml")) if ours else ((file.parent, Path.cwd()), DATA)
-    return _Module(digest(held), files_named(tree, folders, endings), package == name, imports, bound)
+    data = files_named(tree, folders, endings) if any(one.encode() in held.lower() for one in endings) else []
+    return _Module(digest(held), data, of_package, imports, bound)
+
+
+def _statements(tree: ast.Module, *, types: bool) -> Iterator[ast.AST]:
+    """All statements of a source, outer ones first; with those that are for types alone, or without."""
+    waiting: list[ast.AST] = [tree]
+    for one in waiting:
+        yield one
+        of_types = isinstance(one, ast.If) and ast.unparse(one.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+        for inner in ("body", "handlers", "orelse", "finalbody", "cases"):
+            if types or not (of_types and inner == "body"):
+                waiting += getattr(one, inner, ())
 
 
 def _imports(one: ast.AST, package: str) -> Iterator[tuple[str, _Wanted]]:

@@ -103,7 +103,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # the system's linker looks for it
         file = os.path.abspath(_URI.sub(r"\1", os.fsdecode(path)))
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            _note(file, event == "os.rename" or (event == "open" and _only_writes(*arguments[1:])), event == "open")
+            _note(file, event == "os.rename" or (event == "open" and _only_writes(arguments[2])), event == "open")
 
 
 def _note(file: str, written: bool, read: bool) -> None:
@@ -143,10 +143,8 @@ def _reads_a_source(file: str, by: FrameType) -> bool:
     return file.endswith(".py") and by.f_code.co_filename.endswith(_READS_SOURCES)
 
 
-def _only_writes(mode: str | None, flags: int) -> bool:
+def _only_writes(flags: int) -> bool:
     """Whether a file is opened to be written, or made, without regard to what it holds."""
-    if mode:
-        return "r" not in mode
     return flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY or bool(flags & (os.O_TRUNC | os.O_EXCL))
 
 

@@ -15,6 +15,7 @@ from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
+from hexmj.controllers.losses import planned_losses
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.process.threads import run_blocks, thread_count
@@ -181,7 +182,9 @@ class NetworkPlan:
         return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.FastLosses`; only the present state of a walk is kept."""
+        """See `protocol.FastLosses`; only the present state of a walk is kept, if it begins at `starts`."""
+        if "_blocks" in vars(self):
+            return planned_losses(self, steps, self.threads)
         lost, size = np.empty(len(steps), dtype=int), len(steps)
         block = max(8 * kernel.LANES, -(-size // (4 * thread_count(self.threads))))
         block = max(kernel.LANES, min(block, AT_ONCE // int(max(1, steps.max(initial=0)))))
