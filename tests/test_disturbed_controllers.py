@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, UNCOORDINATED, InputError, Stride
+from hexmj import LDVS, UNCOORDINATED, Cruse1998, InputError, Stride
 from hexmj.controllers.asking import begin
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
@@ -68,6 +68,33 @@ class HandsOn:
         return UNCOORDINATED.begin(*given, **how)
 
 
-def test_a_controller_that_hands_on_begin_at_speed_of_another_is_not_disturbed_as_that():
-    with pytest.raises(InputError, match="a disturbance of hands on; expected a controller whose plans can go on from"):
-        begin(Disturbed(HandsOn(), disturbance("halt")), STABLE.starts, V, STRIDE)  # pyright: ignore[reportArgumentType]
+@dataclass(frozen=True)
+class Heir(Cruse1998):
+    """The network, which begins as another one."""
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        return UNCOORDINATED.begin(*given, **how)
+
+
+@pytest.mark.parametrize("controller", [HandsOn(), Heir(LDVS.weights, name="heir")], ids=["hands on", "heir"])
+def test_a_controller_whose_begin_at_speed_is_of_another_begin_is_not_disturbed_by_it(controller: Any):
+    with pytest.raises(InputError, match="a disturbance of h.*; expected a controller whose plans can go on from"):
+        begin(Disturbed(controller, disturbance("halt")), STABLE.starts, V, STRIDE)
+
+
+@dataclass(frozen=True)
+class Stands(Lifts):
+    """On all its feet."""
+
+    name: str = "stands"
+
+    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
+        plan: Any = LDVS.begin_at_speed(*given, **how)
+        goes_on = plan.advance
+        plan.advance = lambda steps: replace(goes_on(steps), stance=np.ones((steps, *plan.starts.shape), dtype=bool))
+        return plan
+
+
+def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
+    with pytest.raises(InputError, match="of stands: of 6 of 6 starts no leg protracts within 100 periods"):
+        disturbance_of(STABLE, "leg", Stands(), V, STRIDE)

@@ -5,7 +5,7 @@ from typing import TypeGuard
 import numpy as np
 
 from hexmj.controllers.asking import advanced, said
-from hexmj.controllers.protocol import FastLosses, Plan
+from hexmj.controllers.protocol import FastLosses, Plan, goes_with
 from hexmj.errors import InputError
 from hexmj.stability import walk_margin
 
@@ -44,10 +44,7 @@ def tells_losses(plan: Plan) -> TypeGuard[FastLosses]:
     own = getattr(plan, "__dict__", {})
     if "first_losses" in own or "advance" in own:
         return "first_losses" in own
-    tells, plans = (
-        next((one for one in type(plan).__mro__ if name in vars(one)), None) for name in ("first_losses", "advance")
-    )
-    return tells is not None and issubclass(tells, plans or tells)
+    return goes_with(type(plan), "first_losses", "advance")
 
 
 def planned_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> np.ndarray:

@@ -171,8 +171,15 @@ class SteerableController(Controller, Protocol):
 
 
 def is_steerable(controller: object) -> TypeGuard[SteerableController]:
-    """Whether a controller is a `SteerableController` itself: one that hands on `begin_at_speed` of another is not."""
-    return isinstance(controller, SteerableController) and hasattr(type(controller), "begin_at_speed")
+    """Whether a controller is a `SteerableController` itself: not one that hands on `begin_at_speed` of another, or
+    whose class has changed `begin` alone."""
+    return isinstance(controller, SteerableController) and goes_with(type(controller), "begin_at_speed", "begin")
+
+
+def goes_with(kind: type, method: str, other: str) -> bool:
+    """Whether a class has a method that was made for its other one: no heir has changed the other one alone."""
+    has, changed = (next((one for one in kind.__mro__ if name in vars(one)), None) for name in (method, other))
+    return has is not None and issubclass(has, changed or has)
 
 
 def check_controller_type(controller: object) -> None:

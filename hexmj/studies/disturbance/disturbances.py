@@ -32,6 +32,10 @@ CHUNK = 50
 """Steps planned at a time while a leg that protracts is looked for."""
 
 
+SEARCHED = 100
+"""Periods of a single leg for which one that protracts is looked for."""
+
+
 class TooFewStable(InputError):
     """Not so many starts keep static stability until they are disturbed."""
 
@@ -118,13 +122,23 @@ def find_stable_starts(
 def disturbance_of(
     stable: StableStarts, kind: Kind, controller: Controller, velocity: float, stride: Stride
 ) -> Disturbance:
-    """What these starts meet; a leg is stopped at the first moment at which one protracts."""
+    """What these starts meet; a leg is stopped at the first moment at which one protracts.
+
+    Raises:
+        InputError: of some start no leg protracts.
+    """
     leg = np.zeros_like(stable.step)
     if kind != "leg":
         return Disturbance(kind, stable.step, leg)
     plan, step = begin(controller, stable.starts, velocity, stride), np.full_like(leg, NEVER)
     advanced(plan, int(stable.step.min()) - 1)
+    end = stable.step.max() + SEARCHED * stride.periods(velocity) / stride.dt
     while (step == NEVER).any():
+        if plan.done > end:
+            raise InputError(
+                f"disturbance = 'leg' of {controller.name}: of {(step == NEVER).sum()} of {len(step)} starts no leg"
+                f" protracts within {SEARCHED} periods of a single leg; expected a controller whose legs do"
+            )
         first = plan.done + 1
         up = ~advanced(plan, CHUNK).stance
         due = (first + np.arange(CHUNK))[:, None] >= stable.step
