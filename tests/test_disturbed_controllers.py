@@ -78,7 +78,7 @@ class Heir(Cruse1998):
 
 @pytest.mark.parametrize("controller", [HandsOn(), Heir(LDVS.weights, name="heir")], ids=["hands on", "heir"])
 def test_a_controller_whose_begin_at_speed_is_of_another_begin_is_not_disturbed_by_it(controller: Any):
-    with pytest.raises(InputError, match="a disturbance of h.*; expected a controller whose plans can go on from"):
+    with pytest.raises(InputError, match=r"a disturbance of h.*; expected a controller whose plans can go on from"):
         begin(Disturbed(controller, disturbance("halt")), STABLE.starts, V, STRIDE)
 
 

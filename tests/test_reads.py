@@ -151,6 +151,12 @@ def test_a_library_that_the_system_finds_does_not_count(computed: Callable[..., 
     assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
 
 
+def test_what_a_cell_reads_after_an_inner_sweep_counts(computed: Callable[..., tuple[float, int]]) -> None:
+    with pytest.warns(UserWarning, match="reader is not kept"):
+        inner = "hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0)"
+        assert computed(f"[{inner}, float(Path(at, 'gain').read_text())][1]") == (1.0, 1)
+
+
 @pytest.mark.parametrize("folder", [".worktrees", ".gains"])
 def test_what_is_hidden_counts(computed: Callable[..., tuple[float, int]], folder: str) -> None:
     Path(folder).mkdir()
@@ -179,6 +185,8 @@ def test_a_file_that_is_missing_counts_too(
         "[(it := tempfile.mkstemp()), os.write(it[0], b'1.0'), os.close(it[0]), float(Path(it[1]).read_text())][3]",
         "len(list(Path(at).rglob('*.json')))",
         "len(hexmj.load_controller('graham').name) / 6",
+        "sqlite3.connect(':memory:').execute('select 1.0').fetchone()[0]",
+        "sqlite3.connect('file::memory:?cache=shared', uri=True).execute('select 1.0').fetchone()[0]",
     ],
 )
 def test_what_it_writes_itself_and_what_is_installed_does_not_count(

@@ -49,6 +49,11 @@ PROGRAMS = {
         }
         for folder in ("./lib", ".//lib", "lib/../lib")
     },
+    "an installed helper as it is imported": {
+        "site-packages__helper": "import numpy as np\nGAIN = float(np.loadtxt('gain'))",
+        "mine": f"{NEW}from helper import GAIN\n{GAIN}",
+        "script": SCRIPT.replace("import hexmj", "import hexmj, sys\nsys.path.append('site-packages')"),
+    },
     **{
         f"a thread at import, {load}": {
             "mine": THREAD.replace("load('ga' + 'in')", f"float(Threads(1).submit({load}, 'gain').result())"),
@@ -100,6 +105,18 @@ def test_a_log_that_a_cell_writes_is_no_reason_to_refuse_it(tmp_path: Path) -> N
     mine += "    return xr.Dataset({'gain': 2.0})\n"
     for kept in (1, 2):
         assert sweep(tmp_path, mine=mine, script=SCRIPT) == (2.0, kept, "")
+
+
+def test_a_log_that_a_script_names_and_writes_meanwhile_is_no_error(tmp_path: Path) -> None:
+    """The script's texts name it, so it counts for a cell of the script; a controller in a file of its own is kept."""
+    log = "LOG = open('log.txt', 'a')\nimport atexit\natexit.register(LOG.close)\n"
+    cell = "def cell():\n    print('.', file=LOG, flush=True)\n    return xr.Dataset({'gain': 2.0})\n"
+    gain, kept, complaint = sweep(tmp_path, script=f"import hexmj\n{NEW}{log}{cell}{SWEEPS}")
+    assert (gain, kept) == (2.0, 0) and "swept is not kept: the program writes " in complaint
+    gain, kept, complaint = sweep(
+        tmp_path, mine=f"{NEW}def cell():\n    return xr.Dataset({{'gain': 2.0}})\n", script=SCRIPT + log
+    )
+    assert (gain, kept, complaint) == (2.0, 1, "")
 
 
 def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) -> None:

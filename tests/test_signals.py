@@ -41,6 +41,20 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
     assert out == b""
 
 
+@pytest.mark.parametrize("how", [["-m", "hexmj"], [str(Path(sys.executable).with_name("hexmj"))]], ids=len)
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_before_it_hears_them(by, how):
+    """While the package itself is imported, of which Python tells on the way."""
+    words = [sys.executable, "-X", "importtime", *how, "flss"]
+    with subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE) as running:
+        assert running.stderr
+        while b"hexmj.process.beginning" not in running.stderr.readline():
+            assert running.poll() is None
+        running.send_signal(by)
+        told = running.stderr.read()
+    assert running.returncode == 130 and b"hexmj: stopped" in told and b"Traceback" not in told
+
+
 @pytest.mark.parametrize("module", ["tyro", "numpy", "mujoco"])
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_while_it_is_imported(by, module):

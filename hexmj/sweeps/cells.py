@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 from hexmj.checks import check_types
@@ -15,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.sweeps.code import code, needed_files
 from hexmj.sweeps.plain import classes, label, named_files, plain
-from hexmj.user_code.reads import changed, untold
+from hexmj.user_code.reads import changed, untold, written
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -91,6 +92,10 @@ class Cell:
             )
         return ""
 
+    def data(self) -> list[Path]:
+        """Files of data that texts of its code name."""
+        return needed_files(frozenset(self._modules()))[1]
+
     def _modules(self) -> list[str]:
         return [one.__module__ for one in (self.function, *classes([self.settings, self._owner]))]
 
@@ -126,17 +131,24 @@ def _stands_there(function: Any) -> bool:
     return "<" in function.__qualname__ or found == getattr(function, "__func__", function)
 
 
-def check_unchanged(cell: Cell, before: str, now: str) -> None:
+def check_unchanged(cell: Cell, before: str, now: str) -> str:
     """Refuse what a cell has given if something that it depends on has changed since, as its records tell.
 
+    Returns:
+        Why it is not kept, if that is a file which a text names, and which this program writes itself; else empty.
+
     Raises:
-        InputError: it has.
+        InputError: anything else has changed.
     """
-    if now != before:
-        raise InputError(
-            f"{cell.name}: {difference(before, now)} has changed while it was in use; start again, with fields that"
-            " stay as they are and name files that are read, not written"
-        )
+    if now == before:
+        return ""
+    what = difference(before, now)
+    if what.endswith("of sources") and (files := written(cell.data())):
+        return f"{cell.name} is not kept: the program writes {files[0]}, which a text of the cell's code names"
+    raise InputError(
+        f"{cell.name}: {what} has changed while it was in use; start again, with fields that stay as they are and name"
+        " files that are read, not written"
+    )
 
 
 def difference(one: str, other: str) -> str:

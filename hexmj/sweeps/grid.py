@@ -167,8 +167,8 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made
     with heard() as opened:
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
-    check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    not_kept = cell.not_kept(opened) if path or opened else ""
+    not_kept = check_unchanged(cell, before, cell.record() if path else cell.settings_now())
+    not_kept = not_kept or (cell.not_kept(opened) if path or opened else "")
     return (write(path, record, data), "") if path and not not_kept else (data, not_kept if path else "")
 
 

@@ -58,8 +58,8 @@ class KeptValues:
             with heard() as opened:
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
-                check_unchanged(self._cell, self._record, self._cell.record())
-                if why := self._cell.not_kept(opened):
+                changed = check_unchanged(self._cell, self._record, self._cell.record())
+                if why := changed or self._cell.not_kept(opened):
                     warn(why, stacklevel=2)
                     self._path = None
                 else:

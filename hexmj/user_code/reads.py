@@ -30,7 +30,7 @@ _NO_DATA = re.compile(
 )
 """In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
-_SYSTEMS = "/etc/", "/proc/", "/sys/", "/usr/lib/", "/usr/share/"
+_SYSTEMS = "/etc/", "/lib/", "/lib64/", "/proc/", "/sys/", "/usr/lib/", "/usr/share/"
 _SYSTEMS += tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 
 _OURS = f"{Path(__file__).parents[1]}{os.sep}"
@@ -47,6 +47,9 @@ _COMPUTING: dict[int, set[str]] = {}
 WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
+_WRITTEN_EVER: set[str] = set()
+"""What this program has written itself at any time."""
+
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size and times as anybody but this package opened it first."""
 
@@ -62,7 +65,8 @@ def heard() -> Iterator[set[str]]:
     finally:
         del _COMPUTING[mine]
         if outer is not None:
-            _COMPUTING[mine] = outer | opened
+            outer |= opened
+            _COMPUTING[mine] = outer
 
 
 def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[str]:
@@ -90,6 +94,11 @@ def changed(told: Iterable[Path]) -> list[str]:
     return sorted(file for file in files & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
 
 
+def written(told: Iterable[Path]) -> list[str]:
+    """Those of some files that this program has written itself."""
+    return sorted({os.path.abspath(file) for file in told} & _WRITTEN_EVER)
+
+
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event not in _PATH:
         return
@@ -97,11 +106,12 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         path: Any = arguments[_PATH[event]]
         if event == "exec":
             path = path.co_filename if path.co_name == "<module>" else None
-        if not isinstance(path, str | bytes | os.PathLike) or os.fsdecode(path).startswith("<"):
-            return  # an open file, or a code of no file
-        if event == "ctypes.dlopen" and os.sep not in os.fsdecode(path):
-            return  # the system's linker looks for it
-        file = os.path.abspath(_URI.sub(r"\1", os.fsdecode(path)))
+        if not isinstance(path, str | bytes | os.PathLike):
+            return  # an open file
+        name = _URI.sub(r"\1", os.fsdecode(path))
+        if name.startswith(("<", ":memory:")) or (event == "ctypes.dlopen" and os.sep not in name):
+            return  # of no file; or the system's linker looks for it
+        file = os.path.abspath(name)
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
             _note(file, event == "os.rename" or (event == "open" and _only_writes(arguments[2])), event == "open")
 
@@ -110,6 +120,7 @@ def _note(file: str, written: bool, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     if written:
         WRITTEN.update([file] if _COMPUTING else [])
+        _WRITTEN_EVER.add(file)
         return
     if read and not opener.f_code.co_filename.startswith(_OURS):
         _AT_FIRST.setdefault(file, _stamp(file))
@@ -149,7 +160,7 @@ def _only_writes(flags: int) -> bool:
 
 
 def _openers(frame: FrameType | None, file: str) -> set[str]:
-    """The user's function that opens a file, and the module that runs at the moment unless this package has called it.
+    """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
     Where this package opens it for them, that module alone, and no script for a controller that it loads."""
     found, ours = set[str](), False
     while frame:
@@ -158,11 +169,12 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
             if found:
                 return found
             ours = True
-        elif frame.f_code.co_name == "<module>":
-            loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith((".py", ".toml"))
-            return set() if loads else {plain(os.path.abspath(by)), *found}
-        elif not (ours or found) and is_users(os.path.abspath(by)):
-            found.add(plain(os.path.abspath(by)))
+        elif not by.startswith("<") and is_users(os.path.abspath(by)):
+            if frame.f_code.co_name == "<module>":
+                loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith((".py", ".toml"))
+                return set() if loads else {plain(os.path.abspath(by)), *found}
+            if not (ours or found):
+                found.add(plain(os.path.abspath(by)))
         frame = frame.f_back
     return found
 
