@@ -65,6 +65,17 @@ PROGRAMS = {
         "mine": f"{CACHED}def cell():\n    return xr.Dataset({{'gain': load('gain')}})\n",
         "script": SCRIPT.replace("print", "run([Cell('a', cell, {})]); print"),
     },
+    "a module, while another thread sweeps": {
+        "mine": LOADS,
+        "other": f"{NEW}from threading import Event\nBEGUN, GO_ON = Event(), Event()\n"
+        "def cell():\n    BEGUN.set()\n    GO_ON.wait()\n    return xr.Dataset({'gain': 1.0})\n",
+        "script": SCRIPT.replace(
+            "from mine",
+            "from threading import Thread\nimport other\nfrom hexmj.sweeps import Cell, run\n"
+            "beside = Thread(target=run, args=([Cell('beside', other.cell, {})],))\nbeside.start()\n"
+            "other.BEGUN.wait()\nimport mine\nother.GO_ON.set()\nbeside.join()\nfrom mine",
+        ),
+    },
     "a helper that the script has called": {
         "helper": CACHED,
         "mine": f"{NEW}import helper\ndef cell():\n    return xr.Dataset({{'gain': helper.load('gain')}})\n",

@@ -4,14 +4,17 @@ import os
 import re
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
+import hexmj
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, over_axes, run
 from small_cells import odd_cells
@@ -100,3 +103,20 @@ def shut() -> Executor:
 def test_sweeps_of_what_is_none_are_refused_in_one_sentence(ask: Callable[[], object], sentence: str) -> None:
     with pytest.raises(InputError, match=re.escape(sentence)):
         ask()
+
+
+@dataclass(frozen=True)
+class Remembers:
+    """A controller that keeps something beside its fields once it plans."""
+
+    name: str = "remembers"
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        object.__setattr__(self, "table", 1.0)
+        return hexmj.LDVS.begin(*given, **how)
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_a_setting_that_comes_about_is_refused(tmp_path: Path, keeps: bool) -> None:
+    with pytest.raises(InputError, match="Remembers keeps 'table' beside its fields; expected all settings as fields"):
+        hexmj.flss(Remembers(), 0.5, n_starts=2, window=1.0, folder=tmp_path / "kept" if keeps else None)

@@ -55,6 +55,17 @@ def test_before_it_hears_them(by, how):
     assert running.returncode == 130 and b"hexmj: stopped" in told and b"Traceback" not in told
 
 
+def test_no_program_is_started_that_a_stop_would_reach(tmp_path):
+    """As GLFW does to ask libraries for their versions."""
+    heard = "lambda event, _: event == 'subprocess.Popen' and print('started a program', flush=True)"
+    script = f"import sys\nfrom hexmj.__main__ import main\nsys.addaudithook({heard})\nmain()"
+    words = "flss --physical --velocities 0.5 --starts 1 --window 5 --threads 1"
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words.split()], env=ENVIRONMENT, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 0 and "FLSS" in done.stdout and "started" not in done.stdout
+
+
 @pytest.mark.parametrize("module", ["tyro", "numpy", "mujoco"])
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_while_it_is_imported(by, module):

@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
 from urllib.request import urlopen
 
 import numpy as np
@@ -89,6 +91,14 @@ def test_a_controller_that_cannot_go_on_begins_again():
     assert live.velocity == 0.5
 
 
+@dataclass(frozen=True)
+class NeverAtSpeed(Cruse1998):
+    """The network, of which no plan can be had that walks at once."""
+
+    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
+        raise ValueError("not at speed")
+
+
 def test_what_makes_no_sense_changes_nothing():
     live = begun()
     live.advance(0.1)
@@ -103,7 +113,9 @@ def test_what_makes_no_sense_changes_nothing():
     for wrong in (np.nan, np.inf, 1e9, "a", None):
         with pytest.raises(InputError, match="impulse = "):
             live.push(wrong)  # pyright: ignore[reportArgumentType]
-    assert live.velocity == 0.4
+    with pytest.raises(InputError, match="begin_at_speed: ValueError"):
+        live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights))
+    assert (live.velocity, live.controller) == (0.4, LDVS)
     assert live.moment is before
 
 

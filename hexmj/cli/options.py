@@ -65,10 +65,10 @@ def check_loaded() -> None:
     """Refuse that a file has changed, while the command was at work, which a field of a controller names.
 
     Raises:
-        InputError: it has.
+        InputError: it has, or settings are none any more.
     """
     for name, (controller, settings) in LOADED.items():
-        if _settings(controller) != settings:
+        if settings is not None and plain(controller) != settings:
             raise InputError(f"a file that {name} names has changed while the command was at work; start it again")
 
 

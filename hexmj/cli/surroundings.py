@@ -3,6 +3,7 @@
 import os
 import shutil
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,16 @@ def settle() -> None:
     warnings.formatwarning = _shown
     os.environ["MPLBACKEND"] = "agg"  # figures go to files
     drop_vain_wish()
+    _spare_glfw_its_programs()
+
+
+def _spare_glfw_its_programs() -> None:
+    """GLFW, which MuJoCo imports, starts a program for each library that it finds, to ask for its version; and Ctrl-C
+    reaches that, too.  It may take its own."""
+    spec = find_spec("glfw") if os.environ.get("XDG_SESSION_TYPE") != "wayland" else None
+    for folder in (spec and spec.submodule_search_locations) or ():
+        if (own := Path(folder, "x11", "libglfw.so")).is_file():
+            os.environ.setdefault("PYGLFW_LIBRARY", str(own))
 
 
 def _shown(message: Warning | str, category: type[Warning], filename: str, *place: Any) -> str:

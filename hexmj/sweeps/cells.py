@@ -67,6 +67,14 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
+    def check_settings(self) -> None:
+        """Refuse settings, or a function, that cannot be written down.
+
+        Raises:
+            InputError: they cannot.
+        """
+        self._told()
+
     def not_kept(self, opened: set[str]) -> str:
         """Why it cannot be kept, in a sentence, if its code has opened files that its record does not tell; else empty.
 
@@ -140,8 +148,10 @@ def check_unchanged(cell: Cell, before: str, now: str) -> str:
     Raises:
         InputError: anything else has changed.
     """
-    if now == before:
+    if not before or now == before:
         return ""
+    if not now:
+        cell.check_settings()
     what = difference(before, now)
     if what.endswith("of sources") and (files := written(cell.data())):
         return f"{cell.name} is not kept: the program writes {files[0]}, which a text of the cell's code names"

@@ -118,6 +118,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
 
 def _note(file: str, written: bool, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
+    main = threading.main_thread()
+    in_main = threading.current_thread() is main
     if written:
         WRITTEN.update([file] if _COMPUTING else [])
         _WRITTEN_EVER.add(file)
@@ -126,13 +128,14 @@ def _note(file: str, written: bool, read: bool) -> None:
         _AT_FIRST.setdefault(file, _stamp(file))
     if by is not None:
         by.add(file)
-    elif not _COMPUTING:
-        found, main = _openers(opener, file), threading.main_thread()
-        if not found and threading.current_thread() is not main:
+        return
+    if in_main or not _COMPUTING:
+        found = _openers(opener, file)
+        if not (found or in_main):
             found = _openers(sys._current_frames().get(main.ident or 0), file)
         for one in found:
             _OPENED.setdefault(one, set()).add(file)
-    elif not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
+    if _COMPUTING and not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
         for opened in _COMPUTING.values():  # whose thread it is nobody knows
             opened.add(file)
 

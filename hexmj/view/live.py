@@ -11,7 +11,7 @@ import numpy as np
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.checks import numbers, typed
 from hexmj.conditions import Bound, Conditions
-from hexmj.controllers.asking import begin, tell
+from hexmj.controllers.asking import begin, said, tell
 from hexmj.controllers.protocol import (
     Controller,
     Plan,
@@ -107,8 +107,9 @@ class Steered:
         if not (isinstance(self._plan, SteerablePlan) and is_steerable(controller)):
             return False
         tips, standing = self._plan.tips, self._plan.standing
-        plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
-        plan.see(tips, standing)
+        with said("a controller, begin_at_speed"):
+            plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
+            plan.see(tips, standing)
         self._plan = plan
         return True
 
@@ -183,9 +184,9 @@ class LiveWalk:
         controller = controller or self.controller
         begin(controller, self.start[np.newaxis], wanted, self.stride, threads=1)  # refuses what makes no sense
         before, self.velocity, self.controller = (self.velocity, self.controller), wanted, controller
-        if self._plan.hand_over(controller, wanted):
-            return True
         try:
+            if self._plan.hand_over(controller, wanted):
+                return True
             self.begin()
         except Exception:
             self.velocity, self.controller = before
