@@ -227,6 +227,12 @@ def test_a_source_counts_in_any_encoding_that_python_reads(tmp_path: Path, conte
     assert "numpy" in code(frozenset({importable(tmp_path / "mine.py").__name__})).versions
 
 
+def test_what_carries_our_numbers_may_compute_a_users(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("import hexmj.measures.kinematic\nfrom matplotlib.path import Path")
+    versions = code(frozenset({importable(tmp_path / "mine.py").__name__})).versions
+    assert "matplotlib" in versions and "xarray" not in versions
+
+
 def test_a_source_in_an_archive_is_refused_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with zipfile.ZipFile(tmp_path / "lib.zip", "w") as archive:
         archive.writestr("zipped_controller.py", MINE)

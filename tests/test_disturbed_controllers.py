@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, UNCOORDINATED, Cruse1998, InputError, Stride
+from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsLegs, Stride, physical_walk
 from hexmj.controllers.asking import begin
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
@@ -52,6 +52,24 @@ def test_a_halted_start_puts_its_feet_down_where_they_are():
             walk.y[:step, start] != walk.y[0, start]
         ).any()
         assert not np.isnan(walk.height[step + PAUSED :, start]).any()
+
+
+@dataclass(frozen=True)
+class MadeForHalf(Lifts):
+    """It does so at half the usual V_p."""
+
+    name: str = "made for 40 mm/s"
+
+    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
+        plan = Lifts.begin_at_speed(self, *given, **how)
+        plan.made_for = Conditions.of(vp=40.0)
+        return plan
+
+
+@pytest.mark.parametrize("around", [Disturbed(MadeForHalf(), disturbance("push")), ReadsLegs(MadeForHalf())])
+def test_what_a_plan_is_made_for_is_handed_on(around: Any):
+    with pytest.raises(InputError, match=r"the plan is made for vp = 40\.0; expected that of the conditions, 80\.0"):
+        physical_walk(STABLE.starts, around, V, 5.0)
 
 
 @dataclass(frozen=True)

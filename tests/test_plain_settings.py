@@ -93,7 +93,24 @@ class Hidden:
         return 2
 
 
+class Slotted:
+    __slots__ = ("kept",)
+
+
+@dataclass(frozen=True, slots=True)
+class HiddenInASlot(Slotted):
+    """The same in a slot."""
+
+    pull: InitVar[float] = 1.0
+    name: str = "hidden"
+
+    def __post_init__(self, pull: float) -> None:
+        object.__setattr__(self, "kept", pull)
+
+
 def test_a_setting_that_no_field_tells_is_refused() -> None:
+    with pytest.raises(InputError, match=r"HiddenInASlot keeps 'kept' beside its fields; expected all settings as"):
+        plain(HiddenInASlot())
     with pytest.raises(InputError, match=r"Hidden keeps 'kept' beside its fields; expected all settings as fields"):
         plain(Hidden())
 

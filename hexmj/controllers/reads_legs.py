@@ -88,7 +88,7 @@ class SensedPlan:
     def __init__(self, plan: SteerablePlan) -> None:
         """Around a plan at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
-        self._plan = plan
+        self._plan, self.made_for = plan, getattr(plan, "made_for", None)
         self._tips = self._targets = self._ordered = plan.starts
         self._stance = np.ones(plan.starts.shape, dtype=bool)
 

@@ -33,7 +33,8 @@ CARRIERS = {
     *("hexmj.field_docs", "hexmj.process.progress", "hexmj.storage.files", "hexmj.storage.netcdf", "hexmj.sweeps"),
     *("hexmj.user_code.as_run", "hexmj.user_code.reads"),
 }
-"""What carries, keeps and shows numbers, but computes none: another version of these makes no cell anew."""
+"""What carries, keeps and shows this package's numbers, but computes none: another version makes no cell anew, unless
+a user's module imports it."""
 
 DATA = (
     *(".toml", ".xml", ".mjcf", ".mjb", ".urdf", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
@@ -154,6 +155,8 @@ def _follow(modules: frozenset[str]) -> _Needed:
             sources[module_label(name)] = module.digest
             read.append((name, file, module.data))
             ours = top == PACKAGE.name
+            if not file.is_relative_to(PACKAGE):
+                installed |= CARRIERS & {imported.partition(".")[0] for imported, _ in module.imports}
             whole = iter_modules([str(file.parent)]) if attribute == _ALL and module.package and not ours else ()
             inner += [(f"{name}.{one.name}", _ALL) for one in whole]
             waiting += _of_our_own(attribute, module, inner) if ours else [*module.imports, *inner, *_above(name)]

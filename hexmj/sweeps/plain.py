@@ -9,6 +9,7 @@ from functools import cached_property
 from inspect import getattr_static
 from os.path import isfile
 from pathlib import Path
+from types import MemberDescriptorType
 from typing import Any
 
 import numpy as np
@@ -152,7 +153,8 @@ def _folders(kind: type) -> list[Path]:
 def _check_fields(value: Any, names: tuple[str, ...]) -> None:
     """Refuse what keeps anything else, but what it computes once, where no name and no file would tell it."""
     kind = type(value)
-    beside = set(getattr(value, "__dict__", ())) - set(names)
+    slots = {name for base in kind.__mro__ for name, one in vars(base).items() if isinstance(one, MemberDescriptorType)}
+    beside = {*getattr(value, "__dict__", ()), *(name for name in slots if hasattr(value, name))} - set(names)
     if hidden := {name for name in beside if not isinstance(getattr_static(kind, name, None), cached_property)}:
         raise InputError(f"{label(kind)} keeps {min(hidden)!r} beside its fields; expected all settings as fields")
 

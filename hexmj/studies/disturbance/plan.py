@@ -86,7 +86,7 @@ class DisturbedPlan:
         """Around a plan at time 0."""
         self._plan, self._disturbance, self._postures = plan, controller.disturbance, controller.postures
         self.starts, self.stride, self.done = plan.starts, plan.stride, 0
-        self._slows = controller.slows
+        self.made_for, self._slows = getattr(plan, "made_for", None), controller.slows
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, Rest] = {}
         shape = self.starts.shape
