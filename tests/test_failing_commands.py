@@ -20,6 +20,15 @@ def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):
     assert "(EOFError: Ran out of input)" in error
 
 
+def test_a_library_that_cannot_be_loaded_is_not_blamed_on_the_output(run, monkeypatch):
+    def fail(*_, **__):
+        raise OSError("Could not find/load shared object file")
+
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", fail)
+    code, _, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, error) == (2, "hexmj: the system: Could not find/load shared object file\n")
+
+
 @pytest.mark.parametrize(
     ("failed", "why"),
     [

@@ -105,6 +105,14 @@ def test_sweeps_of_what_is_none_are_refused_in_one_sentence(ask: Callable[[], ob
         ask()
 
 
+@pytest.mark.parametrize("what", ["a file", "a link to nothing"])
+def test_a_folder_that_is_none_is_a_sentence(tmp_path: Path, what: str) -> None:
+    kept = tmp_path / "kept"
+    kept.write_text("") if what == "a file" else kept.symlink_to("nowhere")
+    with pytest.raises(InputError, match="kept is a file, or a link to nothing; expected a folder"):
+        hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0, folder=kept)
+
+
 @dataclass(frozen=True)
 class Remembers:
     """A controller that keeps something beside its fields once it plans."""

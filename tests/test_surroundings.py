@@ -49,11 +49,12 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
     assert (tmp_path / "plain" / "flss.png").read_bytes() == (tmp_path / "asked" / "flss.png").read_bytes()
 
 
-@pytest.mark.parametrize("threads", ["0", "-3", "many"])
-def test_threads_of_numba_that_are_none(threads: str):
-    done = done_with(FEW, NUMBA_NUM_THREADS=threads)
+@pytest.mark.parametrize("number", ["-3", "many", "9" * 5000])
+@pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "SOURCE_DATE_EPOCH"])
+def test_numbers_for_libraries_that_are_none(name: str, number: str):
+    done = done_with(FEW, **{name: number})
     assert done.returncode == 2
-    assert f"NUMBA_NUM_THREADS = {threads}; expected a whole number" in done.stderr
+    assert f"{name} = {number[:80]}; expected a whole number" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ ABOUT = (
 
 MEMORY = "the memory does not suffice ({}); expected more of it, or fewer starts"
 
+OUTPUT = "standard output"
 SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
 """What the system has too little of, where no file is named."""
 
@@ -146,10 +147,11 @@ def main() -> None:
         _drop_output()
         sys.exit(141)
     except OSError as error:
-        _drop_output()
         if is_of_numbas_cache(error):
             sys.exit(_complain(f"{NUMBA} ({error.strerror or error})", 2))
-        where = error.filename or ("the system" if error.errno in SHORT else "standard output")
+        where = error.filename or ("the system" if error.errno in (None, *SHORT) else OUTPUT)
+        if where == OUTPUT:
+            _drop_output()
         sys.exit(_complain(f"{where}: {error.strerror or error}", 2))
     except Exception as error:
         if "can't start new thread" in str(error):

@@ -14,16 +14,19 @@ from hexmj.storage.literal import literal
 NARROWEST = 40
 """Columns of a terminal; in a few, boxes of help are never done."""
 
+_NUMBERS = {"NUMBA_NUM_THREADS": (1, 2**31 - 1), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
+"""Variables of the environment -> least and most that libraries take: threads; seconds to the end of the year 9999."""
+
 _PACKAGE = Path(__file__).parents[1]
 _USUAL = warnings.formatwarning
 
 
 def settle() -> None:
-    """Settle the folder, the terminal's width, threads of numba, how warnings of this package are shown, and where
+    """Settle the folder, the terminal's width, numbers for libraries, how warnings of this package are shown, and where
     figures and frames are drawn.
 
     Raises:
-        InputError: the current folder has gone, or numba's number of threads is none.
+        InputError: the current folder has gone, or one of the numbers is none.
     """
     try:
         os.getcwd()
@@ -32,9 +35,10 @@ def settle() -> None:
     columns = shutil.get_terminal_size().columns
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))
-    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
-    if not (threads.isdecimal() and int(threads) > 0):
-        raise InputError(f"NUMBA_NUM_THREADS = {threads:.80}; expected a whole number of at least 1, or nothing")
+    for name, (least, most) in _NUMBERS.items():
+        number = os.environ.get(name, str(least))
+        if not (number.isdecimal() and least <= int(number[:20]) <= most):
+            raise InputError(f"{name} = {number:.80}; expected a whole number from {least} to {most}, or nothing")
     warnings.formatwarning = _shown
     os.environ["MPLBACKEND"] = "agg"  # figures go to files
     drop_vain_wish()

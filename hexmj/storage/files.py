@@ -91,6 +91,8 @@ def prepare(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         try_writing(folder)
+    except FileExistsError:
+        raise InputError(f"{folder} is a file, or a link to nothing; expected a folder") from None
     except OSError as error:
         raise InputError(f"{folder} cannot be written to: {error.strerror or error}") from None
     remove_leftovers(folder)
