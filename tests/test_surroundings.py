@@ -49,12 +49,23 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
     assert (tmp_path / "plain" / "flss.png").read_bytes() == (tmp_path / "asked" / "flss.png").read_bytes()
 
 
+def test_empty_numbers_for_libraries_are_none_at_all():
+    done = done_with(FEW, NUMBA_NUM_THREADS="", SOURCE_DATE_EPOCH="")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("number", ["-3", "many", "9" * 5000])
 @pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "SOURCE_DATE_EPOCH"])
 def test_numbers_for_libraries_that_are_none(name: str, number: str):
     done = done_with(FEW, **{name: number})
     assert done.returncode == 2
     assert f"{name} = {number[:80]}; expected a whole number" in done.stderr
+
+
+def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
+    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film.mp4")), PYGLFW_LIBRARY="/nonexistent")
+    assert done.returncode == 1
+    assert "Nothing can be rendered here (MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none)" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -44,11 +44,11 @@ class WalkingCommand:
 
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
-        from hexmj.controllers.cruse1998.presets import SEARCHED_ON
+        from hexmj.controllers.cruse1998.presets import searched_on
         from hexmj.controllers.named import PART
 
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
-        known = [name for name in self.names if SEARCHED_ON.get(PART.sub("", name)) == self.walks.seed]
+        known = [name for name in self.names if searched_on(PART.sub("", name)) == self.walks.seed]
         line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
         if acceleration := self.accelerating.procedure:
             line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"

@@ -36,6 +36,8 @@ def settle() -> None:
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))
     for name, (least, most) in _NUMBERS.items():
+        if os.environ.get(name) == "":
+            del os.environ[name]
         number = os.environ.get(name, str(least))
         if not (number.isdecimal() and least <= int(number[:20]) <= most):
             raise InputError(f"{name} = {number:.80}; expected a whole number from {least} to {most}, or nothing")

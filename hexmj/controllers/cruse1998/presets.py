@@ -1,7 +1,9 @@
 """Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
 
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -93,22 +95,46 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
     return {key: float(value) for key, value in table.items()}
 
 
-_PAPER = {"hws": HWS_WEIGHTS, "ldvs": LDVS_WEIGHTS, "uncoordinated": NO_WEIGHTS}
-_ENTRIES = read_toml(OWN)
-_OWN = {
-    name: read_network({key: one for key, one in entry.items() if key != "command"}, f"{OWN.name} [{name}]", name)
-    for name, entry in _ENTRIES.items()
+_PAPER = {
+    name: Cruse1998(weights, name=name)
+    for name, weights in (("hws", HWS_WEIGHTS), ("ldvs", LDVS_WEIGHTS), ("uncoordinated", NO_WEIGHTS))
 }
 
-PRESETS: dict[str, Cruse1998] = {name: Cruse1998(weights, name=name) for name, weights in _PAPER.items()} | _OWN
+HWS, LDVS, UNCOORDINATED = _PAPER.values()
+"""The paper's hard-wired and linearly velocity-dependent systems, and none (Section 5.1)."""
+
+
+class _Presets(Mapping[str, Cruse1998]):
+    """Sets by name; the file of our own is read when one of them is asked for, not by every command."""
+
+    def __getitem__(self, name: str) -> Cruse1998:
+        return _PAPER[name] if name in _PAPER else _own()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_PAPER | _own())
+
+    def __len__(self) -> int:
+        return len(_PAPER | _own())
+
+
+PRESETS: Mapping[str, Cruse1998] = _Presets()
 """The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once;
 `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ... `lasting-0.9` and
 `lasting`, which were searched under that reading and walk by it."""
 
-SEARCHED_ON = {
-    name: int(found[1]) for name, entry in _ENTRIES.items() if (found := re.search(r"--seed (\d+)", entry["command"]))
-}
-"""Sets that a search found, and the seed of the starts on which it did: on these they look better than they are."""
 
-HWS, LDVS, UNCOORDINATED = (PRESETS[name] for name in ("hws", "ldvs", "uncoordinated"))
-"""The paper's hard-wired and linearly velocity-dependent systems, and none (Section 5.1)."""
+@cache
+def _own() -> dict[str, Cruse1998]:
+    tables = {name: {key: one for key, one in entry.items() if key != "command"} for name, entry in _entries().items()}
+    return {name: read_network(table, f"{OWN.name} [{name}]", name) for name, table in tables.items()}
+
+
+@cache
+def _entries() -> dict[str, Any]:
+    return read_toml(OWN)
+
+
+def searched_on(name: str) -> int | None:
+    """The seed of the starts on which a search found a set of our own, where it looks better than it is."""
+    found = re.search(r"--seed (\d+)", _entries()[name]["command"]) if name not in _PAPER and name in PRESETS else None
+    return int(found[1]) if found else None

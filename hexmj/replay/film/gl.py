@@ -123,6 +123,10 @@ def missing() -> str | None:
         return _sentence("MUJOCO_GL asks for nothing")
     try:
         check_not_forked()
+        import mujoco
+
+        if not hasattr(mujoco, "Renderer"):
+            return _sentence("MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context
             context = context_type()(16, 16)

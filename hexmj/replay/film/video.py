@@ -140,7 +140,7 @@ def _filmed_insect(film: Film, conditions: Conditions) -> mujoco.MjModel:
 
 
 def _view(
-    renderer: mujoco.Renderer, data: mujoco.MjData, camera: str, take: Take, row: int
+    renderer: "mujoco.Renderer", data: mujoco.MjData, camera: str, take: Take, row: int
 ) -> tuple[np.ndarray, float]:
     """The scene at the end of step `row`, (height, width, 3), and its pixels per mm at the centre of mass."""
     data.qpos[:] = take.qpos[row]
@@ -157,7 +157,7 @@ def _view(
     return renderer.render(), _pixels_per_mm(renderer, centre)
 
 
-def _pixels_per_mm(renderer: mujoco.Renderer, point: np.ndarray) -> float:
+def _pixels_per_mm(renderer: "mujoco.Renderer", point: np.ndarray) -> float:
     """Of a length across the view at a point, (3,) [mm]."""
     camera = renderer.scene.camera[0]
     near = (camera.frustum_top - camera.frustum_bottom) / camera.frustum_near
