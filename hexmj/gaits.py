@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import numbers, typed
+from hexmj.checks import numbers, short, typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.diagrams import footfall_html
@@ -168,8 +168,14 @@ def limit_gait(
 
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Mean direction of phases on the circle [0, 1)."""
+    """Mean direction of phases on the circle [0, 1).
+
+    Raises:
+        InputError: no numbers, or none at all.
+    """
     angle = 2.0 * np.pi * numbers("phase", phase)
+    if not angle.size:
+        raise InputError(f"phase = {short(phase)}; expected at least one")
     mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
@@ -180,8 +186,14 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
     The paper says: a front leg begins protraction when the leg behind it ends its own (zero delay), and the duration
     of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
     V / (1 + V) of the period, and by that part the front leg lags behind.
+
+    Raises:
+        InputError: velocities that are none.
     """
-    return 1.0 / (1.0 + numbers("velocity", v))
+    velocity = numbers("velocity", v)
+    if not ((velocity >= 0) & (velocity <= 1)).all():
+        raise InputError(f"velocity = {short(v)}; expected 0 <= V <= 1")
+    return 1.0 / (1.0 + velocity)
 
 
 def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName:
