@@ -288,9 +288,9 @@ def test_some_starts_alone_go_as_among_all(kind):
 
 def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():
     frozen: Any = dataclass(frozen=True)(type("Rigid", (), {"name": "rigid", "begin": LDVS.begin}))()
-    with pytest.raises(InputError, match="a disturbance of rigid; expected a controller whose plans can go on"):
+    with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
         DisturbedWalks(frozen, **FEW)
-    with pytest.raises(InputError, match="a disturbance of rigid; expected a controller whose plans can go on"):
+    with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
         DisturbedWalks(ReadsLegs(frozen), **FEW)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsLegs, Stride, physical_walk
 from hexmj.controllers.asking import begin
+from hexmj.controllers.protocol import is_steerable
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
 
@@ -96,8 +97,47 @@ class Heir(Cruse1998):
 
 @pytest.mark.parametrize("controller", [HandsOn(), Heir(LDVS.weights, name="heir")], ids=["hands on", "heir"])
 def test_a_controller_whose_begin_at_speed_is_of_another_begin_is_not_disturbed_by_it(controller: Any):
-    with pytest.raises(InputError, match=r"a disturbance of h.*; expected a controller whose plans can go on from"):
+    with pytest.raises(InputError, match=r"h.* cannot be disturbed; expected .* begin_at_speed"):
         begin(Disturbed(controller, disturbance("halt")), STABLE.starts, V, STRIDE)
+
+
+class AtSpeed:
+    """For controllers that walk at their final velocity at once."""
+
+    def begin_at_speed(self: Any, starts, velocity, stride, acceleration=None, threads=None) -> Any:
+        return self.begin(starts, velocity, stride, None, threads)
+
+
+@dataclass(frozen=True)
+class Mixed(AtSpeed):
+    """With `begin` of its own."""
+
+    name: str = "mixed"
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        return LDVS.begin(*given, **how)
+
+
+class Logged:
+    """For those that have it, to note that it was asked for."""
+
+    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
+        return super().begin_at_speed(*given, **how)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@dataclass(frozen=True)
+class LoggedNetwork(Logged, Cruse1998):
+    """The network's own two."""
+
+
+@dataclass(frozen=True)
+class LoggedHeir(Logged, Heir):
+    """Of which the network's own does not go with the heir's `begin`."""
+
+
+def test_mixins_go_with_the_begin_of_the_class_that_they_are_mixed_into():
+    assert is_steerable(Mixed()) and is_steerable(LoggedNetwork(LDVS.weights))
+    assert not is_steerable(LoggedHeir(LDVS.weights))
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,10 @@ def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values
             hexmj.physical_walk(hexmj.draw_starts(1, 3), one, 0.3, 1.0, conditions=conditions)
     with pytest.raises(InputError, match=f"the plan is made for {told}"):
         StickInsect(controller=still, conditions=conditions).reset(seed=0)
+    body = hexmj.STICK_INSECT
+    other = replace(body, lengths=replace(body.lengths, largest_tip_offset=1.0))
+    with pytest.raises(InputError, match="the plan is made for another body that is called stick_insect"):
+        hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(body=other))
     hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(load=1.0))
 
 

@@ -5,11 +5,11 @@ import shutil
 import sys
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, make_dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell
-from hexmj.sweeps.plain import classes, plain
+from hexmj.sweeps.plain import classes, named_files, plain
 from hexmj.timing import Stride
 from hexmj.user_code.loaded import importable
 from small_cells import Wave, odd_bits
@@ -108,6 +108,22 @@ class HiddenInASlot(Slotted):
         object.__setattr__(self, "kept", pull)
 
 
+def made(gain: float) -> Any:
+    """A controller of a class that nobody finds by its name."""
+
+    def begin(self: Any, *given: Any, **how: Any) -> Any:
+        return gain
+
+    return make_dataclass(
+        "Made", [("name", str, "made")], namespace={"begin": begin, "__module__": __name__}, frozen=True
+    )()
+
+
+def test_a_class_that_its_module_does_not_have_under_its_name_is_refused() -> None:
+    with pytest.raises(InputError, match="Made is not what its module has under that name; expected one of a module"):
+        plain(made(1.0))
+
+
 def test_a_setting_that_no_field_tells_is_refused() -> None:
     with pytest.raises(InputError, match=r"HiddenInASlot keeps 'kept' beside its fields; expected all settings as"):
         plain(HiddenInASlot())
@@ -164,7 +180,7 @@ def test_a_file_among_the_settings_is_its_content_and_where_it_lies(
         assert plain(kind(tmp_path / "here" / "body.xml")) != here
     assert plain(text := str(tmp_path)) == text
     assert plain("0.5" * 2000) == "0.5" * 2000
-    assert plain("a.b\0") == "a.b\0"
+    assert plain("a.b\0") == "a.b\0" and not list(named_files("a.b\0"))
 
 
 TABLED = """

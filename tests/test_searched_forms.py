@@ -1,7 +1,7 @@
 """What can be searched: forms of the network, fields of a controller, and what is refused of either."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -127,3 +127,28 @@ class Askew:
 
     def vector(self, controller):
         return np.array([controller.good, controller.idle])
+
+
+@dataclass(frozen=True)
+class Doubled(Pace):
+    """Whose speed comes of what is no field."""
+
+    pull: InitVar[float] = 1.0
+    speed: float = field(init=False)
+
+    def __post_init__(self, pull: float) -> None:
+        object.__setattr__(self, "speed", 2.0 * pull)
+
+
+@dataclass(frozen=True)
+class DoubledAlways(Doubled):
+    """The same, which has to be told it."""
+
+    pull: InitVar[float] = field(kw_only=True)
+
+
+@pytest.mark.parametrize("controller", [Doubled(pull=5.0), DoubledAlways(pull=5.0)])
+def test_fields_are_searched_of_a_controller_that_they_tell_alone(controller):
+    assert FieldsForm(Doubled()).usual == Doubled()
+    with pytest.raises(InputError, match="is another controller once its fields are replaced by what they are"):
+        FieldsForm(controller)

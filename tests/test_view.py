@@ -95,8 +95,11 @@ def test_a_controller_that_cannot_go_on_begins_again():
 class NeverAtSpeed(Cruse1998):
     """The network, of which no plan can be had that walks at once."""
 
+    raises: bool = True
+
     def begin_at_speed(self, *given: Any, **how: Any) -> Any:
-        raise ValueError("not at speed")
+        if self.raises:
+            raise ValueError("not at speed")
 
 
 def test_what_makes_no_sense_changes_nothing():
@@ -115,6 +118,8 @@ def test_what_makes_no_sense_changes_nothing():
             live.push(wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="begin_at_speed: ValueError"):
         live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights))
+    with pytest.raises(InputError, match="begin_at_speed of network gave None; expected a plan that can be steered"):
+        live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights, name="network", raises=False))
     assert (live.velocity, live.controller) == (0.4, LDVS)
     assert live.moment is before
 

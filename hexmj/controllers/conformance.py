@@ -22,8 +22,8 @@ from hexmj.controllers.protocol import (
     ReadingPlan,
     Sensed,
     check_controller_type,
+    check_steerable,
     claims_mirrored,
-    is_steerable,
     settings_of,
 )
 from hexmj.errors import InputError
@@ -249,11 +249,13 @@ def _fast_losses(trial: Trial) -> None:
 
 
 def _at_speed(trial: Trial) -> None:
-    if is_steerable(trial.controller):
+    controller: Any = trial.controller
+    if hasattr(type(controller), "begin_at_speed"):
         with said("a controller, begin_at_speed"):
-            plan = trial.controller.begin_at_speed(trial.starts, trial.velocity, trial.stride, trial.acceleration, 1)
+            plan = controller.begin_at_speed(trial.starts, trial.velocity, trial.stride, trial.acceleration, 1)
         usual = replace(trial, acceleration=None).walk
         _same(usual, advanced(plan, STEPS), "begin without an acceleration, and begin_at_speed,")
+        check_steerable(controller)
 
 
 def _mirrored(trial: Trial) -> None:

@@ -177,9 +177,28 @@ def is_steerable(controller: object) -> TypeGuard[SteerableController]:
 
 
 def goes_with(kind: type, method: str, other: str) -> bool:
-    """Whether a class has a method that was made for its other one: no heir has changed the other one alone."""
-    has, changed = (next((one for one in kind.__mro__ if name in vars(one)), None) for name in (method, other))
-    return has is not None and issubclass(has, changed or has)
+    """Whether a class has a method that was made for its other one: no heir has changed the other one alone.
+
+    A mixin with the method alone goes with any.
+    """
+    having = [one for one in kind.__mro__ if method in vars(one)]
+    knowing = [one for one in having if hasattr(one, other)]
+    return bool(having) and all(getattr(one, other) is getattr(kind, other) for one in knowing[:1])
+
+
+def check_steerable(controller: Controller) -> None:
+    """Refuse a controller that is no `SteerableController`.
+
+    Raises:
+        InputError: it is none.
+    """
+    if is_steerable(controller):
+        return
+    alone = ", in a class that defines its begin, too" if hasattr(type(controller), "begin_at_speed") else ""
+    raise InputError(
+        f"{controller.name} cannot be disturbed; expected a controller whose plans can go on from other legs, with"
+        f" begin_at_speed{alone}, as the 1998 network has"
+    )
 
 
 def check_controller_type(controller: object) -> None:

@@ -118,6 +118,8 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
                 raise InputError(
                     f"the plan is made for {name} = {there[name]}; expected that of the conditions, {here[name]}"
                 )
+        if conditions.body != made_for.body:
+            raise InputError(f"the plan is made for another body that is called {there['body']}; expected this one")
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:

@@ -57,6 +57,15 @@ class FieldsForm:
         check_controller_type(self.usual)
         if not self.names:
             raise InputError(f"{self.usual.name} has no field of the type float; expected one that can be searched")
+        try:
+            same = self.controller(self.begin) == self.usual or not np.isfinite(self.begin).all()
+        except ValueError:  # of what is no field
+            same = False
+        if not same:
+            raise InputError(
+                f"{self.usual.name} is another controller once its fields are replaced by what they are; expected that"
+                " nothing else tells it, as an InitVar would"
+            )
 
     @property
     def names(self) -> tuple[str, ...]:

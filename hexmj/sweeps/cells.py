@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.sweeps.code import code, needed_files
-from hexmj.sweeps.plain import classes, label, named_files, plain
+from hexmj.sweeps.plain import classes, label, named_files, plain, stands_there
 from hexmj.user_code.reads import changed, untold, written
 
 EXECUTION = ("threads", "progress")
@@ -110,7 +109,7 @@ class Cell:
     def _told(self) -> dict[str, Any]:
         if not hasattr(self.function, "__qualname__"):
             raise InputError(f"{self.function!r:.80} of {self.name}; expected a function or a method")
-        if not _stands_there(self.function):
+        if "<" not in self.function.__qualname__ and not stands_there(self.function):
             raise InputError(
                 f"{self.name}: {label(self.function)} is not what its module has under that name; expected a function"
                 " of a module, not one that was wrapped elsewhere"
@@ -129,14 +128,6 @@ class Cell:
     def stem(self, record: str) -> str:
         """The name of its file without the ending."""
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
-
-
-def _stands_there(function: Any) -> bool:
-    """Whether a function is what its name leads to, and no wrapper that goes by it; within a function none leads."""
-    found: Any = sys.modules.get(function.__module__)
-    for name in function.__qualname__.split("."):
-        found = getattr(found, name, None)
-    return "<" in function.__qualname__ or found == getattr(function, "__func__", function)
 
 
 def check_unchanged(cell: Cell, before: str, now: str) -> str:

@@ -81,7 +81,17 @@ def label(thing: Any) -> str:
     """
     if "<" in thing.__qualname__:
         raise InputError(f"{thing.__qualname__} stands inside a function; expected one of a module")
+    if isinstance(thing, type) and not stands_there(thing):
+        raise InputError(f"{thing.__qualname__} is not what its module has under that name; expected one of a module")
     return f"{module_label(thing.__module__)}.{thing.__qualname__}"
+
+
+def stands_there(thing: Any) -> bool:
+    """Whether a class or function is what its name leads to in its module."""
+    found: Any = sys.modules.get(thing.__module__)
+    for name in thing.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found == getattr(thing, "__func__", thing)
 
 
 def module_label(module: str) -> str:
@@ -116,7 +126,7 @@ def named_files(value: Any, folders: Sequence[Path] = ()) -> Iterator[Path]:
     elif isinstance(value, list | tuple):
         for item in value:
             yield from named_files(item, folders)
-    elif isinstance(value, Path) or (type(value) is str and (folders or "." in value)):
+    elif isinstance(value, Path) or (type(value) is str and (folders or "." in value) and "\0" not in value):
         for path in _paths(value, folders):
             yield from parts(path) if isfile(path) else [path]
 

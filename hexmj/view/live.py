@@ -20,6 +20,7 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     is_steerable,
 )
+from hexmj.errors import InputError
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
@@ -109,6 +110,11 @@ class Steered:
         tips, standing = self._plan.tips, self._plan.standing
         with said("a controller, begin_at_speed"):
             plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
+        if not isinstance(plan, SteerablePlan):
+            raise InputError(
+                f"begin_at_speed of {controller.name} gave {plan!r:.80}; expected a plan that can be steered"
+            )
+        with said("a plan, see"):
             plan.see(tips, standing)
         self._plan = plan
         return True

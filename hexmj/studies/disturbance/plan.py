@@ -9,8 +9,7 @@ from hexmj.controllers.protocol import (
     Sensed,
     SteerableController,
     SteerablePlan,
-    check_controller_type,
-    is_steerable,
+    check_steerable,
 )
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance
@@ -63,20 +62,6 @@ class Disturbed:
             raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
         plan = self.controller.begin_at_speed(starts, velocity, stride, acceleration, threads)
         return DisturbedReadingPlan(self, plan) if isinstance(plan, ReadingPlan) else DisturbedPlan(self, plan)
-
-
-def check_steerable(controller: object) -> None:
-    """Refuse a controller whose plans cannot go on from other legs than their own.
-
-    Raises:
-        InputError: it has no `begin_at_speed`.
-    """
-    check_controller_type(controller)
-    if not is_steerable(controller):
-        raise InputError(
-            f"a disturbance of {getattr(controller, 'name', '')}; expected a controller whose plans can go on from"
-            " other legs, with begin_at_speed, as the 1998 network has"
-        )
 
 
 class DisturbedPlan:
