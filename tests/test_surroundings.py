@@ -63,7 +63,8 @@ def test_numbers_for_libraries_that_are_none(name: str, number: str):
 
 
 def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
-    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film.mp4")), PYGLFW_LIBRARY="/nonexistent")
+    words = "render", "--window", "1", "--out", str(tmp_path / "film.mp4")
+    done = done_with(words, PYGLFW_LIBRARY="/nonexistent", MUJOCO_GL="")
     assert done.returncode == 1
     assert "Nothing can be rendered here (MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none)" in done.stderr
 
