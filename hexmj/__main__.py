@@ -15,7 +15,7 @@ def main() -> None:
     """
     try:
         hear_stops()
-        gc.set_threshold(10_000)  # not while modules are imported: a command takes 5 % less time
+        gc.set_threshold(10_000)  # after so many new objects: `hexmj flss` takes 5 % less time
         from hexmj.cli.main import main as command
 
         command()

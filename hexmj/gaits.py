@@ -174,7 +174,7 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
         InputError: no numbers, or none at all.
     """
     angle = 2.0 * np.pi * numbers("phase", phase)
-    if not angle.size:
+    if not (angle.size if axis is None else angle.shape[axis]):
         raise InputError(f"phase = {short(phase)}; expected at least one")
     mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
@@ -191,7 +191,7 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
         InputError: velocities that are none.
     """
     velocity = numbers("velocity", v)
-    if not ((velocity >= 0) & (velocity <= 1)).all():
+    if ((velocity < 0) | (velocity > 1)).any():
         raise InputError(f"velocity = {short(v)}; expected 0 <= V <= 1")
     return 1.0 / (1.0 + velocity)
 

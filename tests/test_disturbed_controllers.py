@@ -135,8 +135,17 @@ class LoggedHeir(Logged, Heir):
     """Of which the network's own does not go with the heir's `begin`."""
 
 
+@dataclass(frozen=True)
+class OfTheClass(Mixed):
+    """Whose `begin` is the class's."""
+
+    @classmethod
+    def begin(cls, *given: Any, **how: Any) -> Any:
+        return LDVS.begin(*given, **how)
+
+
 def test_mixins_go_with_the_begin_of_the_class_that_they_are_mixed_into():
-    assert is_steerable(Mixed()) and is_steerable(LoggedNetwork(LDVS.weights))
+    assert is_steerable(Mixed()) and is_steerable(OfTheClass()) and is_steerable(LoggedNetwork(LDVS.weights))
     assert not is_steerable(LoggedHeir(LDVS.weights))
 
 

@@ -187,6 +187,7 @@ def test_a_file_that_is_missing_counts_too(
         "len(hexmj.load_controller('graham').name) / 6",
         "sqlite3.connect(':memory:').execute('select 1.0').fetchone()[0]",
         "sqlite3.connect('file::memory:?cache=shared', uri=True).execute('select 1.0').fetchone()[0]",
+        "sqlite3.connect('file:it?mode=memory', uri=True).execute('select 1.0').fetchone()[0]",
     ],
 )
 def test_what_it_writes_itself_and_what_is_installed_does_not_count(

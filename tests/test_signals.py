@@ -41,7 +41,9 @@ def stopped(running: subprocess.Popen[bytes], by: signal.Signals, group: bool = 
     assert out == b""
 
 
-@pytest.mark.parametrize("how", [["-m", "hexmj"], [str(Path(sys.executable).with_name("hexmj"))]], ids=len)
+@pytest.mark.parametrize(
+    "how", [["-m", "hexmj"], [str(Path(sys.executable).with_name("hexmj"))]], ids=["module", "script"]
+)
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_before_it_hears_them(by, how):
     """While the package itself is imported, of which Python tells on the way."""

@@ -54,8 +54,13 @@ def test_empty_numbers_for_libraries_are_none_at_all():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("number", ["-3", "many", "9" * 5000])
-@pytest.mark.parametrize("name", ["NUMBA_NUM_THREADS", "SOURCE_DATE_EPOCH"])
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        *(("NUMBA_NUM_THREADS", one) for one in ("0", "-3", "many", str(2**31))),
+        *(("SOURCE_DATE_EPOCH", one) for one in ("-3", "now", "253402300800", "9" * 5000)),
+    ],
+)
 def test_numbers_for_libraries_that_are_none(name: str, number: str):
     done = done_with(FEW, **{name: number})
     assert done.returncode == 2

@@ -49,10 +49,12 @@ def settle() -> None:
 
 def _spare_glfw_its_programs() -> None:
     """GLFW, which MuJoCo imports, starts a program for each library that it finds, to ask for its version; and Ctrl-C
-    reaches that, too.  It may take its own."""
-    spec = find_spec("glfw") if os.environ.get("XDG_SESSION_TYPE") != "wayland" else None
+    reaches that, too.  It may take its own, of the kind that it would look for first."""
+    spec, session = find_spec("glfw"), os.environ.get("XDG_SESSION_TYPE")
+    wish = os.environ.get("PYGLFW_LIBRARY_VARIANT", "").lower()
+    kind = wish if wish in ("wayland", "x11") else "wayland" if session == "wayland" else "x11"
     for folder in (spec and spec.submodule_search_locations) or ():
-        if (own := Path(folder, "x11", "libglfw.so")).is_file():
+        if (own := Path(folder, kind, "libglfw.so")).is_file():
             os.environ.setdefault("PYGLFW_LIBRARY", str(own))
 
 

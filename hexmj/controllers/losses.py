@@ -44,7 +44,8 @@ def tells_losses(plan: Plan) -> TypeGuard[FastLosses]:
     own = getattr(plan, "__dict__", {})
     if "first_losses" in own or "advance" in own:
         return "first_losses" in own
-    return goes_with(type(plan), "first_losses", "advance")
+    tells = next((one for one in type(plan).__mro__ if "first_losses" in vars(one)), None)
+    return hasattr(tells, "advance") and goes_with(type(plan), "first_losses", "advance")
 
 
 def planned_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> np.ndarray:

@@ -6,6 +6,7 @@ what a robot would know.
 """
 
 from dataclasses import dataclass, is_dataclass
+from inspect import getattr_static
 from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
@@ -179,11 +180,11 @@ def is_steerable(controller: object) -> TypeGuard[SteerableController]:
 def goes_with(kind: type, method: str, other: str) -> bool:
     """Whether a class has a method that was made for its other one: no heir has changed the other one alone.
 
-    A mixin with the method alone goes with any.
+    Classes that have the method without the other one are passed over; where all do, it goes with any.
     """
     having = [one for one in kind.__mro__ if method in vars(one)]
-    knowing = [one for one in having if hasattr(one, other)]
-    return bool(having) and all(getattr(one, other) is getattr(kind, other) for one in knowing[:1])
+    knowing = next((one for one in having if hasattr(one, other)), None)
+    return bool(having) and (knowing is None or getattr_static(knowing, other) is getattr_static(kind, other))
 
 
 def check_steerable(controller: Controller) -> None:

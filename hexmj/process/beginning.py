@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from hexmj.process.signals import STOPS
@@ -17,8 +18,8 @@ def _end(number: int, frame: Any) -> None:
 
 def _is_the_command() -> bool:
     """Whether this program was started as `hexmj` or `python -m hexmj`; no process of a pool was."""
-    began = sys.orig_argv[-len(sys.argv) :][:1]
-    return [os.path.basename(one) for one in began] in (["hexmj"], ["-mhexmj"])
+    now, began = sys.argv[:1], sys.orig_argv[-len(sys.argv) :][:1]
+    return (now == ["-m"] and began in (["hexmj"], ["-mhexmj"])) or (now == began and Path(*now).stem == "hexmj")
 
 
 if _is_the_command():

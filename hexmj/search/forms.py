@@ -1,6 +1,7 @@
 """Forms: which numbers of a controller a search chooses, as a vector; `network_forms` has those of the 1998 network."""
 
 from dataclasses import dataclass, fields, replace
+from inspect import signature
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -57,15 +58,9 @@ class FieldsForm:
         check_controller_type(self.usual)
         if not self.names:
             raise InputError(f"{self.usual.name} has no field of the type float; expected one that can be searched")
-        try:
-            same = self.controller(self.begin) == self.usual or not np.isfinite(self.begin).all()
-        except ValueError:  # of what is no field
-            same = False
-        if not same:
-            raise InputError(
-                f"{self.usual.name} is another controller once its fields are replaced by what they are; expected that"
-                " nothing else tells it, as an InitVar would"
-            )
+        of: Any = self.usual
+        if beside := signature(type(of)).parameters.keys() - {one.name for one in fields(of)}:
+            raise InputError(f"{of.name} is made of {min(beside)}, too; expected one that its fields alone tell")
 
     @property
     def names(self) -> tuple[str, ...]:

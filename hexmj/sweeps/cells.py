@@ -134,7 +134,7 @@ def check_unchanged(cell: Cell, before: str, now: str) -> str:
     """Refuse what a cell has given if something that it depends on has changed since, as its records tell.
 
     Returns:
-        Why it is not kept, if that is a file which a text names, and which this program writes itself; else empty.
+        Why it is not kept, if that is a file which a text names, and which this process writes itself; else empty.
 
     Raises:
         InputError: anything else has changed.
@@ -143,9 +143,12 @@ def check_unchanged(cell: Cell, before: str, now: str) -> str:
         return ""
     if not now:
         cell.check_settings()
-    what = difference(before, now)
-    if what.endswith("of sources") and (files := written(cell.data())):
-        return f"{cell.name} is not kept: the program writes {files[0]}, which a text of the cell's code names"
+    what, (old, new) = difference(before, now), (json.loads(one).get("sources", {}) for one in (before, now))
+    sources = [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
+    here = tuple(f", {Path(file).name}" for file in written(cell.data()))
+    if what.endswith("of sources") and all(one.endswith(here) for one in sources):
+        file = min(sources).rpartition(", ")[2]
+        return f"{cell.name} is not kept: the program writes {file}, which a text of the cell's code names"
     raise InputError(
         f"{cell.name}: {what} has changed while it was in use; start again, with fields that stay as they are and name"
         " files that are read, not written"

@@ -81,7 +81,7 @@ def label(thing: Any) -> str:
     """
     if "<" in thing.__qualname__:
         raise InputError(f"{thing.__qualname__} stands inside a function; expected one of a module")
-    if isinstance(thing, type) and not stands_there(thing):
+    if hasattr(thing, "__dataclass_fields__") and not stands_there(thing):
         raise InputError(f"{thing.__qualname__} is not what its module has under that name; expected one of a module")
     return f"{module_label(thing.__module__)}.{thing.__qualname__}"
 

@@ -108,8 +108,9 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             path = path.co_filename if path.co_name == "<module>" else None
         if not isinstance(path, str | bytes | os.PathLike):
             return  # an open file
-        name = _URI.sub(r"\1", os.fsdecode(path))
-        if name.startswith(("<", ":memory:")) or (event == "ctypes.dlopen" and os.sep not in name):
+        given = os.fsdecode(path)
+        name = ":memory:" if "mode=memory" in given else _URI.sub(r"\1", given)
+        if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = os.path.abspath(name)
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):

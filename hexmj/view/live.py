@@ -110,7 +110,7 @@ class Steered:
         tips, standing = self._plan.tips, self._plan.standing
         with said("a controller, begin_at_speed"):
             plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
-        if not isinstance(plan, SteerablePlan):
+        if not hasattr(plan, "see"):
             raise InputError(
                 f"begin_at_speed of {controller.name} gave {plan!r:.80}; expected a plan that can be steered"
             )

@@ -111,10 +111,13 @@ class _Presets(Mapping[str, Cruse1998]):
         return _PAPER[name] if name in _PAPER else _own()[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_PAPER | _own())
+        return iter([*_PAPER, *_own()])
 
     def __len__(self) -> int:
-        return len(_PAPER | _own())
+        return len(_PAPER) + len(_own())
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
 
 
 PRESETS: Mapping[str, Cruse1998] = _Presets()

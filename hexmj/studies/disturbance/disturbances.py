@@ -32,7 +32,7 @@ CHUNK = 50
 """Steps planned at a time while a leg that protracts is looked for."""
 
 
-SEARCHED = 100
+MOST_PERIODS = 100
 """Periods of a single leg for which one that protracts is looked for."""
 
 
@@ -132,12 +132,12 @@ def disturbance_of(
         return Disturbance(kind, stable.step, leg)
     plan, step = begin(controller, stable.starts, velocity, stride), np.full_like(leg, NEVER)
     advanced(plan, int(stable.step.min()) - 1)
-    end = stable.step.max() + SEARCHED * stride.periods(velocity) / stride.dt
+    end = stable.step.max() + MOST_PERIODS * stride.periods(velocity) / stride.dt
     while (step == NEVER).any():
         if plan.done > end:
             raise InputError(
                 f"disturbance = 'leg' of {controller.name}: of {(step == NEVER).sum()} of {len(step)} starts no leg"
-                f" protracts within {SEARCHED} periods of a single leg; expected a controller whose legs do"
+                f" protracts within {MOST_PERIODS} periods of a single leg; expected a controller whose legs do"
             )
         first = plan.done + 1
         up = ~advanced(plan, CHUNK).stance
