@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from small_cells import BODY, ENVIRONMENT
@@ -128,6 +129,14 @@ def test_a_log_that_a_script_names_and_writes_meanwhile_is_no_error(tmp_path: Pa
         tmp_path, mine=f"{NEW}def cell():\n    return xr.Dataset({{'gain': 2.0}})\n", script=SCRIPT + log
     )
     assert (gain, kept, complaint) == (2.0, 1, "")
+
+
+def test_a_log_excuses_no_change_of_another_file(tmp_path: Path) -> None:
+    (tmp_path / "gains.toml").write_text("2.0")
+    cell = "def cell():\n    __import__('subprocess').run('echo 3.0 > gains.toml; echo . >> log.txt', shell=True)\n"
+    script = f"import hexmj\n{NEW}open('log.txt', 'a').close()\nGAINS = 'gains.toml'\n"
+    gain, kept, complaint = sweep(tmp_path, script=f"{script}{cell}    return xr.Dataset({{'gain': 2.0}})\n{SWEEPS}")
+    assert np.isnan(gain) and kept == 0 and "gains.toml of sources has changed while it was in use" in complaint
 
 
 def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) -> None:

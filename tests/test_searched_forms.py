@@ -151,3 +151,12 @@ class DoubledAlways(Doubled):
 def test_fields_are_searched_of_a_controller_that_they_tell_alone(controller):
     with pytest.raises(InputError, match="pace is made of pull, too; expected one that its fields alone tell"):
         FieldsForm(controller)
+
+
+@dataclass(frozen=True, eq=False)
+class Unequal(Pace):
+    """Which equals itself alone."""
+
+
+def test_fields_are_searched_of_a_controller_without_equality():
+    assert FieldsForm(Unequal()).names == FieldsForm(Pace()).names

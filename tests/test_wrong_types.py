@@ -207,6 +207,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: circular_mean([0.1 + 1j]), "phase = [(0.1+1j)]; expected numbers"),  # pyright: ignore
     (lambda: wilson_phase("slow"), "velocity = 'slow'; expected numbers"),  # pyright: ignore
     (lambda: wilson_phase([0.5, -1.0]), "velocity = [0.5, -1.0]; expected 0 <= V <= 1"),
+    (lambda: circular_mean(np.empty((0, 4)), axis=0), "phase = array([]"),
     (lambda: circular_mean([]), "phase = []; expected at least one"),
     (lambda: hexmj.load_controller(3), "name = 3; expected a text"),  # pyright: ignore
     (lambda: compare(folder=3), "folder = 3; expected a Path or a text or None"),

@@ -66,14 +66,6 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def check_settings(self) -> None:
-        """Refuse settings, or a function, that cannot be written down.
-
-        Raises:
-            InputError: they cannot.
-        """
-        self._told()
-
     def not_kept(self, opened: set[str]) -> str:
         """Why it cannot be kept, in a sentence, if its code has opened files that its record does not tell; else empty.
 
@@ -142,7 +134,7 @@ def check_unchanged(cell: Cell, before: str, now: str) -> str:
     if not before or now == before:
         return ""
     if not now:
-        cell.check_settings()
+        cell.record()  # which says what cannot be written down
     what, (old, new) = difference(before, now), (json.loads(one).get("sources", {}) for one in (before, now))
     sources = [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
     here = tuple(f", {Path(file).name}" for file in written(cell.data()))
