@@ -54,6 +54,8 @@ def varied(part: Part, variant: str) -> Part:
     """
     if variant not in VARIANTS:
         raise InputError(f"variant {variant!r:.80}; valid names: {', '.join(VARIANTS)}")
+    if variant == "usual":
+        return part
     own: Any = part
     usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
     wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}

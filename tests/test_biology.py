@@ -20,9 +20,10 @@ from hexmj.studies.biology.ground_forces import GroundForces
 from hexmj.studies.biology.names import SEGMENTS, UNITS
 from hexmj.studies.biology.quantities import quantities
 from hexmj.studies.biology.strides import Strides, last_strides, onsets, strides_between
-from hexmj.studies.biology.study import Biology
+from hexmj.studies.biology.study import MEASURED, Biology
 from hexmj.studies.biology.table import rows
 from hexmj.sweeps import conduct
+from hexmj.timing import Stride
 
 WEIGHT = STICK_INSECT.mass * 9810.0
 PERIOD = 20.0 * (1.0 + 1.0 / 0.3)  # of a single leg at V = 0.3
@@ -102,6 +103,23 @@ def test_heights_do_not_hang_on_the_order_in_which_a_legs_parts_are_named(walkin
     legs = tuple(replace(leg, parts=leg.parts[::-1]) for leg in STICK_INSECT.legs)
     other = settle(draw_starts(1, 0), Conditions(body=replace(STICK_INSECT, legs=legs))).compiled
     assert quantities(strides[0], other) == told[0]
+
+
+def test_a_leg_that_is_lifted_in_the_first_row_begins_its_strides_with_the_next():
+    """Before the first row nothing is known of its velocity; start 7 of seed 0 lifts leg 1 there."""
+    velocity = 31.0 / 80.0
+    settled, period = settle(draw_starts(8, 0)[7:]), float(Stride().periods(velocity))
+    first, *chunks = [
+        chunk
+        for chunk in drive(settled, begin(LDVS, settled.starts, velocity, settled.stride), 8 * period)
+        if chunk.first >= (8 - MEASURED) * period / settled.stride.dt * settled.substeps
+    ]
+    standing = np.concatenate([chunk.standing[0, :, 0] for chunk in (first, *chunks)])
+    lifted = onsets(standing, settled.compiled.model.opt.timestep)
+    assert lifted[0] == 1
+    ((_, strides),) = last_strides(settled, LDVS, velocity, 8 * period, MEASURED * period)
+    assert len(strides.qpos) == lifted[-1] - lifted[1]
+    assert np.isfinite(list(quantities(strides, settled.compiled).values())).any()
 
 
 def test_a_hop_is_no_swing():

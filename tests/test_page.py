@@ -136,6 +136,15 @@ def test_the_ground_is_as_high_as_it_is(ground):
     assert (shape.faces < max(1, len(shape.corners))).all()
 
 
+def test_a_geom_has_its_own_colour_before_that_of_its_material():
+    model = compile_body(Conditions()).model
+    colours = body_shape(model).colour
+    model.geom_rgba[model.geom_matid >= 0] = 1.0, 0.0, 1.0, 1.0
+    assert not np.array_equal(body_shape(model).colour, colours)
+    model.geom_rgba[:] = 0.0
+    assert len(body_shape(model).faces) == 0
+
+
 def test_whatever_is_hidden_is_not_drawn():
     model = compile_body(Conditions()).model
     whole = len(body_shape(model).faces)

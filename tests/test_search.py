@@ -152,5 +152,5 @@ def test_what_has_no_such_parameters_is_refused():
         FieldsForm(hexmj.UNCOORDINATED)
     with pytest.raises(InputError, match="ldvs to begin with; expected a Pace"):
         search(Problem(FieldsForm(Pace()), 0.4, 0.4), Effort(begin=hexmj.LDVS))
-    with pytest.raises(InputError, match="pace has no weights"):
+    with pytest.raises(InputError, match="pace is not made of weights alone"):
         search(PROBLEM, Effort(begin=Pace()))

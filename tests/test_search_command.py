@@ -139,6 +139,39 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     assert "share" in text and "usual" in text
 
 
+HEIR = """
+from dataclasses import dataclass, replace
+import hexmj
+
+@dataclass(frozen=True)
+class Stretched(hexmj.Cruse1998):
+    weights: object = hexmj.LDVS.weights
+    name: str = "stretched"
+    gain: float = 1.0
+    reading: str = "a word of its own"
+
+    def begin(self, *how):
+        w = self.weights
+        return hexmj.Cruse1998(replace(w, p1_i=self.gain * w.p1_i)).begin(*how)
+"""
+
+
+def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
+    """It is no set of weights: neither what is found nor what a search of weights can begin with."""
+    (tmp_path / "heir.py").write_text(HEIR)
+    form = f"{tmp_path / 'heir.py'}:Stretched"
+    words = ["--velocity", 0.4, "--window", "start", "--starts", 10, "--budget", 4, "--population", 2]
+    words += ["--refine-budget", 0, "--verdict-starts", 5, "--json", "--out", tmp_path / "out"]
+    code, text, error = run("search", "--form", form, *words)
+    assert code == 0, error
+    found = hexmj.load_controller(str(tmp_path / "out/found.toml"))
+    assert type(found).__name__ == "Stretched"
+    assert {"gain": vars(found)["gain"]} == json.loads(text)["found"]
+    code, _, error = run("search", "--begin", form, *words[:-1], tmp_path / "weights")
+    assert code == 2
+    assert "stretched is not made of weights alone" in error
+
+
 ODD = """
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from PIL import Image, ImageSequence
 
+from compiled_bodies import changed_body
 from drawing import drawing
 from film_reader import read_film
 from hexmj.bodies.loading import compile_body
@@ -187,6 +188,18 @@ def test_the_scale_is_that_of_the_camera(plan):
         _, scale = _view(renderer, mujoco.MjData(model), "top", take, 0)
     height = model.cam("top").pos[2]  # above the centre of mass of what it tracks
     assert scale == pytest.approx(480 / (2 * height * np.tan(np.radians(model.cam("top").fovy[0] / 2))), rel=0.05)
+
+
+@drawing
+def test_a_camera_that_the_insect_has_passed_has_no_scale(plan, tmp_path):
+    """It stands in the world, 10 mm ahead; the film goes on."""
+    camera = '<worldbody><camera name="ahead" pos="10 0 12" xyaxes="0 1 0 0 0 1"/>'
+    body = changed_body(tmp_path, {"<worldbody>": camera})
+    body = replace(body, name=STICK_INSECT.name, cameras=(*STICK_INSECT.cameras, "ahead"))
+    frames = render([plan], tmp_path / "film.mp4", Film(camera="ahead"), body=body)
+    assert len(read_film(tmp_path / "film.mp4")[0]) == frames
+    blank = np.full((18, 640, 3), 200, dtype=np.uint8)
+    assert (Overlay(Take.of(plan), Film(), 0.0, 1.0)._strip(blank, 0.0)[:, :300] == 200).all()
 
 
 @drawing

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 from urllib.request import urlopen
 
@@ -16,6 +18,7 @@ import pytest
 
 from chromium import tab
 from hexmj.conditions import Conditions
+from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Symmetric
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
@@ -26,6 +29,7 @@ from hexmj.measures.physical import physical_walk
 from hexmj.process import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
+from hexmj.view import desktop
 from hexmj.view.browser import BrowserView, footfall
 from hexmj.view.live import LiveWalk
 from hexmj.view.session import LIES, LiveSession
@@ -124,6 +128,48 @@ def test_what_makes_no_sense_changes_nothing():
     assert live.moment is before
 
 
+@dataclass(frozen=True)
+class Stumbles:
+    """Begins at any velocity, and fails at its first step above 0.5."""
+
+    name: str = "stumbles"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        def step(v):
+            if velocity > 0.5:
+                raise ValueError("too fast")
+            return Step(starts, np.ones(6, dtype=bool))
+
+        return stepwise(step, starts, velocity, stride, acceleration)
+
+
+def test_a_walk_that_fails_as_it_begins_leaves_the_one_before():
+    live = begun()
+    live.advance(0.1)
+    before = live.moment
+    with pytest.raises(InputError, match="too fast"):
+        live.steer(controller=Stumbles(), velocity=0.6)
+    assert live.moment is before
+    assert live.advance(0.1).seconds == pytest.approx(before.seconds + 0.1, abs=0.01)
+    assert (live.velocity, live.controller) == (0.4, LDVS)
+
+
+def test_a_key_that_asks_for_what_is_refused_is_told(monkeypatch):
+    """MuJoCo's viewer without its window."""
+    shown, session = [], LiveSession(LiveWalk(Stumbles(), 0.5, STARTS[0]), 0, STARTS.__getitem__)
+
+    @contextmanager
+    def window(conditions, on_key):
+        on_key(desktop.UP)
+        yield SimpleNamespace(is_running=lambda: len(shown) < 2)
+
+    monkeypatch.setattr(desktop, "_window", window)
+    monkeypatch.setattr(desktop, "_show", lambda *what: shown.append(what[-1]))
+    desktop.view_live(session)
+    assert all("too fast" in told for told in shown)
+    assert session.walk.velocity == 0.5
+
+
 def test_a_push_moves_the_insect_to_its_side():
     aside = []
     for impulse in (0.0, 6.0, -6.0):
@@ -214,6 +260,16 @@ def test_a_page_is_served_the_walk_goes_on_and_sliders_change_it(view):
     until(view, lambda: walked.conditions.time.vp == 120.0)
     assert walked.moment.seconds < seconds
     assert "margin" in view._readout.content
+
+
+def test_charts_of_a_walk_that_stands_still_stay_as_they_were(view):
+    for _ in range(10):
+        view.step(0.02)
+    charted = list(view._recent)
+    view.session.paused = True
+    for _ in range(10):
+        view.step(0.02)
+    assert list(view._recent) == charted != []
 
 
 @pytest.mark.parametrize(("velocity", "vp"), [(0.97, 10.0), (0.345, 1000.0)])

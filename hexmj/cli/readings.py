@@ -63,7 +63,7 @@ class Readings:
             raise InputError(f"--best = {best}; expected 1 to {len(readings)}, the number of readings")
         out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
         with self.sweepers.executor() as executor, progress_bar("reading") as progress:
-            how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads}
+            how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
             scores = compare_readings(readings, best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
         scores.attrs |= attributes({"only": self.only or ()})
         files = [

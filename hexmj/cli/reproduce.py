@@ -50,7 +50,7 @@ class Reproduce:
                 self.beside,
                 executor=executor,
                 progress=progress,
-                threads=self.sweepers.threads,
+                threads=self.sweepers.threads_each,
             )
         settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": self.beside}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))

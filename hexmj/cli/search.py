@@ -148,7 +148,7 @@ class Search(WalkingCommand):
         from hexmj.search.network_forms import FORMS
 
         begun = loaded(self.begin) if self.begin and self.form in FORMS else None
-        if not isinstance(begun, Cruse1998):
+        if type(begun) is not Cruse1998:
             return self.controlled
         rules = {"order": begun.order, "reading": reading_name(begun.reading)}
         taken = {rule: name for rule, name in rules.items() if name != "printed" and not getattr(self.controlled, rule)}
@@ -228,12 +228,11 @@ class Search(WalkingCommand):
         """What `load_controller` reads to the same bits: weights, or a controller and its fields."""
         import tomli_w
 
-        from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.presets import network_toml
+        from hexmj.search.network_forms import NetworkForm
 
-        controller = problem.form.controller(found.vector)
-        if isinstance(controller, Cruse1998):
-            return network_toml(controller)
+        if isinstance(problem.form, NetworkForm):
+            return network_toml(problem.form.controller(found.vector))
         table = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
         values = table.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
         return tomli_w.dumps({"controller": table["controller"], "fields": values})

@@ -174,7 +174,7 @@ class Walking(control.Task):
         self._walkers.check_begun()
         spec, action = self._spec, checked_actions(action, self._spec.shape)
         if (i := beyond(action, *self._bounds)) >= 0:
-            name, least, most = spec.name.split()[i], spec.minimum[i], spec.maximum[i]
+            name, least, most = action_names(physics.compiled, self.task)[i], spec.minimum[i], spec.maximum[i]
             raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
         if self._acted.terminated or self._acted.truncated:
             return

@@ -8,7 +8,7 @@ import numpy as np
 from hexmj.checks import numbers
 from hexmj.conditions import TimeScale
 from hexmj.errors import InputError
-from hexmj.timing import Stride
+from hexmj.timing import Stride, steps_within
 
 PUSH_LASTS = 0.025
 """How long a push lasts [s]."""
@@ -43,8 +43,8 @@ class Push:
         """The most steps of which beginnings and ends are multiples: chunks of these cut no push."""
         return gcd(steps_pushed(time, stride), *self.begins(stride)[self.impulse != 0.0].tolist())
 
-    def check_within(self, duration: float, n_starts: int) -> None:
-        """Refuse a push that is not of so many starts, or does not begin while its start is watched [time units].
+    def check_within(self, duration: float, stride: Stride, n_starts: int) -> None:
+        """Refuse a push that is not of so many starts, or begins in none of the steps within a duration [time units].
 
         Raises:
             InputError: it is of others, or begins before or after that.
@@ -52,10 +52,11 @@ class Push:
         for name, values in vars(self).items():
             if values.shape != (n_starts,):
                 raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
-        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time >= duration))
+        steps = steps_within(duration, stride)
+        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time / stride.dt + 1e-9 >= steps))
         if beside.any():
             start = int(np.argmax(beside))
             raise InputError(
                 f"the push of start {start} is at {self.time[start]:g} time units;"
-                f" expected 0 to below {duration:g}, where the walk ends"
+                f" expected 0 to below {steps * stride.dt:g}, where the walk ends"
             )

@@ -112,8 +112,8 @@ class NetworkForm:
 
     def vector(self, controller: Controller) -> np.ndarray:
         """See `forms.Form.vector`."""
-        if not isinstance(controller, Cruse1998):
-            raise InputError(f"{controller.name} has no weights; expected a set of the 1998 network")
+        if type(controller) is not Cruse1998:
+            raise InputError(f"{controller.name} is not made of weights alone; expected a set of the 1998 network")
         vector = FORMS[self.name].vector(controller.weights)
         if np.isfinite(vector).all():
             kept, every = general(self.controller(vector).weights), general(controller.weights)

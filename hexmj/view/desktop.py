@@ -4,6 +4,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -44,11 +45,12 @@ def view_live(session: LiveSession) -> None:
             if not window.is_running():
                 return
             while not wishes.empty():
-                _obey(session, wishes.get())
+                session.attempt(partial(_obey, session, wishes.get()))
             moment = session.tick(passed)
             seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
             state = f"fell on {walk.fell_on}" if walk.fell_on else f"margin {moment.margin:+.1f} mm"
-            _show(window, walk.conditions, moment.qpos, moment.margin, seen, f"V = {walk.velocity:.2f}, {state}")
+            text = f"V = {walk.velocity:.2f}, {state}"
+            _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.told)
 
 
 def view_recording(session: ReplaySession) -> None:
@@ -106,8 +108,10 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
     return window
 
 
-def _show(window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str) -> None:
-    """Put the body into a pose, and the marks of a film beside it."""
+def _show(
+    window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str, told: str = ""
+) -> None:
+    """Put the body into a pose, the marks of a film beside it, and words into two corners."""
     (feet, stance, centre, tips), body, scene = seen, conditions.body, window.user_scn
     with window.lock():
         window.d.qpos[:] = qpos
@@ -118,6 +122,6 @@ def _show(window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, 
         mark_centre_of_mass(scene, body.marks, centre, level, stable)
         mark_planned_tips(scene, body.marks, tips)
     sign = "within the polygon" if stable else "NOT within the polygon"
-    corner = mujoco.mjtGridPos.mjGRID_TOPLEFT
-    window.set_texts((mujoco.mjtFontScale.mjFONTSCALE_150, corner, f"{text}, {sign}", ""))
+    corners = {mujoco.mjtGridPos.mjGRID_TOPLEFT: f"{text}, {sign}", mujoco.mjtGridPos.mjGRID_BOTTOMLEFT: told}
+    window.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, *corner, "") for corner in corners.items()])
     window.sync()

@@ -126,7 +126,7 @@ class LiveWalk:
     moment: Moment
     """What is seen now."""
     trace: list[Moment]
-    """Every step since `advance` was last called, the last one is `moment`."""
+    """Every step since `advance` was last called, the last one is `moment`; emptied by who has seen them."""
     fell_on: str
     """Part of the trunk that has touched the ground; nothing while it walks."""
 
@@ -163,7 +163,7 @@ class LiveWalk:
         start = self.start if start is None else numbers("start", in_order(start))
         conditions = conditions or self.conditions
         settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
-        plan = Steered(self.controller, settled.starts, self.velocity, self.stride)
+        plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
         self._insects = Insects(settled, self._push, threads=1)
@@ -172,7 +172,11 @@ class LiveWalk:
         self.trace, self.fell_on = [], ""
         self._before: PlannedWalk | None = None
         self._left = 0.0
-        self._walk(2)  # shows the end of the first
+        try:
+            self._walk(2)  # shows the end of the first
+        except Exception:
+            vars(self).update(before)
+            raise
 
     def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
         """Change V_r, the controller, or both.

@@ -54,6 +54,7 @@ class LiveSession:
 
     def tick(self, passed: float) -> Moment:
         """Let so much time pass [s]."""
+        self.walk.trace = []
         if self.paused:
             return self.walk.moment
         before = self.walk.moment.seconds

@@ -1,6 +1,7 @@
 """What is drawn on the frames of a film: a caption above, a scale, and a footfall diagram that grows below."""
 
-from functools import cache
+from functools import cache, lru_cache
+from math import floor
 from pathlib import Path
 
 import matplotlib
@@ -51,7 +52,7 @@ class Overlay:
             frame: with the scene in it.
             row: of the take.
             seconds: on the clock [s].
-            scale: of the scene at the centre of mass [pixels/mm].
+            scale: of the scene at the centre of mass [pixels/mm]; 0 where it is not ahead of the camera.
         """
         now = self._column(seconds)
         diagram = frame[self._bottom :]
@@ -64,29 +65,31 @@ class Overlay:
         strip[:] = self._strip(strip, scale)
 
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
-        """A bar of a round length, as long as it would be at the centre of mass, and what the diagram's bars are."""
-        image = Image.fromarray(background)
-        draw, font, edge = ImageDraw.Draw(image), _font(self._pixels(11)), self._pixels(10)
-        length = _round(self._pixels(BAR) / scale)
-        end, middle = edge + round(length * scale), image.height // 2
+        """The scale, if there is one, and what the diagram's bars are."""
+        image, size, edge = Image.fromarray(background), self._pixels(11), self._pixels(10)
+        if scale > 0:
+            self._draw_scale(image, scale, edge, size)
+        legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
+        _write(image, (image.width - edge, image.height // 2), legend, size, anchor="rm")
+        return np.asarray(image)
+
+    def _draw_scale(self, image: Image.Image, scale: float, edge: int, size: int) -> None:
+        """A bar of a round length, as long as it would be at the centre of mass."""
+        draw, length, middle = ImageDraw.Draw(image), _round(self._pixels(BAR) / scale), image.height // 2
+        end = edge + round(length * scale)
         draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
         for x in (edge, end):
             draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
-        draw.text((end + self._pixels(5), middle), f"{length:g} mm", INK, font, anchor="lm")
-        legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
-        draw.text((image.width - edge, middle), legend, INK, font, anchor="rm")
-        return np.asarray(image)
+        _write(image, (end + self._pixels(5), middle), f"{length:g} mm", size)
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
         take, size, edge = self._take, self._pixels(15), self._pixels(10)
         image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
-        draw = ImageDraw.Draw(image)
         first, second = round(0.29 * self._top), round(0.75 * self._top)
         state, colour = self._state(row, seconds)
-        bold = _font(size, bold=True)
-        free = image.width - 3 * edge - draw.textlength(state, bold)
-        draw.text((edge, first), _shortened(take.title, bold, free), INK, bold, anchor="lm")
-        draw.text((image.width - edge, first), state, colour, bold, anchor="rm")
+        free = image.width - 3 * edge - _font(size, bold=True).getlength(state)
+        _write(image, (edge, first), _shortened(take.title, _font(size, bold=True), free), size, bold=True)
+        _write(image, (image.width - edge, first), state, size, colour, "rm", bold=True)
         margin = f"{take.margin[row]:+.1f} mm".replace("-", MINUS) if seconds < take.fell else "unknown"
         fields = (
             f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
@@ -95,8 +98,7 @@ class Overlay:
             f"margin {margin}",
         )
         for place, text in zip((0.0, 0.51, 0.615, 0.79), fields, strict=True):
-            x = edge + place * (image.width - 2 * edge)
-            draw.text((x, second), text, INK, _font(self._pixels(12)), anchor="lm")
+            _write(image, (edge + place * (image.width - 2 * edge), second), text, self._pixels(12))
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
@@ -180,6 +182,33 @@ def _ticks(begin: float, end: float) -> np.ndarray:
     power = 10.0 ** np.floor(np.log10(span))
     step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if span <= 11 * power * part)
     return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # never from -0
+
+
+def _write(
+    image: Image.Image,
+    place: tuple[float, float],
+    text: str,
+    size: int,
+    colour: tuple[int, int, int] = INK,
+    anchor: str = "lm",
+    *,
+    bold: bool = False,
+) -> None:
+    """Write a text as `ImageDraw.text` does; most of a caption is the same on the next frame."""
+    x, y = floor(place[0]), floor(place[1])
+    mask, (left, top) = _mask(text, size, anchor, place[0] - x, place[1] - y, bold)
+    image.paste(colour, (x + left, y + top), mask)
+
+
+@lru_cache(64)
+def _mask(text: str, size: int, anchor: str, x: float, y: float, bold: bool) -> tuple[Image.Image, tuple[int, int]]:
+    """A text's opacity beside an anchor that lies a part of a pixel (x, y) off the grid, and where its corner lies."""
+    font = _font(size, bold)
+    left, top, right, bottom = font.getbbox(text, anchor=anchor)
+    left, top = floor(left) - 2, floor(top) - 2
+    mask = Image.new("L", (floor(right) + 4 - left, floor(bottom) + 4 - top))
+    ImageDraw.Draw(mask).text((x - left, y - top), text, 255, font, anchor=anchor)
+    return mask, (left, top)
 
 
 @cache

@@ -12,6 +12,9 @@ from hexmj.bodies.grounds import BUMPS, ground_level
 AROUND, RINGS = 14, 4
 """Corners around a round thing, and rings of each of its ends."""
 
+UNTOLD = (0.5, 0.5, 0.5, 1.0)
+"""The colour of a geom that has none of its own."""
+
 SEEN = 3
 """Groups of geoms below this are shown, as MuJoCo's own renderer has it."""
 
@@ -106,8 +109,9 @@ def _seen(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    material = model.geom_matid[geom]
-    return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    """As MuJoCo draws it: in its material's colour unless it has one of its own."""
+    material, own = model.geom_matid[geom], model.geom_rgba[geom]
+    return model.mat_rgba[material] if material >= 0 and (own == UNTOLD).all() else own
 
 
 def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
