@@ -1,15 +1,18 @@
 """The faces for Gymnasium: its own checks, and one insect, many insects and the physical walk to the same bits."""
 
+import gc
 import os
 import subprocess
 import sys
 import warnings
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from gymnasium.envs.mujoco.utils import check_mujoco_reset_state
@@ -357,6 +360,17 @@ def test_seeds_of_many_are_whole_numbers():
     for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1], np.array(5)):
         with pytest.raises(InputError, match="seed = "):
             many.reset(seed=wrong)  # pyright: ignore[reportArgumentType]
+
+
+@drawing
+def test_a_drawn_insect_that_nobody_closes_is_freed_when_it_is_dropped():
+    walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
+    walking.reset(seed=0)
+    walking.render()
+    renderers = [weakref.ref(one) for one in gc.get_objects() if isinstance(one, mujoco.Renderer)]
+    del walking
+    gc.collect()
+    assert renderers and not any(one() for one in renderers)
 
 
 @pytest.mark.slow

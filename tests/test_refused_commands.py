@@ -53,6 +53,7 @@ NONSENSE = [
     (["variants", "--physical", "--contact-gap", "0.01"], "--contact-gap = 0.01 with falls only"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
+    (["flss", "--threads", "0", "--processes", "2"], "threads = 0; expected a whole number of at least 1"),
     (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
     (["flss", "--velocity", "0.1"], "Unrecognized options"),
     (["flss", "--window", "long"], "valid names: walk, start"),

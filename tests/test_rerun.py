@@ -270,6 +270,7 @@ def test_words_that_decide_nothing_are_left_out(tmp_path, monkeypatch):
     words += ["--processes", "3", "--out=x"]
     assert deciding(words) == ["compare", "--models", "a", "--velocities", "0.1", "0.2"]
     assert deciding(["walk", "--out"]) == ["walk"]
+    assert deciding(["walk", "--range_of", "20", "--range-of=20", "--range_of=20"]) == ["walk"]
     monkeypatch.chdir(tmp_path)
     for name in ("mine.py", "weights.toml", "a.nc"):
         Path(name).write_text("")

@@ -142,4 +142,8 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     assert len([*(tmp_path / "films").glob("*.mp4")]) == len([*(tmp_path / "films").glob("*-manifest.json")]) == 3
     code, _, error = run("render", tmp_path / "walk" / "recording.nc", *film, "--out", tmp_path / "films")
     assert code == 0
-    assert "ldvs-V-0.5.mp4 was there; the new film takes its place" in error
+    assert "ldvs-V-0.5.mp4 was there; the new one takes its place" in error
+    code, _, error = run("render", *walk, "--beside", "planned", *film, "--format", "gif", "--out", tmp_path / "films")
+    assert code == 0
+    told = [f"ldvs-V-0.5-beside-planned-{i}.nc was there; the new one takes its place" in error for i in (1, 2)]
+    assert told == [True, True]

@@ -215,8 +215,9 @@ class Sweepers:
         """Threads of each process; None where a single one takes all cores."""
         from hexmj.process.threads import thread_count
 
-        shared = max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
-        return self.threads if self.threads is not None else shared
+        if self.threads is not None:
+            return thread_count(self.threads)
+        return max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
 
     @contextmanager
     def executor(self) -> Iterator[Executor | None]:

@@ -62,17 +62,21 @@ class Render(WalkingCommand):
         shown = [load_recording(path) for path in self.recordings]
         takes_of(shown)  # refuses what cannot be filmed before a folder is made
         name = self._name(shown)
-        video, manifest = f"{name}.{self.format}", f"{name}.{self.format}-{MANIFEST}"
-        out = results_folder(self.out, (video, f"{name}-1.nc", f"{name}-2.nc", manifest))
+        video, walks = f"{name}.{self.format}", () if shown else (f"{name}-1.nc", f"{name}-2.nc")
+        out = results_folder(self.out, (video, *walks, manifest := f"{video}-{MANIFEST}"))
         if sentence := missing():
             raise RenderingError(sentence)
-        files, settings = [], {"film": asdict(self.film)}
+        files, settings, there = (
+            [],
+            {"film": asdict(self.film)},
+            [one for one in (video, *walks) if (out / one).exists()],
+        )
         if not shown:
             shown, files = self._recorded(controllers, out / name)
             settings |= self._walked(controllers)
         out.mkdir(parents=True, exist_ok=True)
-        if (out / video).exists():
-            print(f"hexmj: {literal(str(out / video))} was there; the new film takes its place", file=sys.stderr)
+        for one in there:
+            print(f"hexmj: {literal(str(out / one))} was there; the new one takes its place", file=sys.stderr)
         with progress_bar("rendering") as progress:
             frames = render(shown, out / video, self.film, progress)
         files.append(out / video)

@@ -78,10 +78,11 @@ def deciding(words: Sequence[str]) -> list[str]:
     kept, coming = [], iter(words)
     for word in coming:
         option, given, _ = word.partition("=")
-        if option not in INDIFFERENT:
+        values = INDIFFERENT.get(option.replace("_", "-"))
+        if values is None:
             kept.append(word)
         elif not given:
-            for _ in range(INDIFFERENT[option]):
+            for _ in range(values):
                 next(coming, "")
     return kept
 

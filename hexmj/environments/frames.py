@@ -4,6 +4,7 @@ The body is compiled at once, so that files edited later do not change what is s
 """
 
 import atexit
+import weakref
 from threading import get_ident
 from typing import TYPE_CHECKING
 
@@ -48,7 +49,6 @@ class Frames:
     def close(self) -> None:
         """Free the GL; it may be called again."""
         if self._renderer:
-            atexit.unregister(self._renderer.close)
             self._renderer.close()
         self._renderer = None
 
@@ -56,8 +56,13 @@ class Frames:
         gl.check_not_forked()
         if self._renderer is None:
             self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
-            atexit.register(self._renderer.close)  # before the GL goes, though nobody closes the environment
+            atexit.register(_close, weakref.ref(self._renderer))  # before the GL goes, though nobody closes it
             self._thread = get_ident()
         if self._thread != get_ident():
             raise InputError("another thread has drawn this environment; expected one that draws all of its frames")
         return self._renderer
+
+
+def _close(renderer: "weakref.ref[Renderer]") -> None:
+    if one := renderer():
+        one.close()
