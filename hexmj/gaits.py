@@ -171,9 +171,11 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     """Mean direction of phases on the circle [0, 1).
 
     Raises:
-        InputError: no numbers, or none at all.
+        InputError: no numbers, none at all, or no such axis.
     """
-    angle = 2.0 * np.pi * numbers("phase", phase)
+    angle, axis = 2.0 * np.pi * numbers("phase", phase), typed("axis", axis, int | None)
+    if axis is not None and not -angle.ndim <= axis < angle.ndim:
+        raise InputError(f"axis = {axis}; expected one of the {angle.ndim} of phase")
     if not (angle.size if axis is None else angle.shape[axis]):
         raise InputError(f"phase = {short(phase)}; expected at least one")
     mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)

@@ -20,6 +20,9 @@ WINDOWS = ("walk", "start")
 MOST_STEPS = 10**7
 """Longest walk [steps]; far beyond any use."""
 
+LEAST_STEP = 1e-5
+"""Shortest time step of a plan [time units]; a ten-thousandth of the usual one."""
+
 FAR = 1e6
 """Farther than any leg reaches [mm]."""
 
@@ -47,8 +50,8 @@ class Stride:
             raise InputError(
                 f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"
             )
-        if not 0 < self.dt <= 1:
-            raise InputError(f"dt = {self.dt}; expected a time step above 0 and at most 1 time unit")
+        if not LEAST_STEP <= self.dt <= 1:
+            raise InputError(f"dt = {self.dt}; expected a time step of at least {LEAST_STEP:g} and at most 1 time unit")
 
     def periods(self, velocity: Any, count: float = 1.0) -> Any:
         """Duration of some periods of a single leg at V_r, (AEP_0 - PEP_0) (1 + 1/V) each [time units]."""

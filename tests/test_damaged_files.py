@@ -98,7 +98,7 @@ FALSE: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "longer": (lambda r: changed(r, seconds=r.seconds.values * 1e4), "seconds are not time over vp"),
     "holed": (lambda r: r.isel(step=[*range(50), *range(60, 100)]), "time is not that of 90 steps"),
     "empty": (lambda r: r.isel(step=slice(0)), "time is float64 of .'step': 0."),
-    "dt": (lambda r: changed(r, dt=-1.0), "dt = -1.0; expected a time step above 0"),
+    "dt": (lambda r: changed(r, dt=-1.0), "dt = -1.0; expected a time step of at least 1e-05"),
     "vp": (lambda r: changed(r, vp=1e-300), "seconds are not time"),
     "slow": (lambda r: changed(r, vp=1e-3, seconds=r.seconds.values * 8e4), "vp = 0.001; expected above 0.1"),
     "text": (lambda r: changed(r, friction="False"), "attribute friction = 'False'; expected one such as 1.0"),

@@ -66,7 +66,7 @@ class Flss(WalkingCommand):
             raise InputError(f"--format {self.drawn.format} without --out; expected it where a figure is written")
         table = self._measured(controller)
         table.attrs |= attributes({"model": self.model, "physical": self.physical})
-        self._print(table, self._write(table, controller, self.out) if self.out else [])
+        self._print(table, self._write(table, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
         how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.sweepers.threads_each}
@@ -80,7 +80,7 @@ class Flss(WalkingCommand):
 
             return flss(controller, self.velocities, range_of=RANGE if self.range_of is None else self.range_of, **how)
 
-    def _write(self, table: "xr.Dataset", controller: Controller, out: Path) -> list[Path]:
+    def _write(self, table: "xr.Dataset", out: Path) -> list[Path]:
         from hexmj.measures.figures import flss_figure
 
         files = [

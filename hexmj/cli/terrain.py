@@ -37,8 +37,6 @@ class _Ground(Ground):
     """Length of hurdles along the way [mm]."""
 
 
-_CONDITIONS = replace(FARTHER, ground=_Ground())
-
 
 @dataclass(frozen=True)
 class Terrain(StudyCommand):

@@ -86,11 +86,11 @@ class SensedPlan:
     """
 
     def __init__(self, plan: SteerablePlan) -> None:
-        """Around a plan at time 0."""
+        """Around a plan at time 0, which may have been moved before."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self.made_for = plan, getattr(plan, "made_for", None)
-        self._tips = self._targets = self._ordered = plan.starts
-        self._stance = np.ones(plan.starts.shape, dtype=bool)
+        self._tips = self._targets = self._ordered = np.array(plan.tips)
+        self._stance = np.array(plan.standing)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
         """See `protocol.FastLosses`: on paper, where nothing is read, those of the plan within."""

@@ -139,8 +139,9 @@ def _search(
     problem: Problem, effort: Effort, folder: Path | None, threads: int | None, progress: Progress | None
 ) -> Found:
     domain, history = problem.domain(effort.domain, effort.begin), History()
-    work = effort.budget * effort.starts + effort.refine_budget * effort.refine_starts
-    sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if effort.refine_budget else {})
+    refine_budget = 0 if domain.binary.all() else effort.refine_budget  # which leaves binary ones as they are
+    work = effort.budget * effort.starts + refine_budget * effort.refine_starts
+    sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if refine_budget else {})
     samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
     searcher = _searcher(effort, domain)
     kept = {
@@ -158,8 +159,8 @@ def _search(
         return result
 
     best, cost = run(searcher, partial(costs, "population"), effort.budget)
-    if effort.refine_budget:
-        best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
+    if refine_budget:
+        best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), refine_budget, domain.unit)
     asked = history.dataset(problem.form.names, problem.minimised)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     replayed = sum(one.replayed for one in kept.values())

@@ -103,8 +103,9 @@ def find_stable_starts(
         TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
     """
     period = stride.periods(velocity) / stride.dt
-    drawn = n_starts
-    while drawn <= MOST_DRAWN:
+    drawn = 0
+    while drawn < MOST_DRAWN:
+        drawn = min(max(2 * drawn, n_starts), MOST_DRAWN)
         starts = draw_starts(drawn, seed, stride)
         when, draw = np.random.default_rng([seed, 2]).uniform(size=(drawn, 2)).T
         step = grid * np.ceil((SETTLED + when) * period / grid).astype(int)
@@ -112,7 +113,6 @@ def find_stable_starts(
         if len(found) >= n_starts:
             found = found[:n_starts]
             return StableStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
-        drawn *= 2
     raise TooFewStable(
         f"starts = {n_starts}; at V = {velocity:g} not so many of {MOST_DRAWN} keep static stability until they are"
         " disturbed; expected fewer starts or a lower velocity"

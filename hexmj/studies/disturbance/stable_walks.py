@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import advanced, begin
+from hexmj.controllers.asking import REPEATED, advanced, begin, check_repeats
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.drive import Push
 from hexmj.physics.settling import settle
+from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import StableStarts, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan, check_steerable
@@ -60,7 +61,14 @@ class StableWalks:
 
     @cached_property
     def found(self) -> StableStarts:
-        """The starts; found once for all cases."""
+        """The starts; found once for all cases.
+
+        Raises:
+            TooFewStable: not so many starts are stable until they are disturbed.
+            InputError: the controller plans another walk when it begins again.
+        """
+        starts = draw_starts(self.n_starts, self.seed, self.stride)
+        check_repeats(self.planner, starts, self.velocity, REPEATED, self.stride)
         return find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, self.grid)
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.asking import begin, check_repeats
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.measures.kinematic import first_loss
@@ -23,7 +23,7 @@ from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.frequencies import came
-from hexmj.timing import Stride, observation_time
+from hexmj.timing import Stride, observation_time, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,6 +130,7 @@ def _outcomes(
     """Of all starts, (start, leg); see `walks`."""
     import xarray as xr
 
+    check_repeats(controller, starts, velocity, int(steps_within(duration, stride)), stride)
     settled = settle(starts, conditions, stride, threads)
     lost = first_loss(starts, controller, velocity, duration, stride=stride, threads=threads)
     so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)

@@ -63,6 +63,7 @@ def mechanisms(walk: PhysicalWalk, tipped: float = TIPPED) -> np.ndarray:
     for start, end in enumerate(known):
         one = slice(end), start
         if fell[start]:
+            end = max(end, 1)  # nothing is known of one that falls within its first step
             tips = min(int(np.flatnonzero(np.append(True, upright[one]))[-1]), end - 1)
             least = kept[max(tips - steps, 0) : tips + 1, start].min()
             since = slice(max(tips - 2 * steps, 0), end), start
