@@ -17,8 +17,15 @@ from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.reads_legs import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.stability import stability_margin, walk_margin
+from hexmj.studies.disturbance import disturbances
 from hexmj.studies.disturbance.cases import Case, every_case
-from hexmj.studies.disturbance.disturbances import SETTLED, Disturbance, disturbance_of, find_stable_starts
+from hexmj.studies.disturbance.disturbances import (
+    SETTLED,
+    Disturbance,
+    TooFewStable,
+    disturbance_of,
+    find_stable_starts,
+)
 from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed, DisturbedPlan
 from hexmj.studies.disturbance.stable_walks import StableWalks
@@ -184,6 +191,21 @@ def test_starts_are_stable_until_disturbed_and_do_not_depend_on_their_number():
     more = find_stable_starts(LDVS, V, 50, 0, STRIDE, GRID)
     for name in ("starts", "step", "draw"):
         assert np.array_equal(getattr(more, name)[:6], getattr(STABLE, name))
+
+
+def test_as_many_starts_are_drawn_as_are_said_to_be(monkeypatch):
+    """Of a controller that never keeps stability, in place of the hours that this would take."""
+    drawn = []
+
+    def lost(starts, *how, **also):
+        drawn.append(len(starts))
+        return np.zeros(len(starts))
+
+    monkeypatch.setattr(disturbances, "first_loss", lost)
+    monkeypatch.setattr(disturbances, "MOST_DRAWN", 100)
+    with pytest.raises(TooFewStable, match="not so many of 100 keep"):
+        find_stable_starts(LDVS, 0.9, 30, 0, Stride(), 1)
+    assert drawn == [30, 60, 100]
 
 
 def test_planned_losses_are_those_of_the_network():

@@ -166,6 +166,13 @@ def test_names_are_true_of_walks_that_were_looked_at(how):
             step += int(np.argmax(near))
 
 
+def test_a_fall_within_the_first_step_has_a_mechanism():
+    walk = staged(fall=True)
+    walk.qpos[:], walk.measured.x[:], walk.measured.stance[:] = np.nan, np.nan, False
+    (found,) = mechanisms(replace(walk, outcomes=replace(walk.outcomes, fall=np.array([0.05]))))
+    assert [*MECHANISMS][found] not in {"never_lost", *SAVED}
+
+
 def test_a_leg_that_catches_and_then_lets_the_trunk_on_is_not_said_to_throw_it():
     lean = {110: (-0.1, -0.1), 150: (-0.15, -0.15)}
     walk = staged(lean=lean, leg4=slice(120, 140), fall=True)

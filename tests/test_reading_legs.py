@@ -8,6 +8,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers.losses import first_losses, planned_losses
+from hexmj.controllers.reads_legs import SensedPlan
 from stepwise_ldvs import Own, same
 
 STRIDE = hexmj.Stride()
@@ -38,3 +39,14 @@ def test_on_paper_reading_the_legs_changes_nothing(name, acceleration):
     fast, general = first_losses(begin(), steps), planned_losses(begin(), steps)
     assert np.array_equal(fast, general)
     assert np.array_equal(fast, first_losses(controller.begin(starts, velocity, STRIDE, acceleration), steps))
+
+
+def test_feedback_goes_on_from_the_legs_as_a_plan_begins_with_them():
+    """One whose tripod is lifted at time 0, by what its controller has done to it."""
+    starts, velocity, lifted = hexmj.draw_starts(20, 0), np.full(20, 0.5), np.arange(6) % 2 == 0
+    plans = [LDVS.begin(starts, velocity, STRIDE) for _ in range(2)]
+    for plan in plans:
+        plan.see(plan.tips, np.tile(~lifted, (20, 1)))
+    reading, step = SensedPlan(plans[0]).advance(300), plans[1].advance(300)
+    assert same(step, replace(reading, aep=step.aep))
+    assert not same(step, LDVS.begin(starts, velocity, STRIDE).advance(300))

@@ -11,6 +11,8 @@ from hexmj.controllers.asking import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
+from hexmj.studies.league import physics
+from hexmj.studies.league.entrant import Entrant
 from hexmj.walks import PLANNED, part_of
 from stepwise_ldvs import Own, plan_of
 
@@ -141,8 +143,18 @@ class Restless:
     [
         lambda starts: hexmj.physical_walk(starts, Restless(), 0.5, 2.0),
         lambda starts: hexmj.compare(Restless(), [0.5], n_starts=2, window=2.0),
+        lambda starts: physics.walks(
+            Entrant(Restless()),
+            Restless(),
+            0.5,
+            2.0,
+            n_starts=2,
+            seed=0,
+            conditions=hexmj.Conditions(),
+            stride=hexmj.Stride(),
+        ),
     ],
-    ids=["a walk", "both measures"],
+    ids=["a walk", "both measures", "the league"],
 )
 def test_a_controller_that_plans_otherwise_when_it_begins_again_is_refused(measured):
     with pytest.raises(hexmj.InputError, match="plans another walk when it begins again: x is"):
