@@ -133,7 +133,7 @@ def test_switches_alone_are_searched_without_a_simplex():
     problem = Problem(Askew(binary=np.ones(2, dtype=bool), box_is=([0.0, 0.0], [1.0, 1.0])), 0.4, 0.4, window=5.0)
     found = search(problem, Effort(starts=5, budget=12, population=4, refine_budget=20))
     assert not found.history.stage.any()
-    assert found.n_starts == 5
+    assert found.starts == 5
     assert set(found.vector.tolist()) <= {0.0, 1.0}
 
 
