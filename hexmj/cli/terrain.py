@@ -37,7 +37,6 @@ class _Ground(Ground):
     """Length of hurdles along the way [mm]."""
 
 
-
 @dataclass(frozen=True)
 class Terrain(StudyCommand):
     """Options of `hexmj terrain`, which `main.COMMANDS` describes."""
