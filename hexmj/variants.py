@@ -5,7 +5,7 @@ A set of weights is worth most if its FLSS is low whichever of them the authors 
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, fields, replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from hexmj.errors import InputError
@@ -60,7 +60,7 @@ def varied(part: Part, variant: str) -> Part:
     usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
     wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
     changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
-    inner = {name: varied(getattr(own, name), variant) for name in INNER if name in usual}
+    inner = {name: varied(getattr(own, name), variant) for name in INNER if is_dataclass(getattr(own, name, None))}
     with naming(variant):
         return replace(own, **changes | inner)
 
@@ -76,7 +76,7 @@ def instead(part: Any, variant: str) -> dict[str, Any]:
         for name, value in VARIANTS[variant].items()
         if getattr(part, name, MISSING) == value
     }
-    inner = [instead(getattr(part, name), variant) for name in INNER if hasattr(part, name)]
+    inner = [instead(getattr(part, name), variant) for name in INNER if is_dataclass(getattr(part, name, None))]
     return own | dict(pair for one in inner for pair in one.items())
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 import pytest
 from gymnasium.envs.mujoco.utils import check_mujoco_reset_state
@@ -21,9 +20,11 @@ from gymnasium.vector import AutoresetMode
 
 import hexmj
 from drawing import drawing
+from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import IDS, dm
+from hexmj.environments.frames import Frames
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
@@ -363,14 +364,34 @@ def test_seeds_of_many_are_whole_numbers():
 
 
 @drawing
-def test_a_drawn_insect_that_nobody_closes_is_freed_when_it_is_dropped():
-    walking = made("hexmj/StickInsect-v0", render_mode="rgb_array")
-    walking.reset(seed=0)
-    walking.render()
-    renderers = [weakref.ref(one) for one in gc.get_objects() if isinstance(one, mujoco.Renderer)]
-    del walking
+def test_frames_that_nobody_closes_are_freed_when_they_are_dropped():
+    frames = Frames(Conditions())
+    frames.draw(compile_body(Conditions()).model.qpos0)
+    renderer = weakref.ref(frames._renderer)
+    del frames
     gc.collect()
-    assert renderers and not any(one() for one in renderers)
+    assert renderer() is None
+
+
+@drawing
+def test_who_goes_takes_nothing_with_it_that_others_draw_with():
+    one, other, third = (made("hexmj/StickInsect-v0", render_mode="rgb_array") for _ in range(3))
+    for walking in (one, other, third):
+        walking.reset(seed=0)
+        walking.render()
+    before = third.render()
+    one.close()
+    np.testing.assert_array_equal(third.render(), before)
+    del other
+    gc.collect()
+    np.testing.assert_array_equal(third.render(), before)
+    with ThreadPoolExecutor(1) as elsewhere:
+        frames = Frames(Conditions())
+        elsewhere.submit(frames.draw, compile_body(Conditions()).model.qpos0).result()
+        third.render()
+        del frames  # while the thread that drew goes on
+        gc.collect()
+        np.testing.assert_array_equal(third.render(), before)
 
 
 @pytest.mark.slow

@@ -170,6 +170,11 @@ def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
     code, _, error = run("search", "--begin", form, *words[:-1], tmp_path / "weights")
     assert code == 2
     assert "stretched is not made of weights alone" in error
+    for words in (["flss"], ["variants", "--out", tmp_path / "variants", "--models"]):
+        model = ["--model", form] if words == ["flss"] else [form]
+        code, text, error = run(*words, *model, "--velocities", 0.4, "--starts", 5, "--window", "start")
+        assert code == 0, error
+    assert "reading a word of its own" in text
 
 
 ODD = """

@@ -191,6 +191,19 @@ def test_the_scale_is_that_of_the_camera(plan):
 
 
 @drawing
+def test_the_scale_of_an_orthographic_camera_is_the_same_everywhere(plan, tmp_path):
+    camera = '<worldbody><camera name="plan" projection="orthographic" fovy="80" pos="0 0 200"/>'
+    body = changed_body(tmp_path, {"<worldbody>": camera})
+    body = replace(body, name=STICK_INSECT.name, cameras=(*STICK_INSECT.cameras, "plan"))
+    take, film = Take.of(plan, body), Film(camera="plan")
+    model = compile_body(take.conditions).model
+    model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
+    with gl.renderer(model, film.height, film.width) as renderer:
+        _, scale = _view(renderer, mujoco.MjData(model), "plan", take, 0)
+    assert scale == pytest.approx(480 / 80.0), "fovy is the height of what is seen [mm]"
+
+
+@drawing
 def test_a_camera_that_the_insect_has_passed_has_no_scale(plan, tmp_path):
     """It stands in the world, 10 mm ahead; the film goes on."""
     camera = '<worldbody><camera name="ahead" pos="10 0 12" xyaxes="0 1 0 0 0 1"/>'

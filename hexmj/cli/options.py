@@ -160,12 +160,13 @@ class Controlled:
     def brought(self, name: str) -> str:
         """Order of updates and reading that a set brings along, where it does not walk as printed; else nothing."""
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.cruse1998.readings import in_words
+        from hexmj.controllers.cruse1998.readings import Reading, in_words
 
         found, _ = LOADED.get(name, (None, None))
         if not isinstance(found, Cruse1998):
             return ""
-        rules = {"order": found.order, "reading": in_words(found.reading)}
+        reading = in_words(found.reading) if isinstance(found.reading, Reading) else str(found.reading)  # an heir's
+        rules = {"order": found.order, "reading": reading}
         return ", ".join(
             f"{rule} {told}" for rule, told in rules.items() if told != "printed" and rule not in self.rules
         )

@@ -68,13 +68,14 @@ def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Render
     Raises:
         RenderingError: see `check_not_forked`.
     """
-    import mujoco
     from mujoco.rendering.classic import gl_context
+
+    from hexmj.replay.film.own_context import Renderer
 
     check_not_forked()
     usual, gl_context.GLContext = gl_context.GLContext, context_type()
     try:
-        return mujoco.Renderer(model, height, width)
+        return Renderer(model, height, width)
     finally:
         gl_context.GLContext = usual
 

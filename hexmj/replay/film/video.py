@@ -160,6 +160,8 @@ def _view(
 def _pixels_per_mm(renderer: "mujoco.Renderer", point: np.ndarray) -> float:
     """Of a length across the view at a point, (3,) [mm]; 0 where that is not ahead of the camera."""
     camera = renderer.scene.camera[0]
-    near = (camera.frustum_top - camera.frustum_bottom) / camera.frustum_near
     ahead = float(np.dot(point - camera.pos, camera.forward))
-    return renderer.height / (near * ahead) if ahead > camera.frustum_near else 0.0
+    if ahead <= camera.frustum_near:
+        return 0.0
+    at = camera.frustum_near if camera.orthographic else ahead
+    return renderer.height * camera.frustum_near / ((camera.frustum_top - camera.frustum_bottom) * at)
