@@ -206,6 +206,35 @@ def test_as_many_starts_are_drawn_as_are_said_to_be(monkeypatch):
     with pytest.raises(TooFewStable, match="not so many of 100 keep"):
         find_stable_starts(LDVS, 0.9, 30, 0, Stride(), 1)
     assert drawn == [30, 60, 100]
+    with pytest.raises(TooFewStable, match="starts = 101;"):
+        find_stable_starts(LDVS, 0.9, 101, 0, Stride(), 1)
+    assert drawn == [30, 60, 100], "more than are ever drawn are refused at once"
+
+
+@dataclass(frozen=True)
+class Unsure:
+    """LDVS that draws random numbers without a seed, from one of the methods by which it begins."""
+
+    method: str
+    name: str = "unsure"
+
+    def begin(self, starts, velocity, *how):
+        return self._plan("begin", starts, velocity, *how)
+
+    def begin_at_speed(self, starts, velocity, *how):
+        return self._plan("begin_at_speed", starts, velocity, *how)
+
+    def _plan(self, method, starts, velocity, *how):
+        noise = np.random.default_rng().uniform(0.0, 0.1) if method == self.method else 0.0
+        return getattr(LDVS, method)(starts, np.maximum(velocity - noise, 0.0), *how)
+
+
+@pytest.mark.parametrize("method", ["begin", "begin_at_speed"])
+def test_who_begins_otherwise_each_time_is_not_disturbed(method):
+    unsure: Any = Unsure(method)
+    walks = StableWalks(unsure, V, 3, 0, STRIDE, GRID)
+    with pytest.raises(InputError, match="plans another walk when it begins again"):
+        walks.times(Case("halt", "none"), 2.0, None, None)
 
 
 def test_planned_losses_are_those_of_the_network():

@@ -167,6 +167,7 @@ def test_settings_that_make_no_sense(made, words):
     ("change", "words"),
     [
         ({"dt": 0.0}, "dt = 0.0; expected a time step of at least 1e-05"),
+        ({"dt": 1e-6}, "dt = 1e-06; expected a time step of at least 1e-05"),
         ({"aep0": -11.0}, "expected pep_min <= pep0 < aep0"),
         ({"pep_min": 0.0}, "expected pep_min <= pep0 < aep0"),
         ({"pep0": float("nan")}, "expected aep0, pep0 and pep_min between"),

@@ -66,11 +66,8 @@ class Render(WalkingCommand):
         out = results_folder(self.out, (video, *walks, manifest := f"{video}-{MANIFEST}"))
         if sentence := missing():
             raise RenderingError(sentence)
-        files, settings, there = (
-            [],
-            {"film": asdict(self.film)},
-            [one for one in (video, *walks) if (out / one).exists()],
-        )
+        there = [one for one in (video, *walks) if (out / one).exists()]
+        files, settings = [], {"film": asdict(self.film)}
         if not shown:
             shown, files = self._recorded(controllers, out / name)
             settings |= self._walked(controllers)

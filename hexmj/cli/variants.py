@@ -12,6 +12,7 @@ from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, new_table
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError, check_distinct
+from hexmj.studies.short_names import short_names
 from hexmj.studies.variants import study
 
 if TYPE_CHECKING:
@@ -53,8 +54,9 @@ class Variants(StudyCommand):
         networks = {name: tuple(self._network(name, v) for v in self.velocities) for name in self.models}
         for several in networks.values():
             self.refuse_contact_gap(several[0])
+        short = short_names({name: one for name, (one, *_) in networks.items() if not name.endswith(OF_EACH)})
         return study.Variants(
-            networks,
+            {short.get(name, name): several for name, several in networks.items()},
             self.velocities,
             self.starts if self.starts is not None else 50 if self.physical else study.Variants.n_starts,
             **self.walked,

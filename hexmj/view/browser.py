@@ -157,9 +157,9 @@ class BrowserView:
             self.controls |= {"V": velocity, "V_p": vp}
             paused = gui.add_checkbox("pause", False)
             paused.on_update(lambda _: setattr(self.session, "paused", paused.value))
-            buttons = gui.add_button_group("", ("same start", "next start"))
-            buttons.on_click(lambda _: self._wish(lambda _: self.session.begin(
-                self.session.start + (buttons.value == "next start"))))  # fmt: skip
+            begins = {"same start": self.session.begin, "next start": self.session.begin_next}
+            buttons = gui.add_button_group("", tuple(begins))
+            buttons.on_click(lambda _: self._wish(lambda _: begins[buttons.value]()))
         with gui.add_folder("Push"):
             impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, IMPULSE)
             gui.add_button("Push").on_click(lambda _: self._wish(lambda walk: walk.push(float(impulse.value))))

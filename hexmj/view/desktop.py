@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from queue import SimpleQueue
+from textwrap import fill
 from typing import Any
 
 import mujoco
@@ -74,7 +75,7 @@ def _obey(session: LiveSession, key: int) -> None:
     if key == SPACE:
         session.paused = not session.paused
     elif key == ENTER:
-        session.begin(session.start + 1)
+        session.begin_next()
     elif faster:
         walk.steer(velocity=float(np.clip(walk.velocity + faster, 0.0, 0.95)))
     elif key in (LEFT, RIGHT):
@@ -122,6 +123,7 @@ def _show(
         mark_centre_of_mass(scene, body.marks, centre, level, stable)
         mark_planned_tips(scene, body.marks, tips)
     sign = "within the polygon" if stable else "NOT within the polygon"
-    corners = {mujoco.mjtGridPos.mjGRID_TOPLEFT: f"{text}, {sign}", mujoco.mjtGridPos.mjGRID_BOTTOMLEFT: told}
-    window.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, *corner, "") for corner in corners.items()])
+    font, at = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
+    seen_above, told_below = f"{text}, {sign}", fill(told, 80)
+    window.set_texts([(font, at.mjGRID_TOPLEFT, seen_above, ""), (font, at.mjGRID_BOTTOMLEFT, told_below, "")])
     window.sync()

@@ -126,7 +126,7 @@ class LiveWalk:
     moment: Moment
     """What is seen now."""
     trace: list[Moment]
-    """Every step since `advance` was last called, the last one is `moment`; emptied by who has seen them."""
+    """Steps since `advance` was last called, the last one is `moment`, or since a viewer took them."""
     fell_on: str
     """Part of the trunk that has touched the ground; nothing while it walks."""
 

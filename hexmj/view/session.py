@@ -42,7 +42,8 @@ class LiveSession:
 
     def __init__(self, walk: LiveWalk, start: int, starts: Callable[[int], np.ndarray]) -> None:
         """Around a walk from the start of this number; `starts` tells a start, (leg,) [mm], by its number."""
-        self.walk, self.start, self._starts, self._lies = walk, start, starts, 0.0
+        self.walk, self._starts, self._lies = walk, starts, 0.0
+        self.start = self._tried = start
         self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)
         self.paused, self.told = False, ""
 
@@ -59,23 +60,35 @@ class LiveSession:
             return self.walk.moment
         before = self.walk.moment.seconds
         if not self.walk.fell_on:
-            if not self.attempt(lambda: self.walk.advance(min(passed, LONGEST))):
-                self.begin()
+            if not self._done(lambda: self.walk.advance(min(passed, LONGEST))):
+                self._done(self.begin)
             self._recent.append((passed, max(0.0, self.walk.moment.seconds - before)))
         elif (lies := self._lies + passed) < LIES:
             self._lies = lies
         else:
-            self.begin(self.start + 1)
+            self._done(self.begin_next)
         return self.walk.moment
 
-    def begin(self, start: int | None = None) -> None:
-        """Begin again, at the start of another number where one is given."""
-        self.start, self._lies = self.start if start is None else start, 0.0
-        self.walk.begin(self._starts(self.start))
+    def begin(self) -> None:
+        """Begin again at the same start."""
+        self._begin(self.start)
+
+    def begin_next(self) -> None:
+        """Begin at the next start; one that cannot be walked is passed over when this is called again."""
+        self._begin(self._tried + 1)
+
+    def attempt(self, wish: Callable[[], object]) -> None:
+        """Do to the walk what somebody wishes, and tell why where that makes no sense."""
+        self.told = ""
+        self._done(wish)
+
+    def _begin(self, start: int) -> None:
+        self._tried, self._lies = start, 0.0
+        self.walk.begin(self._starts(start))
+        self.start = start
         self._recent.clear()
 
-    def attempt(self, change: Callable[[], object]) -> bool:
-        """Do something to the walk, and tell why where that makes no sense; whether it did."""
+    def _done(self, change: Callable[[], object]) -> bool:
         try:
             change()
         except (InputError, SimulationError) as error:

@@ -77,7 +77,8 @@ def last_strides(
     for start in walked:
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, settled.compiled.model.opt.timestep)
-        if len(begun := begun[begun > 1]) > 1:
+        begun = begun[begun > 1]  # before the first row no velocity is known
+        if len(begun) > 1:
             yield int(start), strides_between(settled, chunks, start, begun, forces)
 
 

@@ -104,7 +104,7 @@ def find_stable_starts(
     """
     period = stride.periods(velocity) / stride.dt
     drawn = 0
-    while drawn < MOST_DRAWN:
+    while drawn < MOST_DRAWN >= n_starts:
         drawn = min(max(2 * drawn, n_starts), MOST_DRAWN)
         starts = draw_starts(drawn, seed, stride)
         when, draw = np.random.default_rng([seed, 2]).uniform(size=(drawn, 2)).T

@@ -14,7 +14,6 @@ from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.drive import Push
 from hexmj.physics.settling import settle
-from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import StableStarts, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan, check_steerable
@@ -67,9 +66,9 @@ class StableWalks:
             TooFewStable: not so many starts are stable until they are disturbed.
             InputError: the controller plans another walk when it begins again.
         """
-        starts = draw_starts(self.n_starts, self.seed, self.stride)
-        check_repeats(self.planner, starts, self.velocity, REPEATED, self.stride)
-        return find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, self.grid)
+        found = find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, self.grid)
+        check_repeats(self.planner, found.starts, self.velocity, REPEATED, self.stride)
+        return found
 
     @cached_property
     def postures(self) -> Postures:
@@ -96,7 +95,7 @@ class StableWalks:
             which: indices of some starts, (n,), which walk as long as if all did; all unless given.
 
         Raises:
-            TooFewStable: not so many starts are stable until they are disturbed.
+            TooFewStable, InputError: see `found`.
             InputError, SimulationError: see `drive.drive`.
         """
         import xarray as xr
@@ -105,6 +104,7 @@ class StableWalks:
         disturbance = disturbance_of(self.found, case.kind, self.planner, self.velocity, self.stride)
         postures = self.postures if case.strategy == "reorganise" else None
         disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
+        check_repeats(disturbed, self.found.starts, self.velocity, REPEATED, self.stride, recovery)
         ahead = self._plan(disturbed, self.found.starts, recovery, threads)
         advanced(ahead, int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
