@@ -182,6 +182,13 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
 
+def unrolled(phase: np.ndarray) -> np.ndarray:
+    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN."""
+    known = phase[np.isfinite(phase)]
+    middle = circular_mean(known) if len(known) else np.nan
+    return phase + (phase < middle - 0.5) - (phase > middle + 0.5)
+
+
 def wilson_phase(v: ArrayLike) -> np.ndarray:
     """Ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
 

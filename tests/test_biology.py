@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import xarray as xr
 from numpy.testing import assert_allclose
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
@@ -16,6 +17,7 @@ from hexmj.legs import MIRROR
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.studies.biology.animals import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, timing
+from hexmj.studies.biology.figure import biology_figure
 from hexmj.studies.biology.ground_forces import GroundForces
 from hexmj.studies.biology.names import SEGMENTS, UNITS
 from hexmj.studies.biology.quantities import quantities
@@ -226,7 +228,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     names = {"biology.nc", "biology.png", "biology.md", "manifest.json", "walks"}
     assert {path.name for path in tmp_path.iterdir()} == names
     assert len(answer["name"]) == len(answer["verdict"]) == len(ANIMALS)
-    assert answer["settings"]["window"] == "periods"
+    assert answer["settings"]["window"] == "4 periods"
     code, text, _ = run(*words)
     assert code == 0
     table = (tmp_path / "biology.md").read_text()
@@ -236,3 +238,20 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)
     for option in ("--window", "--grasp", "--acceleration"):
         assert run(*words, option, 1)[0] == 2
+
+
+def test_phases_around_zero_have_their_mean_there():
+    """Of two starts: 0.789 and 0.122 are a third of a period apart, around 0.955."""
+    study = Biology(LDVS, n_starts=2, periods=6)
+    values = np.full((len(SPEEDS), len(UNITS), 2), 0.5)
+    values[:, [*UNITS].index("phase, ipsilateral")] = 0.789, 0.122
+    table = xr.Dataset({"value": (("speed", "quantity", "start"), values)}, {"quantity": [*UNITS]})
+    result = study.result([table.isel(speed=i) for i in range(len(SPEEDS))])
+    ipsilateral = result.isel(row=result.name.values == "phase, ipsilateral")
+    assert_allclose(ipsilateral["mean"], 0.9555)
+    assert_allclose(ipsilateral.high - 0.9555, 0.9555 - ipsilateral.low)
+    assert_allclose(ipsilateral.high - ipsilateral.low, 2 * 1.959964 * 0.333 / 2, rtol=1e-6)
+    assert_allclose(result.isel(row=result.name.values == "duty factor")["mean"], 0.5)
+    drawn = biology_figure(result).axes[2].lines[0]
+    assert_allclose(np.asarray(drawn.get_ydata(), dtype=float), 0.9555)
+    assert "window 6 periods" in biology_figure(result).get_suptitle()

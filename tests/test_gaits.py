@@ -23,6 +23,7 @@ from hexmj.gaits import (
     classify,
     gait,
     limit_gait,
+    unrolled,
     wilson_phase,
 )
 from hexmj.legs import FIG1, MIRROR
@@ -252,6 +253,12 @@ def test_circular_statistics_equal_scipys(seed, centre, width):
     assert circle(circular_mean(phase, 0), circmean(phase, high=1.0, axis=0)).max() < 1e-12
     assert circle(circular_mean(phase), circmean(phase, high=1.0)) < 1e-12
     assert ((circular_mean(phase, 0) >= 0) & (circular_mean(phase, 0) < 1)).all()
+
+
+def test_phases_are_unrolled_around_their_mean():
+    np.testing.assert_allclose(unrolled(np.array([0.98, 0.02, np.nan, 0.96])), [0.98, 1.02, np.nan, 0.96])
+    np.testing.assert_array_equal(unrolled(np.array([0.3, 0.6])), [0.3, 0.6])
+    assert np.isnan(unrolled(np.array([np.nan]))).all()
 
 
 @pytest.mark.parametrize("wrong", [5, -3, "a", 0.0])

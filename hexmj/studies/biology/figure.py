@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.gaits import unrolled
 from hexmj.measures.captions import caption
 from hexmj.measures.parts import check_starts
 from hexmj.studies.biology.animals import ANIMALS
-from hexmj.studies.biology.names import JOINTS, SEGMENTS
+from hexmj.studies.biology.names import JOINTS, PHASES, SEGMENTS
 from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:
@@ -49,7 +50,11 @@ def biology_figure(result: "xr.Dataset") -> "Picture":
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
     axes[2].legend(frameon=False, fontsize=9)
-    head(figure, "The walking insect beside measured ones; bars at 24 mm/s, with standard deviations", caption(result))
+    walked = result.value.sel(quantity="speed").notnull().sum("start")
+    pairs = zip(walked.values, result.speed.values, strict=True)
+    fewer = [f"{n} walked at {speed:g} mm/s" for n, speed in pairs if n < result.sizes["start"]]
+    told = "; ".join([caption(result), *fewer])
+    head(figure, "The walking insect beside measured ones; bars at 24 mm/s, with standard deviations", told)
     return figure
 
 
@@ -74,7 +79,11 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
             ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
             axes.fill_between(ends, row.low, row.high, color=INSECTS, alpha=0.5, linewidth=0)
     dots = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5, "color": OURS}
-    axes.errorbar(values.speed, values.mean("start"), values.std("start"), label="ours", **dots)
+    mean, deviation = values.mean("start"), values.std("start")
+    if name in PHASES:
+        beside = values.copy(data=np.apply_along_axis(unrolled, 1, values.values))
+        mean, deviation = beside.mean("start") % 1.0, beside.std("start")
+    axes.errorbar(values.speed, mean, deviation, label="ours", **dots)
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
     axes.set_xlim(20.0, 40.0)
     if name.startswith("ripple"):

@@ -27,6 +27,9 @@ WHOLE = {
 }
 """Quantities of the whole body, and their units."""
 
+PHASES = "phase, ipsilateral", "phase, contralateral"
+"""Quantities on the circle [0, 1)."""
+
 EACH = {
     "vertical impulse": "% W",
     "fore-aft impulse": "% W",

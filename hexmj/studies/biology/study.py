@@ -8,9 +8,10 @@ import numpy as np
 
 from hexmj.checks import whole
 from hexmj.errors import InputError
+from hexmj.gaits import unrolled
 from hexmj.intervals import WILSON_Z
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
-from hexmj.studies.biology.names import UNITS
+from hexmj.studies.biology.names import PHASES, UNITS
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell
 
@@ -67,7 +68,7 @@ class Biology(SameStarts):
         import xarray as xr
 
         table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
-        ours = [_mean(table.value.sel(speed=row.speed, quantity=row.quantity).values) for row in ANIMALS]
+        ours = [_mean(table.value.sel(speed=row.speed, quantity=row.quantity).values, row.quantity) for row in ANIMALS]
         columns = {
             "name": [row.quantity for row in ANIMALS],
             "unit": [UNITS[row.quantity] for row in ANIMALS],
@@ -83,13 +84,16 @@ class Biology(SameStarts):
         measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
         units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
         told = {name: ("row", values, {"units": units[name]}) for name, values in columns.items()}
-        return self.labelled(table.assign(told), "biology", periods=self.periods, speeds=list(SPEEDS))
+        walked = {"window": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
+        return self.labelled(table.assign(told), "biology", **walked)
 
 
-def _mean(values: np.ndarray) -> tuple[float, float, float]:
-    """Mean of those that are known, and its 95 % interval."""
-    known = values[np.isfinite(values)]
+def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
+    """Mean of those that are known, and its 95 % interval around it, which of phases may go beyond 0 or 1."""
+    known = unrolled(values) if (phase := quantity in PHASES) else values
+    known = known[np.isfinite(known)]
     if len(known) < 2:
         return (float(known.mean()) if len(known) else np.nan), np.nan, np.nan
     middle, half = known.mean(), WILSON_Z * known.std(ddof=1) / np.sqrt(len(known))
+    middle = middle % 1.0 if phase else middle
     return middle, middle - half, middle + half

@@ -128,7 +128,7 @@ class Terrain(SameStarts):
 
         (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
         table = with_crossings(self._over_obstacles(data), self.distance, at - ahead, behind)
-        return self.labelled(table, "terrain", distance=self.distance)
+        return self.labelled(table, "terrain", window=f"{self.distance:g} / V", distance=self.distance)
 
     def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """The outcomes over (obstacle, grasp, velocity, start)."""
