@@ -43,6 +43,13 @@ def result(folder):
     return conduct(Variants(SETS, **SMALL), folder)
 
 
+def test_a_figure_tells_of_the_stride_what_is_not_usual(result):
+    assert "lines of the tips" not in variants_figure(result).get_suptitle()
+    other = conduct(Variants(SETS, **SMALL, stride=Stride(geometry=CENTRED, aep0=9.5)))
+    title = variants_figure(other).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
+    assert "AEP$_0$ = 9.5 mm, other lines of the tips" in title
+
+
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_variant_changes_one_thing(variant):
     changed = [

@@ -55,8 +55,9 @@ class Variants(StudyCommand):
         for several in networks.values():
             self.refuse_contact_gap(several[0])
         short = short_names({name: one for name, (one, *_) in networks.items() if not name.endswith(OF_EACH)})
+        shown = {short.get(name, name): several for name, several in networks.items()}
         return study.Variants(
-            {short.get(name, name): several for name, several in networks.items()},
+            shown if len(shown) == len(networks) else networks,
             self.velocities,
             self.starts if self.starts is not None else 50 if self.physical else study.Variants.n_starts,
             **self.walked,

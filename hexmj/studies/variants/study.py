@@ -1,7 +1,7 @@
 """Sets of weights under every variant of what the paper leaves open: which are good whatever the authors used?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -119,7 +119,8 @@ class Variants:
         table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
         table["instead"] = lost.copy(data=self._instead()).assign_attrs(units="1")
         told = ("window", "n_starts", "seed", "acceleration", "networks")
-        settings = {name: plain(getattr(self, name)) for name in told} | self._stride
+        settings = {name: plain(getattr(self, name)) for name in told}
+        settings["stride"] = asdict(self.strides["usual"])
         settings["conditions"] = self.conditions.settings() if self.conditions else None
         return table.assign_attrs(attributes({"study": "variants"} | settings))
 
@@ -137,10 +138,6 @@ class Variants:
             [[told(one, variant) for one in networks] for variant in self.variants]
             for networks in self.networks.values()
         ])  # fmt: skip
-
-    @property
-    def _stride(self) -> dict[str, object]:
-        return {"stride": plain(self.strides["usual"])}
 
 
 def notes(result: "xr.Dataset") -> list[str]:
