@@ -25,8 +25,11 @@ PHASES = (*np.arange(-1, 26, 2) / 24,)
 FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
 """In a cell of which walks are missing, and in one of which nothing is known."""
 
-BAR: dict[str, Any] = {"location": "bottom", "fraction": 0.03, "format": "%g"}
+BAR: dict[str, Any] = {"location": "bottom", "format": "%g"}
 """Of the colours, below their panels."""
+
+BAR_HEIGHT = 0.25
+"""Of its place [inch]; the bars' aspects make them half as thick, however many entrants there are."""
 
 NAMED = 6
 """Most entrants that a note names."""
@@ -64,7 +67,7 @@ def league_figure(result: "xr.Dataset") -> "Picture":
     images = [_heat(one, panel) for one, panel in zip(axes, panels, strict=False)]
     for one in axes[:3]:
         _velocities(one, shown)
-    how: dict[str, Any] = BAR | {"aspect": 460 / figure.get_figheight(), "shrink": 0.7}
+    how: dict[str, Any] = BAR | {"fraction": BAR_HEIGHT / figure.get_figheight(), "aspect": 55, "shrink": 0.7}
     figure.colorbar(images[0], ax=axes[:3], **how).set_label("share of the starts", fontsize=9)
     _dots(axes[3], shown)
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
@@ -87,7 +90,8 @@ def walks_figure(result: "xr.Dataset") -> "Picture":
     figure, axes = _rows(shown, (1.33, 1.0, 1.0, 1.0))
     labels = ("share of the starts", "share of the starts", "phase", "")
     for one, panel, label in zip(axes, panels, labels, strict=True):
-        bar = figure.colorbar(_heat(one, panel), ax=one, **BAR, aspect=190 / figure.get_figheight())
+        how = {"fraction": BAR_HEIGHT / figure.get_figheight(), "aspect": 23}
+        bar = figure.colorbar(_heat(one, panel), ax=one, **BAR, **how)
         bar.ax.tick_params(labelsize=7)
         if panel.colours == "twilight":
             bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])

@@ -123,8 +123,9 @@ def _regimes(result: "xr.Dataset") -> Table:
     for name in at.entrant.values:
         one = at.sel(entrant=name)
         shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
-        angles = (f"{one[key].item():.2f}" for key in ("ipsilateral", "contralateral", "duty_factor"))
-        rows.append(tuple(_known(text) for text in (name, *shares, f"{one.reached.item():.0f}", *angles)))
+        phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
+        regime = *shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"
+        rows.append(tuple(_known(text) for text in (name, *regime)))
     head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
     return Table(f"Limit regimes at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows)
 
