@@ -57,12 +57,18 @@ def varied(part: Part, variant: str) -> Part:
     if variant == "usual":
         return part
     own: Any = part
-    usual = {one.name: one.default if one.default_factory is MISSING else one.default_factory() for one in fields(own)}
-    wanted = {name: value for name, value in VARIANTS[variant].items() if name in usual}
-    changes = {name: usual[name] if getattr(own, name) == value else value for name, value in wanted.items()}
+    wanted = {one.name: VARIANTS[variant][one.name] for one in fields(own) if one.name in VARIANTS[variant]}
+    changes = {name: _default(own, name) if getattr(own, name) == value else value for name, value in wanted.items()}
     inner = {name: varied(getattr(own, name), variant) for name in INNER if is_dataclass(getattr(own, name, None))}
     with naming(variant):
         return replace(own, **changes | inner)
+
+
+def _default(part: Any, name: str) -> Any:
+    """Of a field, in the first class that has it, whatever its heirs make of it."""
+    classes = [one for one in type(part).__mro__ if is_dataclass(one)]
+    field = next(one for cls in reversed(classes) for one in fields(cls) if one.name == name)
+    return field.default if field.default_factory is MISSING else field.default_factory()
 
 
 def instead(part: Any, variant: str) -> dict[str, Any]:

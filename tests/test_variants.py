@@ -62,6 +62,20 @@ def test_a_variant_changes_one_thing(variant):
     assert len(changed) == (variant != "usual")
 
 
+@dataclass(frozen=True)
+class Sequential(hexmj.Cruse1998):
+    """An heir with a rule of its own by default."""
+
+    order: Any = "sequential"
+
+
+def test_what_an_heir_has_anyway_is_varied_to_what_the_network_has():
+    heir = Sequential(LDVS.weights)
+    assert varied(heir, "sequential").order == "printed"
+    assert instead(heir, "sequential") == {"order": "printed"}
+    assert varied(heir, "undelayed").order == "undelayed"
+
+
 def test_what_has_the_changed_value_already_gets_the_usual_one():
     lasting = hexmj.PRESETS["lasting-0.3"]
     assert varied(lasting, "lasting").reading == Reading()

@@ -147,3 +147,31 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     assert code == 0
     told = [f"ldvs-V-0.5-beside-planned-{i}.nc was there; the new one takes its place" in error for i in (1, 2)]
     assert told == [True, True]
+
+
+DRIFTS = """
+from dataclasses import dataclass
+import hexmj
+
+BEGUN = []
+
+@dataclass(frozen=True)
+class Drifts:
+    name: str = "drifts"
+
+    def begin(self, starts, velocity, *how):
+        BEGUN.append(1)
+        return hexmj.LDVS.begin(starts, velocity * (1.0 if len(BEGUN) < 3 else 0.5), *how)
+"""
+
+
+@drawing
+def test_the_plan_that_is_filmed_beside_an_insect_is_its_own(run, tmp_path):
+    """Of a controller that plans otherwise when it begins for the third time."""
+    (tmp_path / "drifts.py").write_text(DRIFTS)
+    words = ["--velocity", 0.5, "--window", 3, "--beside", "planned", "--width", 160, "--height", 120]
+    code, _, error = run("render", "--model", f"{tmp_path / 'drifts.py'}:Drifts", *words, "--out", tmp_path / "films")
+    assert code == 0, error
+    planned, walked = (xr.load_dataset(path) for path in sorted((tmp_path / "films").glob("*.nc")))
+    assert planned.attrs["title"] == walked.attrs["title"] + ", planned"
+    np.testing.assert_array_equal(planned.planned_x, walked.planned_x)

@@ -13,6 +13,8 @@ from hexmj.timing import observation_time, steps_within
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hexmj.measures.physical import PhysicalWalk
+
 KEPT = 2000
 """Memory that a step of a recording takes until it is written, as measured [bytes]."""
 
@@ -29,20 +31,38 @@ def recorded(
 ) -> "xr.Dataset":
     """A recording of one of the seed's starts: what the insect did, or, unless `physical`, a puppet of the plan."""
     from hexmj.measures.kinematic import walk
-    from hexmj.measures.physical import physical_walk
     from hexmj.replay.recording import record, record_plan
+
+    if physical:
+        return record(walked_start(command, controller, velocity, start, threads), title=title)
+    starts, time, how = _asked(command, velocity, start, threads)
+    planned = walk(starts, controller, velocity, time, **how)
+    return record_plan(planned, command.conditions, how["stride"], title=title)
+
+
+def walked_start(
+    command: WalkingCommand, controller: Controller, velocity: float, start: int, threads: int | None = None
+) -> "PhysicalWalk":
+    """The physical walk of one of the seed's starts."""
+    from hexmj.measures.physical import physical_walk
+
+    starts, time, how = _asked(command, velocity, start, threads)
+    with progress_bar("walking") as progress:
+        how |= {"conditions": command.conditions, "progress": progress}
+        return physical_walk(starts, controller, velocity, time, **how)
+
+
+def _asked(
+    command: WalkingCommand, velocity: float, start: int, threads: int | None
+) -> tuple[np.ndarray, float, dict[str, Any]]:
+    """A start, (1, leg) [mm], how long it walks [time units], and how."""
     from hexmj.starts import draw_start
 
     stride, acceleration = command.walks.stride, command.accelerating.procedure
-    starts = draw_start(start, command.walks.seed, stride)
     time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
     check_memory(f"recordings of {time:g} time units", KEPT * int(steps_within(time, stride)))
-    how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-    with progress_bar("walking") as progress:
-        if not physical:
-            return record_plan(walk(starts, controller, velocity, time, **how), command.conditions, stride, title=title)
-        how |= {"conditions": command.conditions, "progress": progress}
-        return record(physical_walk(starts, controller, velocity, time, **how), title=title)
+    how = {"stride": stride, "acceleration": acceleration, "threads": threads}
+    return draw_start(start, command.walks.seed, stride), time, how
 
 
 def walk_summary(walked: "xr.Dataset") -> dict[str, Any]:

@@ -13,7 +13,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers, changed
-from hexmj.cli.recorded import recorded, walk_summary
+from hexmj.cli.recorded import walk_summary, walked_start
 from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
@@ -117,14 +117,14 @@ class Render(WalkingCommand):
 
     def _recorded(self, controllers: dict[str, Controller], path: Path) -> "tuple[list[xr.Dataset], list[Path]]":
         """The walks that are to be seen, recorded, and their files."""
-        from hexmj.replay.recording import save_recording
+        from hexmj.replay.recording import record, record_plan, save_recording
 
-        walked = [(one, name, True) for name, one in controllers.items()]
+        walks = {
+            name: walked_start(self, one, self.velocity, self.start, self.workers.threads)
+            for name, one in controllers.items()
+        }
+        shown = [record(one, title=name) for name, one in walks.items()]
         if self.beside == "planned":
-            first, title, _ = walked[0]
-            walked.insert(0, (first, f"{title}, planned", False))
-        shown = [
-            recorded(self, one, self.velocity, self.start, physical=physical, title=title, threads=self.workers.threads)
-            for one, title, physical in walked
-        ]
+            ((name, walk),) = walks.items()
+            shown.insert(0, record_plan(walk.planned, self.conditions, self.walks.stride, title=f"{name}, planned"))
         return shown, [save_recording(one, Path(f"{path}-{i + 1}.nc")) for i, one in enumerate(shown)]
