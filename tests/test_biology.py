@@ -130,6 +130,20 @@ def test_a_hop_is_no_swing():
     assert onsets(standing, 0.01).tolist() == [40, 90]
 
 
+def test_who_lifts_where_strides_begin_or_end_has_as_many_stances_as_there_are_strides(walking):
+    """Strides of 400 rows; swings of 100 rows begin in the first row, 10 rows before the last one, or 200 later."""
+    begun, standing = (0, 0, 1190, 200, 200, 200), np.ones((1200, 6), dtype=bool)
+    for leg, first in enumerate(begun):
+        for row in range(first - 1200, first + 1200, 400):
+            standing[np.arange(row, row + 100) % 1200, leg] = False
+    three = replace(walking[0][0], count=3, standing=standing)
+    one = replace(three, count=1, standing=standing[400:800])
+    for strides, legs in ((three, (0, 0, 390, 200, 200, 200)), (one, (0, 0, 390, 200, 200, 200))):
+        assert [strides.lifted(leg)[0] for leg in range(6)] == [*legs]
+        for leg in range(6):
+            assert [len(stance) for stance in strides.stances(leg)] == [300] * strides.count
+
+
 def test_stances_begin_with_landing_and_those_that_the_ends_cut_are_put_together(walking):
     strides = walking[0][0]
     for leg in range(6):

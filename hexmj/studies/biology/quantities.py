@@ -15,7 +15,7 @@ from hexmj.process.threads import check_memory
 from hexmj.rotations import heading, rotated, turned
 from hexmj.starts import draw_starts
 from hexmj.studies.biology.names import EACH, JOINTS, SEGMENTS, UNITS
-from hexmj.studies.biology.strides import Strides, last_strides, onsets
+from hexmj.studies.biology.strides import Strides, last_strides
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def quantities(strides: Strides, compiled: CompiledBody) -> dict[str, float]:
 def _gait(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     ahead, duty = _ahead(strides), (strides.ground[..., 2] > 0).mean()
     speed, period = ahead.mean(), len(ahead) * strides.step / strides.count
-    begun = [0.0, *(np.append(onsets(leg, strides.step), np.nan)[0] for leg in strides.standing.T[1:])]
+    begun = [np.append(strides.lifted(leg), np.nan)[0] for leg in range(6)]
     lags = [(begun[k] - begun[j]) * strides.step / period % 1.0 for j, k in PAIRS.values()]
     return {
         "speed": speed,

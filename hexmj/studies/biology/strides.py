@@ -42,11 +42,16 @@ class Strides:
     ground: np.ndarray
     """(sample, leg, 3) of the ground on the feet, in the world [g mm/s^2]."""
 
+    def lifted(self, leg: int) -> np.ndarray:
+        """Rows in which a leg begins to swing, of a walk that repeats itself."""
+        rows = len(self.standing)
+        found = onsets(np.tile(self.standing[:, leg], 3), self.step)
+        return found[(found >= rows) & (found < 2 * rows)] - rows
+
     def stances(self, leg: int) -> list[np.ndarray]:
         """Rows of each stance of a leg, from its landing until it leaves the ground for longer than it hops; one that
-        the ends of the strides cut is put together of its parts, since a walk repeats itself."""
-        standing, rows = self.standing[:, leg], len(self.standing)
-        lifted = onsets(standing, self.step) if self.count > 1 or leg else np.array([0])
+        the ends of the strides cut is put together of its parts."""
+        standing, rows, lifted = self.standing[:, leg], len(self.standing), self.lifted(leg)
         strides = [np.arange(a, b) % rows for a, b in pairwise([*lifted, *(lifted[:1] + rows)])]
         return [stride[standing[stride].argmax() :] for stride in strides]
 
