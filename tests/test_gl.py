@@ -158,3 +158,48 @@ def test_with_the_libraries_the_wish_for_egl_stands(environment):
     environment.setattr(ctypes, "CDLL", lambda name: None)
     gl.drop_vain_wish()
     assert os.environ["MUJOCO_GL"] == "egl"
+
+
+TOGETHER = """
+import gc
+import sys
+
+import gymnasium
+import numpy as np
+
+import hexmj
+from hexmj.environments import dm
+
+def theirs():
+    return walking.physics.render(120, 160, camera_id=0)
+
+walking = dm.load(velocity=0.5, actions="tips", seed=2)
+walking.reset()
+theirs()
+first = theirs()
+other = gymnasium.make("hexmj.environments:hexmj/StickInsect-v0", render_mode="rgb_array")
+other.reset(seed=0)
+ours = [other.render()]
+assert (theirs() == first).all(), "drawn"
+ours += [other.render()]
+recording = hexmj.record(hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 1.0))
+hexmj.render([recording], sys.argv[1])
+assert (theirs() == first).all(), "filmed"
+assert (other.render() == ours[1]).all()
+other.close()
+assert (theirs() == first).all(), "closed"
+other.reset(seed=0)
+other.render()
+del other
+gc.collect()
+assert (theirs() == first).all(), "dropped"
+"""
+
+
+@drawing
+def test_dm_control_films_and_environments_draw_in_one_program(tmp_path):
+    """dm_control takes for granted that its context is current, and frees it at the exit."""
+    done = subprocess.run(
+        [sys.executable, "-c", TOGETHER, tmp_path / "film.mp4"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -128,7 +128,9 @@ def missing() -> str | None:
 
         if not hasattr(mujoco, "Renderer"):
             return _sentence("MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none")
-        with warnings.catch_warnings():
+        from hexmj.replay.film.own_context import kept_current
+
+        with kept_current(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context
             context = context_type()(16, 16)
             made = bool(context._context)
