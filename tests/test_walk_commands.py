@@ -175,3 +175,10 @@ def test_the_plan_that_is_filmed_beside_an_insect_is_its_own(run, tmp_path):
     planned, walked = (xr.load_dataset(path) for path in sorted((tmp_path / "films").glob("*.nc")))
     assert planned.attrs["title"] == walked.attrs["title"] + ", planned"
     np.testing.assert_array_equal(planned.planned_x, walked.planned_x)
+
+
+def test_the_last_line_of_a_puppet_tells_what_it_obeys(run, tmp_path):
+    code, text, _ = run("walk", "--step-height", 5, "--window", 3, "--out", tmp_path)
+    assert code == 0
+    assert "step_height 5.0" in text
+    assert "friction" not in text

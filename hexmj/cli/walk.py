@@ -65,7 +65,8 @@ class Walk(WalkingCommand):
             print_json(summary | {"settings": told, "files": files})
         else:
             lines = [f"{key}: {_told(key, value)}" for key, value in summary.items() if value is not None]
-            show(title, *lines, self.conditions_line(self.physical), *map(str, files))
+            beyond = () if self.physical else self.conditions.flat().keys() - {*SHOWN}  # what a puppet obeys
+            show(title, *lines, self.conditions_line(varied=beyond), *map(str, files))
 
 
 def _told(key: str, value: Any) -> str:
