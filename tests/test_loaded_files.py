@@ -23,7 +23,15 @@ def test_a_file_is_loaded_once_until_it_is_edited(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
-    [("import nonsense_9", "No module named"), ("def", "invalid syntax"), ("1 / 0", "by zero"), (None, "No such file")],
+    [
+        ("import nonsense_9", "No module named"),
+        ("from .helper import X", "it imports relatively; expected module:object of its package"),
+        ("from . import helper", "it imports relatively"),
+        ("from ..helper import X", "it imports relatively"),
+        ("def", "invalid syntax"),
+        ("1 / 0", "by zero"),
+        (None, "No such file"),
+    ],
 )
 def test_a_file_that_does_not_load_is_refused_in_one_sentence(tmp_path: Path, text: str | None, sentence: str) -> None:
     if text is not None:

@@ -41,7 +41,10 @@ def importable(path: str | Path) -> ModuleType:
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
+        told = f"{type(error).__name__}: {error}"
+        if isinstance(error, ImportError) and (error.name or "").startswith("hexmj.user_code"):
+            told = "it imports relatively; expected module:object of its package, or a file that stands alone"
+        raise InputError(f"{path} cannot be loaded: {told}") from error
 
 
 def module_name(path: Path, stamp: str) -> str:
