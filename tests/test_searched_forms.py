@@ -78,6 +78,20 @@ def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
 
 
 @dataclass(frozen=True)
+class Late(Pace):
+    """Refuses as it begins."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        raise InputError("too late")
+
+
+def test_a_candidate_that_begins_no_walk_is_named():
+    problem = Problem(FieldsForm(Late()), 0.4, 0.4, window=5.0)
+    with pytest.raises(InputError, match=r"with good = 1.5, idle = -0.5: .*too late"):
+        Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]]))
+
+
+@dataclass(frozen=True)
 class Far(Pace):
     """Stands still, far beside its lines."""
 

@@ -220,6 +220,10 @@ class Sample:
                 return self._cost(candidate, threads)
             except OutOfReach:
                 return REFUSED
+            except InputError as error:
+                pairs = zip(self.problem.form.names, vector, strict=True)
+                at = ", ".join(f"{name} = {value:g}" for name, value in pairs)
+                raise InputError(f"with {at}: {error}") from None
 
         # A user's plans may share a module's arrays, and hold the interpreter's lock anyway.
         if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
