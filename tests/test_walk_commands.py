@@ -149,6 +149,20 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     assert told == [True, True]
 
 
+@drawing
+def test_what_takes_the_place_of_another_is_told_before_it_does(run, tmp_path, monkeypatch):
+    words = ["render", "--velocity", 0.5, "--window", 3, "--beside", "planned", "--width", 160, "--height", 120]
+    assert run(*words, "--out", tmp_path)[0] == 0
+
+    def full(*_):
+        raise hexmj.InputError("the disk is full")
+
+    monkeypatch.setattr("hexmj.replay.recording.save_recording", full)
+    code, _, error = run(*words, "--out", tmp_path)
+    assert code == 2
+    assert error.count("the new one takes its place") == 3
+
+
 DRIFTS = """
 from dataclasses import dataclass
 import hexmj

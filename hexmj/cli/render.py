@@ -53,7 +53,7 @@ class Render(WalkingCommand):
     def run(self) -> None:
         """Record if there is nothing to render yet, then render from the recordings."""
         from hexmj.replay.film.video import missing, render
-        from hexmj.replay.recording import load_recording
+        from hexmj.replay.recording import load_recording, save_recording
         from hexmj.replay.take import takes_of
 
         self._check()
@@ -67,13 +67,14 @@ class Render(WalkingCommand):
         if sentence := missing():
             raise RenderingError(sentence)
         there = [one for one in (video, *walks) if (out / one).exists()]
-        files, settings = [], {"film": asdict(self.film)}
+        settings = {"film": asdict(self.film)}
         if not shown:
-            shown, files = self._recorded(controllers, out / name)
+            shown = self._recorded(controllers)
             settings |= self._walked(controllers)
-        out.mkdir(parents=True, exist_ok=True)
         for one in there:
             print(f"hexmj: {literal(str(out / one))} was there; the new one takes its place", file=sys.stderr)
+        out.mkdir(parents=True, exist_ok=True)
+        files = [save_recording(one, out / to) for one, to in zip(shown, walks, strict=False)]  # none that was given
         with progress_bar("rendering") as progress:
             frames = render(shown, out / video, self.film, progress)
         files.append(out / video)
@@ -115,9 +116,9 @@ class Render(WalkingCommand):
         told = {"velocity": self.velocity, "start": self.start, "beside": self.beside}
         return told | walks | {"conditions": self.conditions.settings()}
 
-    def _recorded(self, controllers: dict[str, Controller], path: Path) -> "tuple[list[xr.Dataset], list[Path]]":
-        """The walks that are to be seen, recorded, and their files."""
-        from hexmj.replay.recording import record, record_plan, save_recording
+    def _recorded(self, controllers: dict[str, Controller]) -> "list[xr.Dataset]":
+        """The walks that are to be seen."""
+        from hexmj.replay.recording import record, record_plan
 
         walks = {
             name: walked_start(self, one, self.velocity, self.start, self.workers.threads)
@@ -127,4 +128,4 @@ class Render(WalkingCommand):
         if self.beside == "planned":
             ((name, walk),) = walks.items()
             shown.insert(0, record_plan(walk.planned, self.conditions, self.walks.stride, title=f"{name}, planned"))
-        return shown, [save_recording(one, Path(f"{path}-{i + 1}.nc")) for i, one in enumerate(shown)]
+        return shown
