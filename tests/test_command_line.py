@@ -73,6 +73,8 @@ SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
         (["--model", "sums.py:X"], "; sums.py:X: order sequential, reading cap sum"),
         (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
         (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+        (["--model", "own-0.4-without-3"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+        (["--pep0", -9, "--geometry", "centred"], "; seed 0; pep0 -9.0; geometry centred"),
     ],
 )
 def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, words, told):

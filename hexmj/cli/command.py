@@ -10,6 +10,8 @@ from hexmj.cli.options import Accelerating, Controlled, Walks, changed
 from hexmj.conditions import Conditions, Numerics, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
+from hexmj.legs import GEOMETRIES
+from hexmj.timing import Stride
 
 TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
 """Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
@@ -48,8 +50,12 @@ class WalkingCommand:
         from hexmj.controllers.named import PART
 
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
-        known = [name for name in self.names if searched_on(PART.sub("", name)) == self.walks.seed]
+        bases = dict.fromkeys(PART.sub("", name) for name in self.names)
+        known = [name for name in bases if searched_on(name) == self.walks.seed]
         line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
+        stride = self.walks.stride
+        told = vars(stride) | {"geometry": {one: name for name, one in GEOMETRIES.items()}[stride.geometry]}
+        line += "".join(f"; {name} {told[name]}" for name in changed(stride, Stride()))
         if acceleration := self.accelerating.procedure:
             line += f"; a = {acceleration.rate:g} from V = {acceleration.start:g}"
         line += "".join(f"; {rule} {getattr(self.controlled, rule)}" for rule in self.controlled.rules)
