@@ -1,8 +1,10 @@
 """Controllers by name: presets, rivals, files and objects of a user's own; and their settings."""
 
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -106,6 +108,52 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nwidth = 4.0\n')
     with pytest.raises(hexmj.InputError, match=r"width.*expected fields of mine_of_a_user.py:Still"):
         hexmj.load_controller("tall.toml")
+
+
+KINDS = """
+from dataclasses import dataclass
+from enum import Enum
+
+class Mode(Enum):
+    SLOW = "slow"
+
+@dataclass(frozen=True)
+class Inner:
+    g: float = 1.0
+
+@dataclass(frozen=True)
+class Odd:
+    name: str = "odd"
+    mode: Mode = Mode.SLOW
+    inner: Inner | dict = Inner()
+    made: Inner = Inner()
+    legs: tuple[float, ...] = (1.0,)
+
+    def __post_init__(self):
+        if isinstance(self.made, dict) and "g" in self.made:
+            object.__setattr__(self, "made", Inner(**self.made))
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("rest", "sentence"),
+    [
+        ('[fields]\nmode = "slow"', "mode = 'slow'; expected a Mode"),
+        ("[fields]\nmade = {h = 0.5}", r"made = \{'h': 0.5\}; expected an Inner"),
+        ('[fields]\nlegs = ["a"]', "legs = .*; expected some values, each a number"),
+        ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
+        ("name = 'x'", "holds controller, name; expected controller and a table"),
+        ("[fields]\nmade = {g = 0.5}\nlegs = [1, 2.5]\ninner = {g = 2}", None),
+    ],
+)
+def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("odd.py").write_text(KINDS)
+    Path("odd.toml").write_text(f"controller = 'odd.py:Odd'\n{rest}\n")
+    with pytest.raises(hexmj.InputError, match=sentence) if sentence else nullcontext():
+        hexmj.load_controller("odd.toml")
 
 
 @pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])

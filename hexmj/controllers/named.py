@@ -4,13 +4,14 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
+from enum import Enum
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
 from types import ModuleType
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
@@ -66,7 +67,9 @@ def load_controller(name: str) -> Controller:
             " nor module:object or file.py:object"
         )
     table = read_toml(path)
-    if "controller" in table and set(table) <= {"controller", "fields"} and isinstance(table.get("fields", {}), dict):
+    if "controller" in table:
+        if not (table.keys() <= {"controller", "fields"} and isinstance(table.get("fields", {}), dict)):
+            raise InputError(f"{path} holds {literal(', '.join(table)):.300}; expected controller and a table [fields]")
         return _with_fields(path, str(table["controller"]), table.get("fields", {}))
     return read_network(table, name, literal(path.stem))
 
@@ -109,9 +112,20 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         with suppress(NameError):  # of a type that is there for type checkers alone
             types |= get_type_hints(type(found))
         wanted = {name: _PLAIN[kind] for name, kind in types.items() if name in values and kind in _PLAIN}
-        return replace(found, **(values | {name: typed(name, values[name], kind) for name, kind in wanted.items()}))
+        made = replace(found, **(values | {name: typed(name, values[name], kind) for name, kind in wanted.items()}))
+        for name in values:
+            if _is_told(types[name]):
+                typed(name, getattr(made, name), types[name])
+        return made
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
+
+
+def _is_told(kind: Any) -> bool:
+    """Whether a type is a member, a record or a row of plain ones, which a class may have to make of what it is told."""
+    if get_origin(kind) is tuple:
+        return all(one in _PLAIN or one is Ellipsis for one in get_args(kind))
+    return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
 
 
 def _found(where: str, what: str, name: str) -> Controller:
