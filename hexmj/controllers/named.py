@@ -122,7 +122,7 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
 
 
 def _is_told(kind: Any) -> bool:
-    """Whether a type is a member, a record or a row of plain ones, which a class may have to make of what it is told."""
+    """Whether a type is an enumeration, a record or a row of plain ones: a class may make one of what it is told."""
     if get_origin(kind) is tuple:
         return all(one in _PLAIN or one is Ellipsis for one in get_args(kind))
     return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
