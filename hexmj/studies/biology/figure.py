@@ -81,7 +81,7 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
     dots = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5, "color": OURS}
     mean, deviation = values.mean("start"), values.std("start")
     if name in PHASES:
-        beside = values.copy(data=np.apply_along_axis(unrolled, 1, values.values))
+        beside = values.copy(data=np.apply_along_axis(unrolled, values.get_axis_num("start"), values.values))
         mean, deviation = beside.mean("start") % 1.0, beside.std("start")
     axes.errorbar(values.speed, mean, deviation, label="ours", **dots)
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
