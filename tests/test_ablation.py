@@ -150,4 +150,4 @@ def test_parts_of_a_set_are_known_to_be_searched_on_these_starts() -> None:
 
     for words, name in ((["ablate", "--models", "own-0.3"], "own-0.3"), (["flss", "--model"], "own-0.3-without-4")):
         line = options_of([*words, *([name] if name not in words else []), "--seed", "0"]).conditions_line()
-        assert f"a search found {name} (" in line
+        assert "a search found own-0.3 (" in line

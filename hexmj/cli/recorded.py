@@ -36,7 +36,8 @@ def recorded(
     if physical:
         return record(walked_start(command, controller, velocity, start, threads), title=title)
     starts, time, how = _asked(command, velocity, start, threads)
-    planned = walk(starts, controller, velocity, time, **how)
+    with progress_bar("walking"):
+        planned = walk(starts, controller, velocity, time, **how)
     return record_plan(planned, command.conditions, how["stride"], title=title)
 
 
