@@ -1,11 +1,9 @@
 """The faces for Gymnasium: its own checks, and one insect, many insects and the physical walk to the same bits."""
 
-import gc
 import os
 import subprocess
 import sys
 import warnings
-import weakref
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import replace
@@ -20,11 +18,9 @@ from gymnasium.vector import AutoresetMode
 
 import hexmj
 from drawing import drawing
-from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import IDS, dm
-from hexmj.environments.frames import Frames
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError
@@ -361,49 +357,6 @@ def test_seeds_of_many_are_whole_numbers():
     for wrong in (1.5, "ab", -1, [1.5, 2], [True, 1], np.array(5)):
         with pytest.raises(InputError, match="seed = "):
             many.reset(seed=wrong)  # pyright: ignore[reportArgumentType]
-
-
-@drawing
-def test_frames_that_nobody_closes_are_freed_when_they_are_dropped():
-    frames = Frames(Conditions())
-    frames.draw(compile_body(Conditions()).model.qpos0)
-    renderer = weakref.ref(frames._renderer)
-    del frames
-    gc.collect()
-    assert renderer() is None
-
-
-@drawing
-def test_who_goes_takes_nothing_with_it_that_others_draw_with():
-    one, other, third = (made("hexmj/StickInsect-v0", render_mode="rgb_array") for _ in range(3))
-    for walking in (one, other, third):
-        walking.reset(seed=0)
-        walking.render()
-    before = third.render()
-    one.close()
-    np.testing.assert_array_equal(third.render(), before)
-    del other
-    gc.collect()
-    np.testing.assert_array_equal(third.render(), before)
-    with ThreadPoolExecutor(1) as elsewhere:
-        frames = Frames(Conditions())
-        elsewhere.submit(frames.draw, compile_body(Conditions()).model.qpos0).result()
-        third.render()
-        del frames  # while the thread that drew goes on
-        gc.collect()
-        np.testing.assert_array_equal(third.render(), before)
-
-
-@pytest.mark.slow
-def test_a_drawn_insect_that_nobody_closes_ends_in_silence():
-    program = """
-import gymnasium
-walking = gymnasium.make("hexmj.environments:hexmj/StickInsectTips-v0", render_mode="rgb_array")
-walking.reset(seed=0)
-walking.render()
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stderr == ""
 
 
 def test_who_begins_again_settles_to_the_same_bits_and_builds_nothing(monkeypatch):

@@ -70,9 +70,7 @@ class Biology(StudyCommand):
             table.add_row(*row)
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
         yield table
-        walked = result.value.sel(quantity="speed").notnull().sum("start")
-        pairs = zip(walked.values, result.speed.values, strict=True)
-        counts = (f"{n} of {self.starts} at {speed:g} mm/s" for n, speed in pairs)
+        counts = (f"{n} of {self.starts} at {speed:g} mm/s" for speed, n in biology.walked(result).items())
         yield f"starts that walked: {', '.join(counts)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()

@@ -9,6 +9,7 @@ from hexmj.measures.captions import caption
 from hexmj.measures.parts import check_starts
 from hexmj.studies.biology.animals import ANIMALS
 from hexmj.studies.biology.names import JOINTS, PHASES, SEGMENTS
+from hexmj.studies.biology.study import walked
 from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:
@@ -50,9 +51,7 @@ def biology_figure(result: "xr.Dataset") -> "Picture":
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
     axes[2].legend(frameon=False, fontsize=9)
-    walked = result.value.sel(quantity="speed").notnull().sum("start")
-    pairs = zip(walked.values, result.speed.values, strict=True)
-    fewer = [f"{n} walked at {speed:g} mm/s" for n, speed in pairs if n < result.sizes["start"]]
+    fewer = [f"{n} walked at {speed:g} mm/s" for speed, n in walked(result).items() if n < result.sizes["start"]]
     told = "; ".join([caption(result), *fewer])
     head(figure, "The walking insect beside measured ones; bars at 24 mm/s, with standard deviations", told)
     return figure

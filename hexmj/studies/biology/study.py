@@ -97,3 +97,9 @@ def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
     middle, half = known.mean(), WILSON_Z * known.std(ddof=1) / np.sqrt(len(known))
     middle = middle % 1.0 if phase else middle
     return middle, middle - half, middle + half
+
+
+def walked(result: "xr.Dataset") -> dict[float, int]:
+    """Number of starts that walked at each speed [mm/s], of a result of `Biology`."""
+    count = result.value.sel(quantity="speed").notnull().sum("start")
+    return dict(zip(result.speed.values.tolist(), count.values.tolist(), strict=True))
