@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 
 import hexmj
 from hexmj.errors import InputError
+from hexmj.measures import kinematic
 from hexmj.process import progress
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.stages import search
+from hexmj.view import live
 
 STARTS = hexmj.draw_starts(2, 0)
 CALLS: dict[str, Any] = {
@@ -117,10 +120,17 @@ main()
     assert done.stdout.startswith("{")
 
 
-@pytest.mark.parametrize("words", [("view", "--browser", "--port", -1), ("walk", "--window", 1000)])
+def _slowly(work, *of, **how):
+    time.sleep(0.3)
+    return work(*of, **how)
+
+
+@pytest.mark.parametrize("words", [("view", "--browser", "--port", -1), ("walk",)])
 def test_commands_without_lines_of_their_own_say_that_a_first_run_compiles(run, monkeypatch, tmp_path, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(progress, "EVERY", 0.001)
+    monkeypatch.setattr(progress, "EVERY", 0.1)
+    for command, work in (kinematic, "walk"), (live, "LiveWalk"):
+        monkeypatch.setattr(command, work, partial(_slowly, getattr(command, work)))
     _, _, error = run(*words)
     assert error.count(progress.FIRST) == 1
 
