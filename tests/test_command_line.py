@@ -91,6 +91,22 @@ def test_the_last_line_is_silent_on_what_is_as_printed_and_fresh(run, words):
     assert "reading" not in out
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--velocity", 0.5, "--ground-at", 60], True),
+        (["--velocity", 0.5, "--ground-at", 60, "--window", 46], False),
+        (["--velocity", 0.5, "--ground-at", 60, "--ground", "flat"], False),
+    ],
+)
+def test_the_last_line_tells_of_a_ground_that_nobody_gets_to(run, tmp_path, words, told):
+    """Front feet get to 38 mm ahead of where the body is told to be."""
+    usual = ["--ground", "step"] if "--ground" not in words else []
+    out = run("walk", "--physical", "--window", 20, *usual, *words, "--out", tmp_path / "walk")[1]
+    assert ("; nobody gets to what lies ahead: 10 mm are walked at most" in " ".join(out.split())) == told
+    assert ("nobody" in out) == told
+
+
 @pytest.mark.slow
 def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
     words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]

@@ -113,6 +113,7 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
 KINDS = """
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal, Optional
 
 class Mode(Enum):
     SLOW = "slow"
@@ -128,6 +129,10 @@ class Odd:
     inner: Inner | dict = Inner()
     made: Inner = Inner()
     legs: tuple[float, ...] = (1.0,)
+    feet: Literal["locked", "free"] = "locked"
+    most: float | None = None
+    other: Optional[Mode] = None
+    either: int | str = 1
 
     def __post_init__(self):
         if isinstance(self.made, dict) and "g" in self.made:
@@ -143,9 +148,13 @@ class Odd:
         ('[fields]\nmode = "slow"', "mode = 'slow'; expected a Mode"),
         ("[fields]\nmade = {h = 0.5}", r"made = \{'h': 0.5\}; expected an Inner"),
         ('[fields]\nlegs = ["a"]', "legs = .*; expected some values, each a number"),
+        ('[fields]\nfeet = "Locked"', "feet = 'Locked'; valid names: locked, free"),
+        ("[fields]\nmost = false", "most = False; expected a number or None"),
+        ('[fields]\nother = "slow"', "other = 'slow'; expected a Mode or None"),
+        ("[fields]\neither = 1.5", "either = 1.5; expected a whole number or a text"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
         ("name = 'x'", "holds controller, name; expected controller and a table"),
-        ("[fields]\nmade = {g = 0.5}\nlegs = [1, 2.5]\ninner = {g = 2}", None),
+        ('[fields]\nmade = {g = 0.5}\ninner = {g = 2}\nfeet = "free"\neither = "x"\nmost = 2', None),
     ],
 )
 def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path, monkeypatch):
@@ -154,6 +163,15 @@ def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path,
     Path("odd.toml").write_text(f"controller = 'odd.py:Odd'\n{rest}\n")
     with pytest.raises(hexmj.InputError, match=sentence) if sentence else nullcontext():
         hexmj.load_controller("odd.toml")
+
+
+def test_rows_that_a_file_tells_are_tuples(tmp_path, monkeypatch):
+    """As the class's own are, which may be added to and hashed."""
+    monkeypatch.chdir(tmp_path)
+    Path("odd.py").write_text(KINDS)
+    Path("odd.toml").write_text("controller = 'odd.py:Odd'\n[fields]\nlegs = [1, 2]\n")
+    odd: Any = hexmj.load_controller("odd.toml")
+    assert repr(odd.legs) == "(1.0, 2.0)"
 
 
 @pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])

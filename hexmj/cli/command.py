@@ -6,12 +6,13 @@ from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
+from hexmj.checks import numbers
 from hexmj.cli.options import Accelerating, Controlled, Walks, changed
 from hexmj.conditions import Conditions, Numerics, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 from hexmj.legs import GEOMETRIES
-from hexmj.timing import Stride
+from hexmj.timing import Stride, observation_time
 
 TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
 """Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
@@ -66,7 +67,23 @@ class WalkingCommand:
             told = {*TOLD, *unusual(values)} - {*varied}
             shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
+            line += "" if "ground_at" in varied else self._not_reached()
         return line
+
+    def _not_reached(self) -> str:
+        """That no foot gets to what lies ahead, where even the farthest walk is too short."""
+        from hexmj.studies.terrain.study import reach
+
+        ground, own = self.conditions.ground, vars(self)
+        velocities = numbers("velocities", own.get("velocities") or own.get("velocity") or [])
+        if ground.ground == "flat" or not velocities.size:
+            return ""
+        stride = self.walks.stride
+        time = observation_time(self.walks.time, velocities, stride, self.accelerating.procedure)
+        farthest = float((velocities * time).max())
+        if farthest + reach(stride)[0] > ground.ground_at:
+            return ""
+        return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
 
     def refuse_physical(self, reason: str, obeyed: Collection[str] = ()) -> None:
         """Refuse what only a body obeys, where none walks.

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
@@ -10,8 +10,8 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
-from types import ModuleType
-from typing import Any, get_args, get_origin, get_type_hints
+from types import ModuleType, NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
@@ -111,21 +111,33 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         types = {one.name: one.type for one in fields(found)}
         with suppress(NameError):  # of a type that is there for type checkers alone
             types |= get_type_hints(type(found))
-        wanted = {name: _PLAIN[kind] for name, kind in types.items() if name in values and kind in _PLAIN}
-        made = replace(found, **(values | {name: typed(name, values[name], kind) for name, kind in wanted.items()}))
-        for name in values:
-            if _is_told(types[name]):
-                typed(name, getattr(made, name), types[name])
+        kinds = {name: _PLAIN.get(kind, kind) for name, kind in types.items() if name in values}
+        checked = {name: kind for name, kind in kinds.items() if _is_checked(kind)}
+        made = replace(found, **(values | {name: _fitting(name, values[name], kind) for name, kind in checked.items()}))
+        for name, kind in checked.items():
+            typed(name, getattr(made, name), kind)
         return made
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 
 
-def _is_told(kind: Any) -> bool:
-    """Whether a type is an enumeration, a record or a row of plain ones: a class may make one of what it is told."""
-    if get_origin(kind) is tuple:
-        return all(one in _PLAIN or one is Ellipsis for one in get_args(kind))
+def _is_checked(kind: Any) -> bool:
+    """Whether a type is plain, an enumeration, a record, or a choice or row of such."""
+    if (origin := get_origin(kind)) in (Union, UnionType, tuple, Sequence):
+        return all(one is Ellipsis or _is_checked(one) for one in get_args(kind))
+    if origin is Literal or kind in (*_PLAIN, NoneType):
+        return True
     return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
+
+
+def _fitting(name: str, value: Any, kind: Any) -> Any:
+    """What a file tells, as its type has it; of what is not plain a class may make its own, as it is."""
+    try:
+        return typed(name, value, kind)
+    except InputError:
+        if kind in _PLAIN:
+            raise
+        return value
 
 
 def _found(where: str, what: str, name: str) -> Controller:
