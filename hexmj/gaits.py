@@ -82,7 +82,9 @@ class Gait:
         line += f", stable {int(self.stable.sum())}"
         if known.any():
             phases = ", ".join(
-                f"{pair} {circular_mean(self.phase[known, n]):.2f}" for n, pair in enumerate(PAIRS) if pair in TOLD
+                f"{pair} {round(circular_mean(self.phase[known, n]), 2) % 1.0:.2f}"
+                for n, pair in enumerate(PAIRS)
+                if pair in TOLD
             )
             line += f"; period {self.period[known].mean():.4g} time units, duty factor"
             line += f" {self.duty_factor[known].mean():.2f}, phases {phases}"

@@ -268,6 +268,12 @@ def test_nonsense_gets_a_clear_sentence_and_destroys_nothing(tmp_path):
         reproduce(tmp_path / "file", TINY)
 
 
+def test_figures_of_other_samples_are_refused_before_the_work(tmp_path):
+    with pytest.raises(InputError, match="samples = 3; expected 7, as the figures draw"):
+        reproduce(tmp_path / "paper", replace(TINY, samples=3))
+    assert not any(tmp_path.iterdir())
+
+
 SET = """
 [[set]]
 window = "walk"

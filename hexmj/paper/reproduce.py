@@ -9,7 +9,7 @@ from hexmj.checks import path_of
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError, check_distinct
 from hexmj.paper.claims import CLAIMS, Claim
-from hexmj.paper.figures import FIGURES
+from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
 from hexmj.storage import results
@@ -43,11 +43,13 @@ def reproduce(
         The rows in the paper's order, and the files written.
 
     Raises:
-        InputError: a key that no claim has, a name that no reading has, a folder that cannot be written to, or a
-            damaged measurement.
+        InputError: a key that no claim has, a name that no reading has, samples that no figure draws, a folder that
+            cannot be written to, or a damaged measurement.
     """
     if unknown := [key for key in only if key not in {claim.key for claim in CLAIMS}]:
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
+    if not only and protocol.samples != SAMPLES:
+        raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, as the figures draw, or keys of claims")
     check_distinct("readings beside", ["printed", *beside])
     readings = {name: named_reading(name) for name in beside}
     results_folder(out := path_of(out), TABLES)
