@@ -81,11 +81,8 @@ class Gait:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
         line += f", stable {int(self.stable.sum())}"
         if known.any():
-            phases = ", ".join(
-                f"{pair} {round(circular_mean(self.phase[known, n]), 2) % 1.0:.2f}"
-                for n, pair in enumerate(PAIRS)
-                if pair in TOLD
-            )
+            mean = {pair: float(circular_mean(self.phase[known, n])) for n, pair in enumerate(PAIRS) if pair in TOLD}
+            phases = ", ".join(f"{pair} {round(one, 2) % 1.0:.2f}" for pair, one in mean.items())
             line += f"; period {self.period[known].mean():.4g} time units, duty factor"
             line += f" {self.duty_factor[known].mean():.2f}, phases {phases}"
         return f"{line})"

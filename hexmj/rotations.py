@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from hexmj.jitted import jitted
+
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Vectors, (..., 3), turned by unit quaternions, (..., 4)."""
@@ -32,7 +34,7 @@ def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def lowest(qpos: Any, corners: Any, radii: Any) -> float:
     """Height of the lowest of some spheres that a root carries, for compiled code [mm].
 

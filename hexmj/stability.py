@@ -8,11 +8,11 @@ two against each other.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from hexmj.checks import numbers, states, typed
 from hexmj.errors import InputError
+from hexmj.jitted import jitted
 from hexmj.process.threads import run_blocks
 from hexmj.walks import Walk
 
@@ -97,7 +97,7 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
         return points
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def margins(feet: Any, stance: Any, margin: Any) -> None:
     """`stability_margin` of postures (posture, leg, 2), for compiled code.
 

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from hexmj.bodies.description import Body
 from hexmj.bodies.numeric import HingeChains, over_tips
 from hexmj.bodies.reading import joint_numbers
+from hexmj.jitted import jitted
 from hexmj.legs import SIDE
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> Thre
     return legs if unique and apart <= SAME else None
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
     """`ThreeHinges.inverse` for tips shaped (n, leg, axis); `legs` as a plain tuple, which is handed over faster."""
     coxa_position, coxas, femurs, tibias, side, joint_range = legs

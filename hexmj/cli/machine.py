@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
+from typing import Any
 
 from hexmj.process.threads import cores
 from hexmj.replay.film.gl import PACKAGES
@@ -137,7 +138,8 @@ def compiled() -> str:
     """What Numba compiles is kept, so that only the first call takes long."""
     from hexmj.controllers.cruse1998 import kernel
 
-    folder = kernel.record.stats.cache_path
+    record: Any = kernel.record
+    folder = record.stats.cache_path
     try:
         with tempfile.TemporaryFile(dir=folder):
             return f"kept in {folder}"

@@ -7,16 +7,16 @@ formulas as one would write them, and a test holds the two against each other.
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.jitted import jitted
 from hexmj.stability import margins
 
 ROUNDING = 1e-6
 """Excess of an action over its bounds that is let pass: that of a bound rounded to single precision."""
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
     """What some insects' actions, (insect, number) from -1 to 1, ask for, (n, number) [rad] or [mm].
 
@@ -31,7 +31,7 @@ def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
     return wanted, within
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def beyond(action: Any, low: Any, high: Any) -> int:
     """Which number of an action, (number,), is the first out of its bounds, or none; -1 if all are within."""
     for j in range(len(action)):
@@ -40,7 +40,7 @@ def beyond(action: Any, low: Any, high: Any) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
     """Where the tips of some insects shall be in their next step, (n, substep, leg, axis) [mm].
 
@@ -67,7 +67,7 @@ def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
     return tips
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
     """Legs that cannot reach their tips keep their last angles.
 
@@ -90,7 +90,7 @@ def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
                         joints[i, sub, leg, j] = last[n, leg, j]
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
     """Write everything that is observed into `flat`, (n, number), cut off at its bounds.
 
@@ -137,7 +137,7 @@ def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any,
             seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
     """Write joints, orientation and velocities into the first numbers of `seen`; how many these are."""
     for j in range(joints):
@@ -157,7 +157,7 @@ def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
     return at + 6
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _clearance(q: Any, turn: Any, corners: Any) -> float:
     """Height of the trunk's lowest corner [mm]."""
     lowest = np.inf
@@ -168,7 +168,7 @@ def _clearance(q: Any, turn: Any, corners: Any) -> float:
     return lowest
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, said: Any) -> bool:
     """Say of those that have walked a step what it was worth, and whether they fell or their time is over.
 
@@ -198,7 +198,7 @@ def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time:
     return any_over
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def worth(qvel: Any, rotation: Any, command: float) -> float:
     """Reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect as it is now."""
     return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)

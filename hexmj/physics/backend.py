@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, Protocol
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.jitted import jitted
 from hexmj.physics.callbacks import batched
 from hexmj.process.threads import thread_count
 from hexmj.rotations import lowest
@@ -209,7 +209,7 @@ class MujocoBatch:
         raise Diverged(start, ", ".join(kinds) or "a state that is not finite", state)
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _side_by_side(ids: Any, values: Any) -> Any:
     """Rows of some arrays, each (start, number), one after the other, (n, number)."""
     columns = 0
@@ -224,7 +224,7 @@ def _side_by_side(ids: Any, values: Any) -> Any:
     return rows
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
     """Heights of the lowest points of some trunks, (n,) [mm]; corners (corner, axis) and radii (corner,) [mm]."""
     heights = np.empty(len(ids))
@@ -233,7 +233,7 @@ def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
     return heights
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _first_broken(ids: Any, warned: Any, qpos: Any) -> int:
     """Index of the first of some bodies of which MuJoCo has warned, (start, kind, [last, count]), or whose state is not
     finite; `len(ids)` if none."""

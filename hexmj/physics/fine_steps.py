@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.jitted import jitted
 from hexmj.physics.backend import Diverged, Engine
 
 Shown = dict[str, np.ndarray]
@@ -114,7 +114,7 @@ def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:
         shown[name][rows, begin : begin + values.shape[1]] = values
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def strikes(depth: Any, substeps: int, allowed: float) -> Any:
     """In which physics steps a foot gets too deep, or will be too deep one step later, (n, step).
 

@@ -13,9 +13,9 @@ The ground comes half a millimetre early, since the body sags, so a foot is slow
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from hexmj.conditions import Conditions
+from hexmj.jitted import jitted
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk
 
@@ -63,7 +63,7 @@ def standing_tips(x: np.ndarray, standing_height: float, stride: Stride) -> np.n
     return np.stack([*tips, np.full(x.shape, -standing_height)], axis=-1)
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _follow(wanted: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, origin: Any, tips: Any) -> None:
     """Between two steps a tip moves evenly; where the plan names no height, that is a smooth function of the phase of
     its lift, 0 to 1.

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hexmj.errors import OutOfReach
+from hexmj.jitted import jitted
 from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk
@@ -119,7 +119,7 @@ def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple
     return height, load
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
     """Feet ahead of and beside the centre of mass, seen along the root's heading, up to the fall."""
     qpos, sensors, standing, valid = chunk
@@ -252,7 +252,7 @@ def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
     return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
     """Take a chunk's substeps into the sums and counts of its starts."""
     qpos, sensors, targets, force, valid = chunk
@@ -276,7 +276,7 @@ def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
             sums.shown[start] += 1.0
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -> None:
     """Count the distance of each foot, (leg * axis), from its target, (leg, 3), if that is on the ground."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix(qpos[3], qpos[4], qpos[5], qpos[6])

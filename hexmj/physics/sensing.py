@@ -4,11 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
 from hexmj.conditions import ROUNDING
 from hexmj.controllers.protocol import Sensed
+from hexmj.jitted import jitted
 from hexmj.physics.settling import Settled
 from hexmj.rotations import heading, lean, turned
 
@@ -71,7 +71,7 @@ class Senses:
         )
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _feel(ids: Any, sensors: Any, force: Any, touch: int, longest_gap: int, felt: Any) -> Any:
     """`Senses.feel`; `felt` goes on: substeps without load and load (start, leg), and torques (start, joint)."""
     unloaded, load, torques = felt

@@ -10,9 +10,9 @@ of mass, while the root may move faster as the insect is turned over: of those p
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hexmj.errors import StillThrown
+from hexmj.jitted import jitted
 from hexmj.physics.settling import Settled
 
 MOST_ENERGY = 2.0
@@ -61,7 +61,7 @@ def explosion(
     return Explosion(row, t, what)
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _first_odd(shown: Any, valid: Any, pushed: Any, limits: Any, scale: Any) -> tuple[int, int]:
     """Row and substep in which something moves as no walk does; -1 if nothing does."""
     (qpos, centre), (most, tumbling), (top, timestep, twice_g) = shown, limits, scale
@@ -77,7 +77,7 @@ def _first_odd(shown: Any, valid: Any, pushed: Any, limits: Any, scale: Any) -> 
     return -1, -1
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def _upright(qpos: Any) -> float:
     """Cosine of the tilt of a root, from its positions."""
     return 1.0 - 2.0 * (qpos[4] ** 2 + qpos[5] ** 2)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from hexmj.jitted import jitted
 from hexmj.legs import MIRROR, N2, N4
 
 LANES = 64
@@ -261,7 +262,7 @@ def _begin(z, j, start, v, v_final, steps, k):
     z[STEPS * LANES + j], z[DONE * LANES + j], z[LOST * LANES + j] = steps, 0.0, 0.0
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, lost: Any) -> None:
     """Write the step of each start's first loss of static stability within its `steps`, or 0, to `lost`, (start,).
 
@@ -292,7 +293,7 @@ def _undecided(z, j):
     return (z[LOST * LANES + j] == 0.0) & (z[DONE * LANES + j] < z[STEPS * LANES + j])
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None:
     """Put every start at time 0, (block, row of lanes); empty lanes at the end repeat the last start."""
     for i in range(len(blocks) * LANES):
@@ -300,7 +301,7 @@ def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None
         _begin(blocks[i // LANES], i % LANES, starts[n], v[n], v_final[n], 0.0, k)
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, velocity: Any, x: Any, stance: Any) -> None:
     """Step blocks `begin` to `end` on; write V_r of each step, tips and states after it, (step, start, leg)."""
     steps, starts = velocity.shape
@@ -318,7 +319,7 @@ def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, veloci
                     stance[n, first + j, leg] = z[(S + leg) * LANES + j] == 1.0
 
 
-@njit(cache=True, nogil=True)
+@jitted
 def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: Any, rules: Any) -> None:
     """Step blocks `begin` to `end` on; their rows `LOST` then hold the first losses after the `unseen` steps."""
     for b in range(begin, end):

@@ -1,0 +1,30 @@
+"""Compiled functions, kept from run to run while nothing that they are made of changes."""
+
+from collections.abc import Callable
+from hashlib import sha256
+from typing import Any, TypeVar
+
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def jitted(function: Function) -> Function:
+    """numba's `njit`, kept on the disk.
+
+    By itself numba compiles anew after an edit of the function's own file alone; here also after one of what it takes
+    from others, functions and constants, which are compiled into it.
+    """
+    made: Any = njit(cache=True, nogil=True)(function)
+    if made is not function:  # as it is with NUMBA_DISABLE_JIT
+        kept = made._cache._cache_file
+        kept._source_stamp = (*kept._source_stamp, sha256(_made_of(function).encode()).hexdigest())
+    return made
+
+
+def _made_of(function: Callable[..., Any]) -> str:
+    """The code of a function, and all that it looks up in its module: compiled functions, modules and constants."""
+    code: Any = function.__code__
+    known = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    told = [_made_of(one.py_func) if hasattr(one, "py_func") else repr(one) for one in known.values()]
+    return repr((code.co_code, code.co_consts, code.co_names, told))

@@ -1,0 +1,32 @@
+"""Compiled code is kept for as long as all that it is made of is the same."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HELPER = "from hexmj.jitted import jitted\nFACTOR = 2.0\n@jitted\ndef inner(x):\n    return x + 1.0\n"
+OUTER = "from hexmj.jitted import jitted\nfrom helper import FACTOR, inner\n@jitted\ndef outer(x):\n"
+OUTER += "    return FACTOR * inner(x)\nprint(outer(1.0), *outer.stats.cache_hits.values())\n"
+
+
+def ran(folder: Path) -> list[float]:
+    """What the outer function says in a process of its own, and 1 if it was compiled before."""
+    outer = [sys.executable, "outer.py"]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "kept")}
+    done = subprocess.run(outer, cwd=folder, env=environment, check=True, capture_output=True, text=True)
+    return [float(word) for word in done.stdout.split()]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"), [("+ 1.0", "+ 5.0", 12.0), ("FACTOR = 2.0", "FACTOR = 3.0", 6.0), ("", "", 4.0)]
+)
+def test_an_edit_of_another_file_is_compiled(tmp_path, old, new, told):
+    for name, text in (("helper", HELPER), ("outer", OUTER)):
+        (tmp_path / f"{name}.py").write_text(text)
+    assert ran(tmp_path) == [4.0]
+    assert ran(tmp_path) == [4.0, 1.0]
+    (tmp_path / "helper.py").write_text(HELPER.replace(old, new))
+    assert ran(tmp_path) == ([told] if new else [4.0, 1.0])
