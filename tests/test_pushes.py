@@ -1,6 +1,7 @@
 """Pushes from the side give the momentum asked for, to starts that walk then."""
 
 from contextlib import nullcontext
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.errors import InputError
+from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.drive import Push, drive
+from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
 from hexmj.starts import draw_starts
 
@@ -79,19 +82,37 @@ def test_a_push_lasts_as_long_whatever_the_physics_step():
 
 
 @pytest.mark.parametrize("vp", [60.0, 100.0])
-def test_a_push_lasts_as_long_however_walks_are_cut_into_chunks(vp, monkeypatch):
-    """It begins when told, in whole steps of the plan, of which a chunk has 20 where nobody is pushed."""
+def test_a_push_begins_when_told(vp):
+    """In whole steps of the plan."""
     settled = settle(draw_starts(3, 0), Conditions.of(vp=vp))
     lasts = round(0.025 * vp / settled.stride.dt)
     begun = np.array([2 * lasts, 2 * lasts, 2 * lasts + 4])
     push = Push(np.full(3, 10.0 * vp), begun * settled.stride.dt)
     ends = []
-    for chunk, pushed in ((40, push), (2, push), (40, None)):
-        monkeypatch.setattr("hexmj.physics.orders.CHUNK", chunk)
+    for pushed in (push, None):
         plan = begin(LDVS, settled.starts, 0.3, settled.stride)
         shown = [one.qpos for one in drive(settled, plan, 4.0 * lasts * settled.stride.dt, push=pushed)]
         ends.append(np.concatenate(shown, axis=1))
-    assert np.array_equal(ends[0], ends[1])
     for start, begins in enumerate(begun * settled.substeps):
-        assert np.array_equal(ends[0][start, : begins + 1], ends[2][start, : begins + 1])
-        assert (ends[0][start, begins + 1] != ends[2][start, begins + 1]).any()
+        assert np.array_equal(ends[0][start, : begins + 1], ends[1][start, : begins + 1])
+        assert (ends[0][start, begins + 1] != ends[1][start, begins + 1]).any()
+
+
+@pytest.mark.parametrize("vp", [80.0, 130.0])
+def test_a_push_depends_on_no_start_beside(vp):
+    """To the last bit, but for the speed: what was told is added up chunk by chunk, which pushes cut."""
+    conditions, starts, times = Conditions.of(vp=vp), draw_starts(3, 4), np.array([12.0, 14.0, 16.3])
+    impulse = 20.0 * conditions.body.mass * vp
+
+    def outcomes(ids: list[int]) -> Outcomes:
+        settled = settle(starts[ids], conditions)
+        plan = begin(LDVS, settled.starts, 0.4, settled.stride)
+        push = Push(np.full(len(ids), impulse), times[ids])
+        return outcomes_of_plan(settled, plan, 80.0, np.full(len(ids), np.inf), push=push)
+
+    together = outcomes([0, 1, 2])
+    for n in range(3):
+        alone = outcomes([n])
+        assert_allclose(alone.speed, together.speed[n], rtol=1e-12)
+        for name in {one.name for one in fields(Outcomes)} - {"speed"}:
+            assert getattr(alone, name).tobytes() == getattr(together, name)[[n]].tobytes(), name

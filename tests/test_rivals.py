@@ -1,7 +1,7 @@
 """What all rivals share: the protocol, the legs, and being found by name."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -56,6 +56,10 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
     assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.02)  # swings even out by a factor V a period
 
 
+class Age(NamedTuple):
+    since: np.ndarray
+
+
 @pytest.mark.parametrize("state", [np.zeros((2, 6)), None, (np.zeros((2, 6)),)])
 def test_a_rule_that_remembers_no_named_tuple_is_refused_as_it_begins(state) -> None:
     own = {"name": "rule", "at_start": lambda self, legs: state}
@@ -63,4 +67,16 @@ def test_a_rule_that_remembers_no_named_tuple_is_refused_as_it_begins(state) -> 
     with pytest.raises(
         InputError, match=r"at_start gave .* expected a named tuple of arrays whose first axis is the start, 2"
     ):
+        hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)
+
+
+@pytest.mark.parametrize("later", [lambda legs: (legs.x,), lambda legs: Age(legs.x[0])])
+def test_a_rule_that_later_remembers_no_named_tuple_of_all_starts_is_refused(later) -> None:
+    own = {
+        "name": "rule",
+        "at_start": lambda self, legs: Age(legs.x),
+        "lifts": lambda self, state, legs: (later(legs), legs.x < 0),
+    }
+    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
+    with pytest.raises(InputError, match=r"lifts gave .* expected a named tuple of arrays whose first axis is"):
         hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)

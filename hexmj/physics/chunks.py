@@ -72,8 +72,8 @@ class Insects:
         """What some starts know of themselves now."""
         return self._senses.sensed(ids, self._batch.qpos[ids], self._batch.qvel[ids])
 
-    def carry_out(self, ordered: Iterable[Orders], steps: int) -> Chunk:
-        """Carry out orders for the same starts, one after the other; together they last `steps` steps of the plan.
+    def carry_out(self, ordered: Iterable[Orders]) -> Chunk:
+        """Carry out orders for the same starts, one after the other; no push begins or ends within them.
 
         Each is asked for when those before it are done, so it may depend on what they have done.
 
@@ -82,7 +82,7 @@ class Insects:
             InputError: a walk that leads beyond the ground.
         """
         first = next(rest := iter(ordered))
-        self._apply_push(first, steps)
+        self._apply_push(first)
         before = self._batch.replayed(first.ids)
         done, shown = [first], [self._show(first)]
         for orders in rest:
@@ -147,14 +147,14 @@ class Insects:
         doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
         return walk_error(error, doing, time, self.settled.conditions)
 
-    def _apply_push(self, orders: Orders, steps: int) -> None:
-        """Push with the part of the impulse that falls within the `steps` of the plan that begin with the orders."""
+    def _apply_push(self, orders: Orders) -> None:
+        """Push those whose push goes on as the orders begin."""
         if self._push:
             stride, seconds = self.settled.stride, self.settled.conditions.time.seconds(self.settled.stride)
             first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions.time, stride)
             begin = self._push.begins(stride)
-            within = np.minimum(begin + lasts, first + steps) - np.maximum(begin, first)
-            self._batch.push[:] = np.maximum(within, 0) / lasts * self._push.impulse / (steps * seconds)
+            now = (begin <= first) & (first < begin + lasts)
+            self._batch.push[:] = now * (self._push.impulse / (lasts * seconds))
 
 
 def _joined(values: list[np.ndarray]) -> np.ndarray:

@@ -67,12 +67,12 @@ def _by_itself(insects: Insects, orders: OrdersFromPlan) -> Iterator[Chunk]:
     """The plan goes on, whatever happens to the insects."""
     now = orders.ahead(np.arange(len(insects.settled.starts)))
     with ThreadPoolExecutor(1) as stepper:
-        stepping = now and stepper.submit(insects.carry_out, [now], len(now.plan.time))
+        stepping = now and stepper.submit(insects.carry_out, [now])
         while now and stepping:
             ahead = orders.ahead(now.ids)
             chunk = stepping.result()
             now = ahead.only(~chunk.fell) if ahead and not chunk.fell.all() else None
-            stepping = now and stepper.submit(insects.carry_out, [now], len(now.plan.time))
+            stepping = now and stepper.submit(insects.carry_out, [now])
             yield chunk
 
 
@@ -80,7 +80,7 @@ def _reading(insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan) -> Ite
     """The plan is told what the insects know before each of its steps."""
     ids = np.arange(len(insects.settled.starts))
     while len(ids) and (steps := orders.steps_ahead()):
-        chunk = insects.carry_out(_step_by_step(insects, plan, orders, ids, steps), steps)
+        chunk = insects.carry_out(_step_by_step(insects, plan, orders, ids, steps))
         yield chunk
         ids = ids[~chunk.fell]
 

@@ -10,6 +10,7 @@ from hexmj.jitted import jitted
 from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk
+from hexmj.physics.orders import steps_in_chunk
 from hexmj.physics.settling import Settled
 from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time
@@ -178,6 +179,7 @@ class OutcomesSoFar:
         slid, contacts, saturated, shown = np.zeros((4, size))
         never = np.full(size, np.inf)
         self._sums = _Sums(never, np.ones(size), never.copy(), slid, contacts, saturated, shown, misses)
+        self._before = np.zeros((size, compiled.model.nsensordata))
         columns, ground = compiled.columns, -settled.conditions.path.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
         self._scale = ground, lengths.tracking_bin
@@ -185,9 +187,12 @@ class OutcomesSoFar:
     def add(self, chunk: Chunk) -> None:
         """Take in one chunk of `drive.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
-        seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid
+        if chunk.first % (steps_in_chunk(m) * m) == 0:  # where pushes have not cut a chunk, sliding is counted anew
+            self._before[:] = 0.0
+        seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid, self._before
         _scan(seen, ids, self._body, self._scale, self._sums)
         n, last = np.arange(len(ids)), chunk.valid - 1
+        self._before[ids] = chunk.sensors[n, last]
         trunk = chunk.sensors[n, last, settled.compiled.columns.trunk] > 0
         fell, until = chunk.fell, np.where(chunk.fell, last, chunk.valid)
         self._fall[ids[fell]] = ((chunk.first + last) / m * dt)[fell]
@@ -255,11 +260,11 @@ def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
 @jitted
 def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
     """Take a chunk's substeps into the sums and counts of its starts."""
-    qpos, sensors, targets, force, valid = chunk
+    qpos, sensors, targets, force, valid, last = chunk
     feet, touch, corner, radius, limit = body
     for i, start in enumerate(ids):
         for t in range(valid[i]):
-            q, sensed = qpos[i, t], sensors[i, t]
+            q, sensed, before = qpos[i, t], sensors[i, t], sensors[i, t - 1] if t > 0 else last[start]
             _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
             _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
             sums.clearance[start] = min(sums.clearance[start], lowest(q, corner, radius))
@@ -267,8 +272,8 @@ def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
             if up_z < LEAST_UPRIGHT:
                 sums.toppled[start] = min(sums.toppled[start], sums.shown[start])
             for leg in range(6):
-                if t > 0 and sensed[touch + leg] > 0 and sensors[i, t - 1, touch + leg] > 0:
-                    f, before = feet + 3 * leg, sensors[i, t - 1]
+                if sensed[touch + leg] > 0 and before[touch + leg] > 0:
+                    f = feet + 3 * leg
                     sums.slid[start] += np.hypot(sensed[f] - before[f], sensed[f + 1] - before[f + 1])
                     sums.contacts[start] += 1.0
             for joint in range(len(limit)):

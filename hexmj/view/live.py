@@ -240,7 +240,7 @@ class LiveWalk:
 
     def _walk(self, steps: int) -> None:
         """A few steps."""
-        chunk = self._insects.carry_out(self._ordered(steps), steps)
+        chunk = self._insects.carry_out(self._ordered(steps))
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
             self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]

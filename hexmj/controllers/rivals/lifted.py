@@ -94,7 +94,7 @@ class LiftedPlan:
         self._final = checked_velocities(velocity, len(self.starts), acceleration)
         self._age = np.full(len(self.starts), age)
         self._legs = self._at_rest(self.starts)
-        self._state: Any = _checked(rule.at_start(self._legs), len(self.starts))
+        self._state: Any = _checked("at_start", rule.at_start(self._legs), len(self.starts))
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps."""
@@ -128,7 +128,7 @@ class LiftedPlan:
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        fresh = _checked(self._rule.at_start(rest), len(tips))
+        fresh = _checked("at_start", self._rule.at_start(rest), len(tips))
         self._state = type(self._state)(*(_chosen(which, a, b) for a, b in zip(fresh, self._state, strict=True)))
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
@@ -147,7 +147,8 @@ class LiftedPlan:
         x = legs.x + np.where(legs.stands, -v * dt, dt)
         stands = legs.stands | (x > self.stride.aep0 - dt / 2)
         moved = Legs(x, stands, self._load(stands), v, self.stride)
-        self._state, lifted = self._rule.lifts(self._state, moved)
+        state, lifted = self._rule.lifts(self._state, moved)
+        self._state = _checked("lifts", state, len(x))
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
 
     def _load(self, stands: np.ndarray) -> np.ndarray:
@@ -210,12 +211,12 @@ def _equal_parts(stands: np.ndarray) -> np.ndarray:
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
 
 
-def _checked(state: Any, count: int) -> Any:
-    """A rule's state at time 0 if it is a `State` of so many starts."""
+def _checked(method: str, state: Any, count: int) -> Any:
+    """What a rule's method gave as its state if it is a `State` of so many starts."""
     named = isinstance(state, tuple) and hasattr(state, "_fields")
     if not (named and all(isinstance(one, np.ndarray) and one.shape[:1] == (count,) for one in state)):
         raise InputError(
-            f"at_start gave {' '.join(repr(state).split()):.80}; expected a named tuple of arrays whose first axis is"
+            f"{method} gave {' '.join(repr(state).split()):.80}; expected a named tuple of arrays whose first axis is"
             f" the start, {count}"
         )
     return state
