@@ -187,10 +187,9 @@ class OutcomesSoFar:
     def add(self, chunk: Chunk) -> None:
         """Take in one chunk of `drive.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
-        if chunk.first % (steps_in_chunk(m) * m) == 0:  # where pushes have not cut a chunk, sliding is counted anew
-            self._before[:] = 0.0
-        seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid, self._before
-        _scan(seen, ids, self._body, self._scale, self._sums)
+        seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid
+        since = self._before, chunk.first, len(chunk.plan.time) * m, steps_in_chunk(m) * m
+        _scan(seen, since, ids, self._body, self._scale, self._sums)
         n, last = np.arange(len(ids)), chunk.valid - 1
         self._before[ids] = chunk.sensors[n, last]
         trunk = chunk.sensors[n, last, settled.compiled.columns.trunk] > 0
@@ -258,12 +257,15 @@ def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
 
 
 @jitted
-def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
-    """Take a chunk's substeps into the sums and counts of its starts."""
-    qpos, sensors, targets, force, valid, last = chunk
+def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
+    """Take a chunk's substeps into the sums and counts of its starts; of sliding those to the first substep of a usual
+    chunk, wherever pushes cut it, are left out."""
+    qpos, sensors, targets, force, valid = chunk
+    last, first, end, usual = since
     feet, touch, corner, radius, limit = body
     for i, start in enumerate(ids):
         for t in range(valid[i]):
+            slides = t == end or (first + t) % usual != 0
             q, sensed, before = qpos[i, t], sensors[i, t], sensors[i, t - 1] if t > 0 else last[start]
             _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
             _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
@@ -272,7 +274,7 @@ def _scan(chunk: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
             if up_z < LEAST_UPRIGHT:
                 sums.toppled[start] = min(sums.toppled[start], sums.shown[start])
             for leg in range(6):
-                if sensed[touch + leg] > 0 and before[touch + leg] > 0:
+                if slides and sensed[touch + leg] > 0 and before[touch + leg] > 0:
                     f = feet + 3 * leg
                     sums.slid[start] += np.hypot(sensed[f] - before[f], sensed[f + 1] - before[f + 1])
                     sums.contacts[start] += 1.0
