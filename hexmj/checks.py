@@ -167,7 +167,7 @@ def _fitted(value: Any, wanted: Any) -> Any:
 
 
 def _is_of_any_length(wanted: Any) -> bool:
-    return get_origin(wanted) is Sequence or get_args(wanted)[-1] is Ellipsis
+    return get_origin(wanted) is Sequence or Ellipsis in get_args(wanted)
 
 
 def _expected(wanted: Any) -> str:
@@ -182,7 +182,12 @@ def _kind(wanted: Any) -> str:
         return f"one of {', '.join(map(str, inner))}"
     if origin in (tuple, Sequence):
         count = "some" if _is_of_any_length(wanted) else len(inner)
-        return f"{count} values, each {_kind(inner[0])}"
+        kinds = dict.fromkeys(_kind(one) for one in inner if one is not Ellipsis)
+        return (
+            f"{count} values, each {next(iter(kinds))}"
+            if len(kinds) == 1
+            else f"{count} values: {', '.join(map(_kind, inner))}"
+        )
     if origin in (Union, UnionType):
         return " or ".join(map(_kind, inner))
     name = (origin or wanted).__name__

@@ -74,12 +74,14 @@ SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
         (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
         (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "own-0.4-without-3"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+        (["--model", "mine.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--pep0", -9, "--geometry", "centred"], "; seed 0; pep0 -9.0; geometry centred"),
     ],
 )
 def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, words, told):
     monkeypatch.chdir(tmp_path)
     Path("sums.py").write_text(SUMS)
+    Path("mine.toml").write_text("controller = 'own-0.4'\n[fields]\norder = 'undelayed'\n")
     short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
     assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")
 

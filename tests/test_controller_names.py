@@ -111,9 +111,14 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
 
 
 KINDS = """
+from __future__ import annotations
+
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, Optional
+from typing import TYPE_CHECKING, Literal, Optional
+
+if TYPE_CHECKING:
+    from nowhere import Thing
 
 class Mode(Enum):
     SLOW = "slow"
@@ -133,6 +138,9 @@ class Odd:
     most: float | None = None
     other: Optional[Mode] = None
     either: int | str = 1
+    thing: Thing | None = None
+    mixed: tuple[bool, str] = (True, "a")
+    none: tuple[()] = ()
 
     def __post_init__(self):
         if isinstance(self.made, dict) and "g" in self.made:
@@ -152,9 +160,13 @@ class Odd:
         ("[fields]\nmost = false", "most = False; expected a number or None"),
         ('[fields]\nother = "slow"', "other = 'slow'; expected a Mode or None"),
         ("[fields]\neither = 1.5", "either = 1.5; expected a whole number or a text"),
+        ('[fields]\nmixed = ["b", true]', "mixed = .*; expected 2 values: True or False, a text"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
         ("name = 'x'", "holds controller, name; expected controller and a table"),
-        ('[fields]\nmade = {g = 0.5}\ninner = {g = 2}\nfeet = "free"\neither = "x"\nmost = 2', None),
+        (
+            '[fields]\nmade = {g = 0.5}\ninner = {g = 2}\nthing = 5\nnone = []\nfeet = "free"\neither = "x"\nmost = 2',
+            None,
+        ),
     ],
 )
 def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path, monkeypatch):

@@ -14,6 +14,7 @@ from drawing import drawing
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.environments.frames import Frames
+from hexmj.errors import RenderingError
 
 
 @drawing
@@ -45,6 +46,22 @@ def test_who_goes_takes_nothing_with_it_that_others_draw_with():
         del frames  # while the thread that drew goes on
         gc.collect()
         np.testing.assert_array_equal(third.render(), before)
+
+
+@drawing
+def test_what_a_thread_has_drawn_with_any_other_may_free():
+    frames = Frames(Conditions())
+    with ThreadPoolExecutor(1) as elsewhere:
+        elsewhere.submit(frames.draw, compile_body(Conditions()).model.qpos0).result()
+        context = frames._renderer._gl_context  # pyright: ignore[reportOptionalMemberAccess]
+        frames.close()
+        assert context._context is None  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_frames_that_cannot_be_drawn_are_refused(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    with pytest.raises(RenderingError, match="MUJOCO_GL asks for nothing"):
+        Frames(Conditions()).draw(compile_body(Conditions()).model.qpos0)
 
 
 @pytest.mark.slow

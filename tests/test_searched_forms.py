@@ -1,6 +1,7 @@
 """What can be searched: forms of the network, fields of a controller, and what is refused of either."""
 
 import math
+from contextlib import nullcontext
 from dataclasses import InitVar, dataclass, field
 from typing import Any
 
@@ -182,3 +183,13 @@ class Unequal(Pace):
 
 def test_fields_are_searched_of_a_controller_without_equality():
     assert FieldsForm(Unequal()).names == FieldsForm(Pace()).names
+
+
+@pytest.mark.parametrize(
+    ("least", "sentence"), [(1, r"to begin with has least = 1; expected 2, as of what is"), (2, None)]
+)
+def test_a_search_begins_with_the_fields_that_it_does_not_choose(least, sentence):
+    """Another name is no other field."""
+    begin = Picky(good=2.005, least=least, name="begun")
+    with pytest.raises(InputError, match=sentence) if sentence else nullcontext():
+        assert FieldsForm(Picky()).vector(begin).tolist() == [2.005, -0.5]

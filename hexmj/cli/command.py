@@ -48,10 +48,9 @@ class WalkingCommand:
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
         from hexmj.controllers.cruse1998.presets import searched_on
-        from hexmj.controllers.named import PART
 
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
-        bases = dict.fromkeys(PART.sub("", name) for name in self.names)
+        bases = dict.fromkeys(self.controlled.preset_of(name) for name in self.names)
         known = [name for name in bases if searched_on(name) == self.walks.seed]
         line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
         stride = self.walks.stride

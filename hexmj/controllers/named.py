@@ -2,15 +2,16 @@
 
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import is_dataclass, replace
 from enum import Enum
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
-from types import ModuleType, NoneType, UnionType
+from types import ModuleType, NoneType, SimpleNamespace, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hexmj.checks import typed
@@ -28,8 +29,8 @@ ENTRY_POINTS = "hexmj.controllers"
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
 
-_PLAIN = {name: kind for kind in (bool, int, float, str) for name in (kind, kind.__name__)}
-"""Types of fields that are checked, as themselves or as texts; others may have names for type checkers alone."""
+_PLAIN = bool, int, float, str
+"""Types of fields whose values are as a file tells them."""
 
 PART = re.compile(r"(-(without|with)-\d)+$")
 """The end of such names."""
@@ -108,17 +109,25 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         )
     found: Any = load_controller(named)
     try:
-        types = {one.name: one.type for one in fields(found)}
-        with suppress(NameError):  # of a type that is there for type checkers alone
-            types |= get_type_hints(type(found))
-        kinds = {name: _PLAIN.get(kind, kind) for name, kind in types.items() if name in values}
-        checked = {name: kind for name, kind in kinds.items() if _is_checked(kind)}
+        types = _types(type(found))
+        checked = {name: types[name] for name in values if _is_checked(types.get(name))}
         made = replace(found, **(values | {name: _fitting(name, values[name], kind) for name, kind in checked.items()}))
         for name, kind in checked.items():
             typed(name, getattr(made, name), kind)
         return made
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
+
+
+def _types(kind: type) -> dict[str, Any]:
+    """What a class's fields are annotated with, but for names that only type checkers know."""
+    types = {}
+    for base in reversed(kind.__mro__):
+        known = vars(sys.modules.get(base.__module__, object))
+        for name, annotation in vars(base).get("__annotations__", {}).items():
+            with suppress(NameError):
+                types |= get_type_hints(SimpleNamespace(__annotations__={name: annotation}), dict(known))
+    return types
 
 
 def _is_checked(kind: Any) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError
+from hexmj.errors import InputError, RenderingError
 from hexmj.replay.film import gl
 
 if TYPE_CHECKING:
@@ -30,13 +30,14 @@ class Frames:
         """Nothing is drawn yet."""
         self._cameras, self._renderer = conditions.body.cameras[:1], None
         self._model = compile_body(conditions).model
+        self._model.vis.global_.offheight, self._model.vis.global_.offwidth = SIZE
 
     def draw(self, qpos: np.ndarray) -> np.ndarray:
         """The body at some `qpos`, (height, width, 3) of uint8.
 
         Raises:
             InputError: another thread has drawn before, to which the GL belongs until it is freed.
-            RenderingError: the process was forked from one that had drawn.
+            RenderingError: nothing can be rendered here, or the process was forked from one that had drawn.
         """
         renderer = self._begun()
         self._data.qpos[:] = qpos
@@ -55,6 +56,8 @@ class Frames:
     def _begun(self) -> "Renderer":
         gl.check_not_forked()
         if self._renderer is None:
+            if reason := gl.missing():
+                raise RenderingError(reason)
             self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
             atexit.register(_close, weakref.ref(self._renderer))  # before the GL goes, though nobody closes it
             self._thread = get_ident()

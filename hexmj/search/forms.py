@@ -8,6 +8,7 @@ import numpy as np
 
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.sweeps.plain import plain
 
 
 @runtime_checkable
@@ -93,4 +94,9 @@ class FieldsForm:
         """See `Form.vector`."""
         if type(controller) is not type(self.usual):
             raise InputError(f"{controller.name} to begin with; expected a {type(self.usual).__name__}")
+        here, there = plain(self.usual), plain(controller)
+        for name in here.keys() - {*self.names, "name"}:
+            if here[name] != there[name]:
+                told = f"{name} = {there[name]}; expected {here[name]}, as of what is searched"
+                raise InputError(f"{controller.name} to begin with has {told}")
         return np.array([getattr(controller, name) for name in self.names], dtype=float)

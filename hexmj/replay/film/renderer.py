@@ -12,22 +12,30 @@ import numpy as np
 
 @contextmanager
 def kept_current() -> Iterator[None]:
-    """Leave that context of EGL current which was: others, such as dm_control, take for granted that theirs still is.
+    """Leave that context of EGL current which was, or none: others, such as dm_control, take for granted that theirs
+    still is, and where ours stays current, no thread but this one can free it.
 
     Nor does the display end before the process: it is one for all, and who draws frees its own at the exit.
     """
     egl: Any = sys.modules.get("OpenGL.EGL")
-    before, at = egl and egl.eglGetCurrentContext(), ()
-    if before:
-        at = egl.eglGetCurrentDisplay(), *(egl.eglGetCurrentSurface(which) for which in (egl.EGL_DRAW, egl.EGL_READ))
+    before = _current(egl) if egl else None
     try:
         yield
     finally:
         if egl := sys.modules.get("OpenGL.EGL"):
             atexit.unregister(egl.eglTerminate)
-        if before:
+            display, *ours = _current(egl)
             with suppress(Exception):  # it was freed meanwhile
-                egl.eglMakeCurrent(*at, before)
+                if before and before[-1]:
+                    egl.eglMakeCurrent(*before)
+                elif ours[-1]:
+                    egl.eglMakeCurrent(display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
+
+
+def _current(egl: Any) -> tuple[Any, ...]:
+    """What is drawn with: display, two surfaces and context."""
+    surfaces = (egl.eglGetCurrentSurface(which) for which in (egl.EGL_DRAW, egl.EGL_READ))
+    return egl.eglGetCurrentDisplay(), *surfaces, egl.eglGetCurrentContext()
 
 
 class Renderer(mujoco.Renderer):
