@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import fields
+from enum import EnumType
 from functools import cache
 from numbers import Integral, Real
 from pathlib import Path
@@ -171,15 +172,22 @@ def _is_of_any_length(wanted: Any) -> bool:
 
 
 def _expected(wanted: Any) -> str:
-    if get_origin(wanted) is Literal:
-        return f"valid names: {', '.join(map(str, get_args(wanted)))}"
+    if names := _names(wanted):
+        return f"valid names: {', '.join(names)}"
     return f"expected {_kind(wanted)}"
+
+
+def _names(wanted: Any) -> list[str]:
+    """Of a `Literal` or an enumeration; none of anything else."""
+    if get_origin(wanted) is Literal:
+        return [str(one) for one in get_args(wanted)]
+    return list(wanted.__members__) if isinstance(wanted, EnumType) else []
 
 
 def _kind(wanted: Any) -> str:
     origin, inner = get_origin(wanted), get_args(wanted)
-    if origin is Literal:
-        return f"one of {', '.join(map(str, inner))}"
+    if names := _names(wanted):
+        return f"one of {', '.join(names)}"
     if origin in (tuple, Sequence):
         count = "some" if _is_of_any_length(wanted) else len(inner)
         kinds = dict.fromkeys(_kind(one) for one in inner if one is not Ellipsis)

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 
 import hexmj
 from hexmj.controllers import named
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.protocol import settings_of
+from hexmj.sweeps.plain import plain
 from stepwise_ldvs import Own
 
 LDVS = hexmj.LDVS
@@ -139,6 +141,7 @@ class Odd:
     other: Optional[Mode] = None
     either: int | str = 1
     thing: Thing | None = None
+    plain: Inner = Inner()
     mixed: tuple[bool, str] = (True, "a")
     none: tuple[()] = ()
 
@@ -153,12 +156,13 @@ class Odd:
 @pytest.mark.parametrize(
     ("rest", "sentence"),
     [
-        ('[fields]\nmode = "slow"', "mode = 'slow'; expected a Mode"),
+        ('[fields]\nmode = "Slow"', "mode = 'Slow'; valid names: SLOW"),
         ("[fields]\nmade = {h = 0.5}", r"made = \{'h': 0.5\}; expected an Inner"),
         ('[fields]\nlegs = ["a"]', "legs = .*; expected some values, each a number"),
         ('[fields]\nfeet = "Locked"', "feet = 'Locked'; valid names: locked, free"),
         ("[fields]\nmost = false", "most = False; expected a number or None"),
-        ('[fields]\nother = "slow"', "other = 'slow'; expected a Mode or None"),
+        ('[fields]\nother = "Slow"', "other = 'Slow'; expected one of SLOW or None"),
+        ('[fields]\nmade = {g = "x"}', "g = 'x'; expected a number"),
         ("[fields]\neither = 1.5", "either = 1.5; expected a whole number or a text"),
         ('[fields]\nmixed = ["b", true]', "mixed = .*; expected 2 values: True or False, a text"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -177,13 +181,17 @@ def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path,
         hexmj.load_controller("odd.toml")
 
 
-def test_rows_that_a_file_tells_are_tuples(tmp_path, monkeypatch):
-    """As the class's own are, which may be added to and hashed."""
+def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
+    """Rows are tuples, which may be added to and hashed, tables records, texts members of enumerations."""
     monkeypatch.chdir(tmp_path)
     Path("odd.py").write_text(KINDS)
-    Path("odd.toml").write_text("controller = 'odd.py:Odd'\n[fields]\nlegs = [1, 2]\n")
+    told = {"legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
+    Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
+    assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"
+    assert repr([odd.plain, odd.inner]) == "[Inner(g=2.0), {'g': 2}]"
+    assert plain(odd)["mode"]["member"] == "SLOW"
 
 
 @pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])

@@ -6,6 +6,7 @@ import sys
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass, make_dataclass
+from enum import Enum, StrEnum
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -62,6 +63,23 @@ def test_a_named_tuple_is_its_class_too() -> None:
     told = [plain({"rule": rule})["rule"] for rule in (Rule(), Other())]
     assert told == [{"class": f"test_plain_settings.{name}", "far": 10.0} for name in ("Rule", "Other")]
     assert list(classes([Rule(), {"in": (Other(), 1)}])) == [Rule, Other]
+
+
+class Way(Enum):
+    FAST = "fast"
+
+
+class Tone(StrEnum):
+    LOW = "low"
+
+
+def test_a_member_of_an_enumeration_is_its_class_and_name() -> None:
+    told = [
+        {"class": f"test_plain_settings.{name}", "member": member}
+        for name, member in (("Way", "FAST"), ("Tone", "LOW"))
+    ]
+    assert plain([Way.FAST, Tone.LOW]) == told
+    assert list(classes({"ways": [Way.FAST], "tone": Tone.LOW})) == [Way, Tone]
 
 
 @pytest.mark.parametrize(

@@ -2,22 +2,19 @@
 
 import os
 import re
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import is_dataclass, replace
-from enum import Enum
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
 from pathlib import Path
-from types import ModuleType, NoneType, SimpleNamespace, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from types import ModuleType
+from typing import Any
 
 from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.told_fields import with_fields
 from hexmj.errors import InputError
 from hexmj.storage.files import read_toml
 from hexmj.storage.literal import literal
@@ -28,9 +25,6 @@ ENTRY_POINTS = "hexmj.controllers"
 
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
-
-_PLAIN = bool, int, float, str
-"""Types of fields whose values are as a file tells them."""
 
 PART = re.compile(r"(-(without|with)-\d)+$")
 """The end of such names."""
@@ -107,46 +101,11 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         raise InputError(
             f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
         )
-    found: Any = load_controller(named)
+    found = load_controller(named)
     try:
-        types = _types(type(found))
-        checked = {name: types[name] for name in values if _is_checked(types.get(name))}
-        made = replace(found, **(values | {name: _fitting(name, values[name], kind) for name, kind in checked.items()}))
-        for name, kind in checked.items():
-            typed(name, getattr(made, name), kind)
-        return made
+        return with_fields(found, values)
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
-
-
-def _types(kind: type) -> dict[str, Any]:
-    """What a class's fields are annotated with, but for names that only type checkers know."""
-    types = {}
-    for base in reversed(kind.__mro__):
-        known = vars(sys.modules.get(base.__module__, object))
-        for name, annotation in vars(base).get("__annotations__", {}).items():
-            with suppress(NameError):
-                types |= get_type_hints(SimpleNamespace(__annotations__={name: annotation}), dict(known))
-    return types
-
-
-def _is_checked(kind: Any) -> bool:
-    """Whether a type is plain, an enumeration, a record, or a choice or row of such."""
-    if (origin := get_origin(kind)) in (Union, UnionType, tuple, Sequence):
-        return all(one is Ellipsis or _is_checked(one) for one in get_args(kind))
-    if origin is Literal or kind in (*_PLAIN, NoneType):
-        return True
-    return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
-
-
-def _fitting(name: str, value: Any, kind: Any) -> Any:
-    """What a file tells, as its type has it; of what is not plain a class may make its own, as it is."""
-    try:
-        return typed(name, value, kind)
-    except InputError:
-        if kind in _PLAIN:
-            raise
-        return value
 
 
 def _found(where: str, what: str, name: str) -> Controller:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
+from enum import Enum
 from functools import cached_property
 from inspect import getattr_static
 from os.path import isfile
@@ -31,7 +32,7 @@ NUMBERS = np.bool_, np.int64, np.float64
 
 
 def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
-    """A setting as JSON can hold it: a frozen dataclass or named tuple with its class, an array as a list.
+    """A setting as JSON can hold it: a frozen dataclass, named tuple or enumeration with its class, an array as a list.
 
     A file is its place and a digest of its content; so is a text with a dot that names one.  Its place is told as it is
     given, from the current folder or those of the class's modules where it lies in one, and by its name alone in this
@@ -58,6 +59,8 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
         return value
+    if isinstance(value, Enum):
+        return {"class": label(type(value)), "member": value.name}
     if type(value) is list or type(value) is tuple:
         return [plain(item, folders, exact) for item in value]
     if type(value) is dict and all(isinstance(key, str) for key in value):
@@ -68,8 +71,8 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
             raise InputError(f"{value}, a folder, is no setting; expected files in fields, or its name as a text")
         return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
     raise InputError(
-        f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple, or a"
-        " tuple, dict or array (float64, int64, bool) of these"
+        f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple,"
+        " member of an enumeration, or a tuple, dict or array (float64, int64, bool) of these"
     )
 
 
@@ -104,8 +107,10 @@ def module_label(module: str) -> str:
 
 
 def classes(value: Any) -> Iterator[type]:
-    """Those of all dataclasses and named tuples in a setting."""
-    if (names := field_names(value)) is not None:
+    """Those of all dataclasses, named tuples and enumerations in a setting."""
+    if isinstance(value, Enum):
+        yield type(value)
+    elif (names := field_names(value)) is not None:
         yield type(value)
         yield from classes([getattr(value, name) for name in names])
     elif isinstance(value, Mapping):
