@@ -179,14 +179,17 @@ def test_an_action_is_held_and_rewarded_until_the_first_end():
 
 
 @pytest.mark.slow
-def test_what_all_insects_share_is_not_set_for_some():
+def test_what_all_insects_share_is_not_asked_of_some_or_set():
     pytest.importorskip("stable_baselines3", exc_type=ImportError)
     insects = importlib.import_module("hexmj.environments.stable_baselines").FeltInsects(3)
     assert len(insects.env_method("reset")) == len(insects.get_attr("task")) == 3
     with pytest.raises(InputError, match=r"indices = \[0\]; expected all 3"):
         insects.env_method("reset", indices=[0])
-    with pytest.raises(InputError, match="indices = 1; expected all 3"):
-        insects.set_attr("render_mode", None, indices=1)
+    with pytest.raises(InputError, match="velocity = 0.9 cannot be set; expected new insects"):
+        insects.set_attr("velocity", 0.9)
+    insects.set_options({"reset_mask": None})
+    with pytest.raises(InputError, match="options = .*; expected none"):
+        insects.reset()
 
 
 @pytest.mark.slow

@@ -106,6 +106,7 @@ def test_a_centre_of_mass_elsewhere_is_said_and_stays_there(tmp_path: Path):
         ({"home": "bed"}, "no key 'bed'; valid names: home"),
         ({"cameras": ("side", "drone")}, "no camera 'drone'; valid names: side, top, front, following"),
         ({"mass": 2.0}, "mass = 2 g, but its MJCF weighs 1 g"),
+        ({"lengths": STICK_INSECT.lengths.scaled(2.0)}, r"for legs of 62 mm, but .* 31\.37 mm long.* by 0\.506"),
         ({"legs": changed_leg(joints=("L2_hip", *SECOND.joints[1:]))}, "no joint 'L2_hip'; valid names: root, L1_"),
         ({"legs": changed_leg(joints=SECOND.joints[::-1])}, "expected them leg by leg"),
         ({"legs": changed_leg(parts=SECOND.parts[1:])}, "is moved by 'L2_thorax_coxa'; expected it among the parts of"),

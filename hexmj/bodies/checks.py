@@ -7,7 +7,11 @@ import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.bodies.finished import MASS_TOLERANCE
+from hexmj.bodies.reading import segments
 from hexmj.errors import InputError
+
+LEG_TOLERANCE = 1.5
+"""Times by which the shortest leg may be longer or shorter than the lengths say, which limits are made of."""
 
 LEAST_GRAVITY = 100.0
 """A sixteenth of the moon's [mm/s^2]; less was told in metres."""
@@ -19,7 +23,7 @@ def check_described(model: mujoco.MjModel, body: Body) -> None:
     Raises:
         InputError: a name that is not there, joints in another order, or a mass, root, foot or ground that differs.
     """
-    for faults in (_in_names, _in_joints, _in_legs, _in_ground, _in_pairs, _in_the_rest):
+    for faults in (_in_names, _in_joints, _in_legs, _in_lengths, _in_ground, _in_pairs, _in_the_rest):
         for fault in faults(model, body):
             raise InputError(f"body {body.name!r}: {fault}")
 
@@ -91,6 +95,15 @@ def _in_legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
                 yield f"{one.name!r} is moved by {leg.joints[0]!r}; expected it among the parts of that leg"
     if len(radii) > 1:
         yield f"its feet have the radii {sorted(radii)} mm; expected one for all"
+
+
+def _in_lengths(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    told, there = body.lengths.shortest_leg, segments(model, body).sum(axis=1).min()
+    if not 1 / LEG_TOLERANCE <= told / there <= LEG_TOLERANCE:
+        yield (
+            f"its lengths are for legs of {told:g} mm, but its shortest leg is {there:.4g} mm long; expected `lengths`"
+            f" of its own, such as those scaled by {there / told:.3g}"
+        )
 
 
 def _in_ground(model: mujoco.MjModel, body: Body) -> Iterator[str]:

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.description import Body
-from hexmj.bodies.reading import joint_numbers, posed
+from hexmj.bodies.reading import joint_numbers, posed, segments
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,7 @@ def gains(model: mujoco.MjModel, body: Body) -> Gains:
 def longest_lever(model: mujoco.MjModel, body: Body) -> float:
     """The longest lever with which the weight, on one foot, can turn a joint [mm]."""
     data, joints = posed(model, model.key(body.home).qpos), joint_numbers(model, body)
-    feet = [model.site(foot).id for foot in body.feet]
-    places = np.concatenate([data.xanchor[joints], data.site_xpos[feet][:, None]], axis=1)  # (leg, joint + 1, axis)
-    segments = np.linalg.norm(np.diff(places, axis=1), axis=-1)
-    way = np.cumsum(segments[:, ::-1], axis=1)[:, ::-1]
+    way = np.cumsum(segments(model, body)[:, ::-1], axis=1)[:, ::-1]
     horizontal = np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)
     return float((way * horizontal).max())
 

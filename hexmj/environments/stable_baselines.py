@@ -38,7 +38,13 @@ class FeltInsects(VecEnv):
         super().__init__(num_envs, felt, self._insects.single_action_space)  # pyright: ignore[reportArgumentType]
 
     def reset(self) -> np.ndarray:
-        """Begin all episodes, by the seeds of `seed` if there are some."""
+        """Begin all episodes, by the seeds of `seed` if there are some.
+
+        Raises:
+            InputError: options have been set.
+        """
+        if any(self._options):
+            raise InputError(f"options = {self._options!r:.80}; expected none")
         observed = self._insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
         return self._seen(observed)
@@ -69,13 +75,12 @@ class FeltInsects(VecEnv):
         return [getattr(self._insects, attr_name)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute, of all insects.
+        """Refused: all that an insect is made with is settled.
 
         Raises:
-            InputError: of some of them.
+            InputError: always.
         """
-        self._all(indices)
-        setattr(self._insects, attr_name, value)
+        raise InputError(f"{attr_name} = {value!r:.80} cannot be set; expected new insects that are made with it")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method, for all insects at once.
