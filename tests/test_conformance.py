@@ -13,6 +13,8 @@ import pytest
 import hexmj
 from hexmj.controllers import Sensed
 from hexmj.controllers.conformance import FIRST, check_controller, findings
+from hexmj.controllers.rivals.lifted import LiftedPlan
+from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.legs import CENTRED
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Change, Own
@@ -178,7 +180,38 @@ class OtherAtSpeed:
         return hexmj.UNCOORDINATED.begin_at_speed(*given)
 
 
+def put_back(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
+    """To the tips, with what was remembered and as fast as before."""
+    rows = which[:, None]
+    plan.see(np.where(rows, tips, plan.tips), plan.standing | rows)
+
+
+def steered(**changed: Any) -> Any:
+    """A rival whose plans do something else where they are steered."""
+    plan = type("SteeredPlan", (LiftedPlan,), changed)
+    return type("Steered", (Metronome,), {"_plan": lambda rule, *asked: plan(rule, *asked)})()
+
+
 BROKEN: list[tuple[str, Any, str]] = [
+    ("see", steered(see=lambda *_: None), "tips of start 0, leg 0 is .* after see; expected"),
+    ("see", steered(see=lambda plan, tips, _: LiftedPlan.see(plan, tips, plan.standing)), "standing of .* after see"),
+    ("see", steered(tips=property(lambda plan: plan.starts)), "tips of start 1, leg 0 is .* after a step; expected"),
+    (
+        "restart",
+        steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips)),
+        "tips of start 1, leg 0 is .* after restart of some starts; expected",
+    ),
+    ("restart", steered(restart=put_back), "restart, and beginning, differ: x is"),
+    (
+        "slow down",
+        steered(slow_down=lambda *_: None),
+        "accelerating: velocity of start 2 is 0.225 0 steps after slow_d",
+    ),
+    (
+        "slow down",
+        steered(slow_down=lambda plan, which: LiftedPlan.slow_down(plan, np.ones_like(which))),
+        "accelerating: velocity of start 3, which was not asked to, is",
+    ),
     ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
     ("settings", Melting(), "not frozen"),
     ("settings", Hiding(), "object.*is no setting"),

@@ -185,10 +185,10 @@ def test_what_all_insects_share_is_not_asked_of_some_or_set():
     assert len(insects.env_method("reset")) == len(insects.get_attr("task")) == 3
     with pytest.raises(InputError, match=r"indices = \[0\]; expected all 3"):
         insects.env_method("reset", indices=[0])
-    with pytest.raises(InputError, match="velocity = 0.9 cannot be set; expected new insects"):
+    with pytest.raises(InputError, match=r"velocity = 0.9 cannot be set; expected new insects"):
         insects.set_attr("velocity", 0.9)
     insects.set_options({"reset_mask": None})
-    with pytest.raises(InputError, match="options = .*; expected none"):
+    with pytest.raises(InputError, match=r"options = .*; expected none"):
         insects.reset()
 
 

@@ -105,7 +105,8 @@ def test_what_a_chunk_adds_up_to():
     sums = _Sums(never, np.ones(2), never.copy(), slid, contacts, saturated, shown, misses)
     body = 0, 18, np.array([[0.0, 2.0, -1.0]]), np.array([0.5]), np.array([1.0, 2.0])
     targets = np.zeros((1, 3, 6, 3))
-    _scan((qpos, seen, targets, force, np.array([3])), np.array([1]), body, (-12.0, 0.25), sums)
+    since = np.zeros((2, 24)), 0, 4, 4
+    _scan((qpos, seen, targets, force, np.array([3])), since, np.array([1]), body, (-12.0, 0.25), sums)
     assert_allclose(sums.upright, [1.0, np.cos(0.2)])
     assert_allclose(sums.clearance, [np.inf, 7.0 + 2.0 * np.sin(0.2) - np.cos(0.2) - 0.5])
     assert np.array_equal(sums.toppled, [np.inf, 2.0])

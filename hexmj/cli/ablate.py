@@ -14,16 +14,12 @@ from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
 from hexmj.storage.attributes import settings
 from hexmj.studies.ablation import study
+from hexmj.studies.ablation.figure import ablation_figure
 from hexmj.studies.league.study import FRESH
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
-
-
-@dataclass(frozen=True)
-class _Walks(Walks):
-    """Windows are those of the measures."""
 
 
 @dataclass(frozen=True)
@@ -42,14 +38,16 @@ class Ablate(StudyCommand):
     """Of these, number of starts that walk in physics; 100 unless given, at most all."""
     out: Path = Path("results/ablate")
     """Folder for figure, NetCDF, manifest and finished walks."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: hiding(_Walks(seed=FRESH), ["window"]))
+    walks: OmitArgPrefixes[Walks] = field(
+        default_factory=lambda: hiding(Walks(seed=FRESH), ["window"], "Windows are those of the measures.")
+    )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     controlled: OmitArgPrefixes[Controlled] = field(
         default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
     )
+    outputs = Outputs("walking without parts", "ablation.nc", {"ablation.png": ablation_figure})
 
     def study(self) -> study.Ablation:
-        """See `StudyCommand.study`."""
         check_distinct("models", self.models)
         models = study.wholes(self.models)
         usual = min(study.Ablation.n_physical, max(1, self.starts))
@@ -63,12 +61,6 @@ class Ablate(StudyCommand):
             conditions=self.conditions,
             stride=self.walks.stride,
         )
-
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.ablation.figure import ablation_figure
-
-        return Outputs("walking without parts", "ablation.nc", {"ablation.png": ablation_figure})
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """All frequencies and differences."""

@@ -9,20 +9,17 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import new_table
+from hexmj.cli.tables import table
 from hexmj.conditions import Conditions
 from hexmj.storage.results import save_text
 from hexmj.studies.biology import study as biology
+from hexmj.studies.biology.figure import biology_figure
+from hexmj.studies.biology.table import HEADS, biology_markdown, rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
 TABLE = "biology.md"
-
-
-@dataclass(frozen=True)
-class _Walks(Walks):
-    """All walk so many periods."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +32,14 @@ class Biology(StudyCommand):
     periods: int = biology.Biology.periods
     """Periods of a single leg that each start walks; the last three are measured."""
     out: Path = Path("results/biology")
-    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: hiding(_Walks(), ["window"]))
+    walks: OmitArgPrefixes[Walks] = field(
+        default_factory=lambda: hiding(Walks(), ["window"], "All walk so many periods.")
+    )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["grasp"]))
+    outputs = Outputs("walking beside the animal", "biology.nc", {"biology.png": biology_figure}, others=(TABLE,))
 
     def study(self) -> biology.Biology:
-        """See `StudyCommand.study`."""
         return biology.Biology(
             self.controlled.controller(self.model),
             self.periods,
@@ -50,26 +49,14 @@ class Biology(StudyCommand):
             stride=self.walks.stride,
         )
 
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.biology.figure import biology_figure
-
-        figures = {"biology.png": biology_figure}
-        return Outputs("walking beside the animal", "biology.nc", figures, others=(TABLE,))
-
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """The rows of the table."""
         return lists_of(result.drop_dims(("start", "speed", "quantity")))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The table, how many walked, and the conditions."""
-        from hexmj.studies.biology.table import HEADS, rows
-
-        table = new_table(*HEADS)
-        for row in rows(result):
-            table.add_row(*row)
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
-        yield table
+        yield table(HEADS, rows(result))
         counts = (f"{n} of {self.starts} at {speed:g} mm/s" for speed, n in biology.walked(result).items())
         yield f"starts that walked: {', '.join(counts)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
@@ -77,6 +64,4 @@ class Biology(StudyCommand):
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The table as Markdown."""
-        from hexmj.studies.biology.table import biology_markdown
-
         return [save_text(biology_markdown(result), self.out / TABLE)]

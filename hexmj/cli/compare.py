@@ -12,11 +12,10 @@ from tyro.conf import arg
 from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand
-from hexmj.cli.tables import interval, new_table, physical_report, report_line
+from hexmj.cli.tables import interval, physical_report, report_line, table
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
-from hexmj.process.progress import progress_bar
-from hexmj.replay.film.film import Film
+from hexmj.measures.figures import comparison_figure
 from hexmj.storage.attributes import settings
 
 if TYPE_CHECKING:
@@ -25,6 +24,9 @@ if TYPE_CHECKING:
 
 SUMMARY = ("velocity", "report", "settings", "files")
 """What stands beside the controllers in the JSON."""
+
+RECORDING, FILM = "recording.nc", "gait.mp4"
+"""Files for one gait."""
 
 FILMED = 0.3
 """V_r near which a gait is filmed."""
@@ -43,42 +45,35 @@ class Compare(StudyCommand):
     """Folder for the results and finished walks."""
     no_video: bool = False
     """Leave the video out."""
+    outputs = Outputs("comparing", "comparison.nc", {"comparison.png": comparison_figure}, others=(RECORDING, FILM))
 
     def study(self) -> Comparison:
-        """See `StudyCommand.study`."""
         controllers = self.controlled.controllers(self.models)
         if clash := set(controllers) & set(SUMMARY):
             raise InputError(f"a controller has the name {min(clash)!r}, which the results need; rename it")
         return Comparison(controllers, self.velocities, self.starts, conditions=self.conditions, **self.walked)
 
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.measures.figures import comparison_figure
-
-        others = "recording.nc", "gait.mp4"
-        return Outputs("comparing", "comparison.nc", {"comparison.png": comparison_figure}, others=others)
-
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The video, unless it is left out or cannot be made."""
+        from hexmj.replay.film.video import render
         from hexmj.replay.recording import save_recording
 
         if self.no_video:
             return []
         walked = self._typical_gait(result)
-        recording = save_recording(walked, self.out / "recording.nc")
+        files = [save_recording(walked, self.out / RECORDING)]
         try:
-            return [recording, self._filmed(walked)]
+            render([walked], self.out / FILM, progress=True)
+            files.append(self.out / FILM)
         except RenderingError as error:
             print(f"hexmj: no video: {error}", file=sys.stderr)
-            return [recording]
+        return files
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """The frequencies and answers of every controller."""
         summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
-        keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")] + [
-            "agreement",
-            *AGREEMENT,
-        ]
+        keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")]
+        keys += ["agreement", *AGREEMENT]
         for name in result.controller.values:
             one = result.sel(controller=name)
             summary[name] = {key: one[key].values.tolist() for key in keys}
@@ -104,31 +99,20 @@ class Compare(StudyCommand):
         start = int(np.argmax((np.isinf(one.planned_loss) & np.isinf(one.fall)).values))
         return recorded(self, controller, v, start, title=name, threads=self.sweepers.threads)
 
-    def _filmed(self, walked: "xr.Dataset") -> Path:
-        """A video of a recording."""
-        from hexmj.replay.film.video import missing, render
-
-        if sentence := missing():
-            raise RenderingError(sentence)
-        with progress_bar("rendering") as progress:
-            render([walked], self.out / "gait.mp4", Film(), progress)
-        return self.out / "gait.mp4"
-
 
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
     """A row for each controller and velocity: the frequencies, and what the starts did."""
-    frequencies = new_table("controller", "V", "t", *MEASURES)
-    answers = new_table("controller", "V", "agree", "both", "kin.", "phys.", "none", *BESIDE, "speed")
+    frequencies, answers = [], []
     for name in result.controller.values:
         for v in result.velocity.values:
             one = result.sel(controller=name, velocity=v)
             intervals = (interval(one, measure) for measure in MEASURES)
-            frequencies.add_row(name, f"{v:g}", f"{one.duration.item():.0f}", *intervals)
+            frequencies.append((name, f"{v:g}", f"{one.duration.item():.0f}", *intervals))
             counts = [str(one[case].item()) for case in AGREEMENT]
-            answers.add_row(
-                name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, f"{one.toppled.item():.3f}", _speeds(one)
-            )
-    return frequencies, answers
+            toppled = f"{one.toppled.item():.3f}"
+            answers.append((name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, toppled, _speeds(one)))
+    told = ("agree", "both", "kin.", "phys.", "none", *BESIDE, "speed")
+    return table(("controller", "V", "t", *MEASURES), frequencies), table(("controller", "V", *told), answers)
 
 
 def _speeds(one: "xr.Dataset") -> str:

@@ -10,8 +10,9 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import ControllerName, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import interval, new_table
+from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
+from hexmj.studies.static_limit.figure import static_limit_figure
 from hexmj.studies.static_limit.study import FINE, VARIED, StaticLimit
 
 if TYPE_CHECKING:
@@ -54,9 +55,9 @@ class Converge(StudyCommand):
     """Number of random starts, the same for every V_p and mass."""
     out: Path = Path("results/converge")
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(FINE, VARIED))
+    outputs = Outputs("walking slower and slower", "converge.nc", {"converge.png": static_limit_figure})
 
     def study(self) -> StaticLimit:
-        """See `StudyCommand.study`."""
         return StaticLimit(
             self.controlled.controller(self.model),
             self.velocity,
@@ -66,12 +67,6 @@ class Converge(StudyCommand):
             conditions=self.conditions,
             **self.walked,
         )
-
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.static_limit.figure import static_limit_figure
-
-        return Outputs("walking slower and slower", "converge.nc", {"converge.png": static_limit_figure})
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """Frequencies and distances, over masses and V_p."""
@@ -104,12 +99,12 @@ def _means(result: "xr.Dataset") -> "xr.Dataset":
 
 def _table(means: "xr.Dataset", columns: Mapping[str, "Callable[[xr.Dataset], str]"]) -> "Table":
     """A row for each mass of the legs and V_p."""
-    table = new_table("legs", "V_p", *columns)
-    for mass in means.leg_mass.values:
-        for vp in means.vp.values:
-            one = means.sel(leg_mass=mass, vp=vp)
-            table.add_row(f"{mass:g}", f"{vp:g}", *(column(one) for column in columns.values()))
-    return table
+    rows = [
+        (f"{mass:g}", f"{vp:g}", *(column(means.sel(leg_mass=mass, vp=vp)) for column in columns.values()))
+        for mass in means.leg_mass.values
+        for vp in means.vp.values
+    ]
+    return table(("legs", "V_p", *columns), rows)
 
 
 def _number(one: "xr.Dataset", name: str) -> str:

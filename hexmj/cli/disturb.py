@@ -9,10 +9,12 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, hiding
 from hexmj.cli.study import Outputs, StudyCommand
-from hexmj.cli.tables import interval, new_table
+from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
+from hexmj.studies.disturbance.figure import disturbed_figure
+from hexmj.studies.disturbance.frequencies import MEASURES
 from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks
 from hexmj.timing import Acceleration
 
@@ -52,13 +54,9 @@ class Disturb(StudyCommand):
     out: Path = Path("results/disturb")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["grasp"]))
+    outputs = Outputs("disturbing walks", "disturb.nc", {"disturb.png": disturbed_figure})
 
     def study(self) -> DisturbedWalks:
-        """See `StudyCommand.study`.
-
-        Raises:
-            InputError: options that would not be obeyed.
-        """
         if self.kinematic:
             self.refuse_physical("with --kinematic")
         controller = self.controlled.controller(self.model)
@@ -85,16 +83,8 @@ class Disturb(StudyCommand):
                 raise InputError(f"--{name.replace('_', '-')} without {needed}; expected it among those that are tried")
         return study
 
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.disturbance.figure import disturbed_figure
-
-        return Outputs("disturbing walks", "disturb.nc", {"disturb.png": disturbed_figure})
-
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """Tables for every measure, how the starts were found, the strategies, and the conditions."""
-        from hexmj.studies.disturbance.frequencies import MEASURES
-
         for measure in MEASURES:
             if measure in result:
                 yield from _tables(result, measure)
@@ -128,9 +118,9 @@ def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
 
 def _table(result: "xr.Dataset", name: str) -> "Table":
     """A row for each case, a column for each velocity."""
-    table = new_table("disturbance", "strategy", *(f"V = {v:g}" for v in result.velocity.values))
+    rows = []
     for case in range(result.sizes["case"]):
         row = result.isel(case=case)
         cells = (interval(row.sel(velocity=v), name) for v in result.velocity.values)
-        table.add_row(row.disturbance.item(), row.strategy.item().replace("_", " "), *cells)
-    return table
+        rows.append((row.disturbance.item(), row.strategy.item().replace("_", " "), *cells))
+    return table(("disturbance", "strategy", *(f"V = {v:g}" for v in result.velocity.values)), rows)

@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Sweepers
-from hexmj.cli.tables import new_table, physical_report, print_json, report_line, save_figure, show
+from hexmj.cli.tables import physical_report, print_json, report_line, save_figure, show, table
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
@@ -64,9 +64,9 @@ class Flss(WalkingCommand):
             results_folder(self.out, ("flss.nc", self.drawn.named("flss.png"), MANIFEST))
         elif self.drawn != Figures():
             raise InputError(f"--format {self.drawn.format} without --out; expected it where a figure is written")
-        table = self._measured(controller)
-        table.attrs |= attributes({"model": self.model, "physical": self.physical})
-        self._print(table, self._write(table, self.out) if self.out else [])
+        result = self._measured(controller)
+        result.attrs |= attributes({"model": self.model, "physical": self.physical})
+        self._print(result, self._write(result, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
         how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.sweepers.threads_each}
@@ -80,26 +80,29 @@ class Flss(WalkingCommand):
 
             return flss(controller, self.velocities, range_of=RANGE if self.range_of is None else self.range_of, **how)
 
-    def _write(self, table: "xr.Dataset", out: Path) -> list[Path]:
+    def _write(self, result: "xr.Dataset", out: Path) -> list[Path]:
         from hexmj.measures.figures import flss_figure
 
         files = [
-            save_dataset(table, out / "flss.nc"),
-            save_figure(flss_figure, table, out / self.drawn.named("flss.png")),
+            save_dataset(result, out / "flss.nc"),
+            save_figure(flss_figure, result, out / self.drawn.named("flss.png")),
         ]
-        return [*files, save_manifest(self, settings(table), files, out / MANIFEST)]
+        return [*files, save_manifest(self, settings(result), files, out / MANIFEST)]
 
-    def _print(self, table: "xr.Dataset", files: list[Path]) -> None:
-        columns = [str(name) for name, values in table.items() if values.dims == ("velocity",)]
-        report = physical_report(table) if self.physical else {}
+    def _print(self, result: "xr.Dataset", files: list[Path]) -> None:
+        columns = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
+        report = physical_report(result) if self.physical else {}
         if self.json:
-            lists = {"velocity": table.velocity.values.tolist()} | {c: table[c].values.tolist() for c in columns}
-            print_json(lists | ({"report": report} if report else {}) | {"settings": settings(table), "files": files})
+            lists = {"velocity": result.velocity.values.tolist()} | {c: result[c].values.tolist() for c in columns}
+            print_json(lists | ({"report": report} if report else {}) | {"settings": settings(result), "files": files})
             return
-        columns = [name for name in columns if table[name].notnull().any()]  # no sample_sd of less than two samples
-        rows = new_table("V", *columns)
-        for v in table.velocity.values:
-            one = table.sel(velocity=v)
-            rows.add_row(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns))
+        columns = [name for name in columns if result[name].notnull().any()]  # no sample_sd of less than two samples
+        at = {v: result.sel(velocity=v) for v in result.velocity.values}
+        rows = [(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns)) for v, one in at.items()]
         lines = [self.conditions_line(self.physical), *([report_line(report)] if report else [])]
-        show(f"{self.kind} FLSS of {self.model}, {self.n_starts} starts", rows, *lines, *map(str, files))
+        show(
+            f"{self.kind} FLSS of {self.model}, {self.n_starts} starts",
+            table(("V", *columns), rows),
+            *lines,
+            *map(str, files),
+        )

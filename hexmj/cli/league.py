@@ -14,12 +14,13 @@ from hexmj.cli.study import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
-from hexmj.process.progress import progress_bar
 from hexmj.replay.film.film import Film
 from hexmj.storage.literal import literal
 from hexmj.storage.results import save_text
 from hexmj.studies.league import study
 from hexmj.studies.league.entrants import EVERYONE, FOUR, entrants
+from hexmj.studies.league.figure import league_figure, walks_figure
+from hexmj.studies.league.table import by_rank, league_markdown, tables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +30,8 @@ TABLE, FILM = "league.md", "league.mp4"
 
 OF_TRIALS = ("ground", "ground_height", "ground_at", "ground_length", "load")
 """Conditions that the trials bring along, or of which none has any."""
+
+FIGURES = {"league.png": league_figure, "league_walks.png": walks_figure}
 
 BEST = 6
 """Who are filmed, at most."""
@@ -67,6 +70,7 @@ class League(StudyCommand):
         default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
     )
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), OF_TRIALS))
+    outputs = Outputs("walking the league", "league.nc", FIGURES, others=(TABLE, FILM))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -74,7 +78,6 @@ class League(StudyCommand):
         return (FOUR if self.quick else EVERYONE) if self.controllers is None else self.controllers
 
     def study(self) -> study.League:
-        """See `StudyCommand.study`."""
         check_distinct("controllers", self.names)
         asked = {
             "velocities": self.velocities,
@@ -97,22 +100,12 @@ class League(StudyCommand):
             stride=self.walks.stride,
         )
 
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.league.figure import league_figure, walks_figure
-
-        figures = {"league.png": league_figure, "league_walks.png": walks_figure}
-        others = (TABLE,) if self.no_video else (TABLE, FILM)
-        return Outputs("walking the league", "league.nc", figures, others=others)
-
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """All frequencies, costs and ranks."""
         return lists_of(result)
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """All tables, and the conditions."""
-        from hexmj.studies.league.table import tables
-
         for one in tables(result):
             yield one.title
             yield from tables_that_fit(one.head, one.rows)
@@ -120,8 +113,6 @@ class League(StudyCommand):
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The tables as Markdown, and the film unless it is left out or cannot be made."""
-        from hexmj.studies.league.table import league_markdown
-
         table = save_text(league_markdown(result), self.out / TABLE)
         if self.no_video:
             return [table]
@@ -139,7 +130,6 @@ class League(StudyCommand):
         """
         from hexmj.replay.film.video import missing, render
         from hexmj.studies.league.physics import REFUSALS
-        from hexmj.studies.league.table import by_rank
 
         if sentence := missing():
             raise RenderingError(sentence)
@@ -153,6 +143,5 @@ class League(StudyCommand):
                 print(f"hexmj: {literal(f'{name} is not in the video: {error}')}", file=sys.stderr)
         if not shown:
             raise RenderingError("no controller of this league walks the first random start")
-        with progress_bar("rendering") as progress:
-            render(shown, self.out / FILM, Film(width=480, height=360), progress)
+        render(shown, self.out / FILM, Film(width=480, height=360), progress=True)
         return self.out / FILM

@@ -6,11 +6,12 @@ import shlex
 import sys
 from contextlib import nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from importlib import import_module
 from io import StringIO, TextIOWrapper
 from operator import or_
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import tyro
@@ -91,26 +92,6 @@ class _Listed:
     """Stands for the options of a command that is only listed."""
 
 
-@dataclass(frozen=True)
-class _Version:
-    """`hexmj --version`."""
-
-    def run(self) -> None:
-        print(f"hexmj {__version__}")
-
-
-@dataclass(frozen=True)
-class _Completion:
-    """`hexmj --completion SHELL`: what makes the shell complete the words of `hexmj`."""
-
-    shell: str
-
-    def run(self) -> None:
-        with redirect_stdout(StringIO()) as script, suppress(SystemExit):
-            options_of(["--tyro-write-completion", self.shell, "-"])
-        print(completed(script.getvalue(), COMMANDS))
-
-
 def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
     for stream in (sys.stdout, sys.stderr):
@@ -166,9 +147,9 @@ def main() -> None:
 def options_of(words: list[str]) -> Any:
     """The options of the command that is asked for; no other is imported then, and none that are only listed."""
     if words == ["--version"]:
-        return _Version()
+        return SimpleNamespace(run=lambda: print(f"hexmj {__version__}"))
     if words[:1] == ["--completion"]:
-        return _Completion(shell(words[1:]))
+        return SimpleNamespace(run=partial(_complete, shell(words[1:])))
     how: Any = {"config": (FlagCreatePairsOff,)}
     listed = words in (["--help"], ["-h"])
     if not listed:
@@ -184,6 +165,13 @@ def options_of(words: list[str]) -> Any:
     ]
     any_command: Any = reduce(or_, commands)
     return tyro.cli(any_command, prog="hexmj", description=ABOUT, args=words, **how)
+
+
+def _complete(shell: str) -> None:
+    """Print what makes the shell complete the words of `hexmj`."""
+    with redirect_stdout(StringIO()) as script, suppress(SystemExit):
+        options_of(["--tyro-write-completion", shell, "-"])
+    print(completed(script.getvalue(), COMMANDS))
 
 
 def _class(command: str) -> Any:

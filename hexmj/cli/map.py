@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Controlled, ControllerName, hiding
 from hexmj.cli.study import Outputs, StudyCommand
-from hexmj.cli.tables import interval, new_table
+from hexmj.cli.tables import interval, table
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
 
@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 
 DIFFERENCES = ("dynamics", "change")
 """Paired differences of a map."""
-
-
-@dataclass(frozen=True)
-class _Controlled(Controlled):
-    """A map refuses controllers that read the legs."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +36,11 @@ class Map(StudyCommand):
     """Number of random starts, the same for every value and velocity."""
     out: Path = Path("results/map")
     """Folder for figures, NetCDF, manifest and finished walks."""
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=lambda: hiding(_Controlled(), ["feedback"]))
+    controlled: OmitArgPrefixes[Controlled] = field(
+        default_factory=lambda: hiding(Controlled(), ["feedback"], "A map refuses controllers that read the legs.")
+    )
 
     def study(self) -> StabilityMap:
-        """See `StudyCommand.study`."""
         return StabilityMap(
             self.controlled.controller(self.model),
             self.over,
@@ -55,8 +51,8 @@ class Map(StudyCommand):
             **self.walked,
         )
 
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
+    @property
+    def outputs(self) -> Outputs:  # pyright: ignore[reportIncompatibleVariableOverride]
         from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
 
         figures = {f"{self.over}.png": map_figure, f"{self.over}-mechanisms.png": mechanisms_figure}
@@ -86,28 +82,28 @@ class Map(StudyCommand):
 
 def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
     """A row for each value and velocity: the measures, and what differs between them."""
-    measures = new_table("value", "V", "Froude", *MEASURES)
-    differences = new_table("value", "V", "static", "saved", *DIFFERENCES)
+    measures, differences = [], []
     for value in result.value.values:
         for v in result.velocity.values:
             one, at = result.sel(value=value, velocity=v), (f"{value:g}", f"{v:g}")
-            measures.add_row(*at, f"{one.froude.item():.2g}", *(interval(one, name) for name in MEASURES))
+            measures.append((*at, f"{one.froude.item():.2g}", *(interval(one, name) for name in MEASURES)))
             changes = (_difference(one, name) for name in DIFFERENCES)
             saved = interval(one, "saved") if one.static.item() else "none lost"
-            differences.add_row(*at, f"{one.static.item():.3f}", saved, *changes)
-    return measures, differences
+            differences.append((*at, f"{one.static.item():.3f}", saved, *changes))
+    heads = ("value", "V", "Froude", *MEASURES), ("value", "V", "static", "saved", *DIFFERENCES)
+    return table(heads[0], measures), table(heads[1], differences)
 
 
 def _reasons(result: "xr.Dataset") -> "Table":
     """A row for each velocity and mechanism, a column for each value."""
-    table = new_table("V", "starts that", *(f"{value:g}" for value in result.value.values))
+    rows = []
     for v in result.velocity.values:
         for name in result.mechanism_name.values:
             counts = result["count"].sel(velocity=v, mechanism_name=name).values
-            table.add_row(f"{v:g}", name.replace("_", " "), *map(str, counts))
+            rows.append((f"{v:g}", name.replace("_", " "), *map(str, counts)))
         toppled = (result.topple.sel(velocity=v) < float("inf")).sum("start")
-        table.add_row(f"{v:g}", "toppled, of all", *map(str, toppled.values))
-    return table
+        rows.append((f"{v:g}", "toppled, of all", *map(str, toppled.values)))
+    return table(("V", "starts that", *(f"{value:g}" for value in result.value.values)), rows)
 
 
 def _difference(one: "xr.Dataset", name: str) -> str:

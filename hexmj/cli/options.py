@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
 
@@ -239,7 +239,9 @@ class Sweepers:
         if not 1 <= self.processes <= MOST_PROCESSES:
             raise InputError(f"--processes = {self.processes}; expected at least 1 and at most {MOST_PROCESSES}")
         if self.processes == 1:
-            with self._cluster() as executor:
+            from hexmj.sweeps.cluster import workers_of
+
+            with nullcontext() if self.scheduler is None else workers_of(self.scheduler) as executor:
                 yield executor
             return
         if self.scheduler is not None:
@@ -266,14 +268,6 @@ class Sweepers:
                 raise
             with stops_wait():  # nothing is left to do but to leave
                 executor.shutdown()
-
-    def _cluster(self) -> AbstractContextManager[Executor | None]:
-        """The workers of the scheduler, if one was named."""
-        if self.scheduler is None:
-            return nullcontext()
-        from hexmj.sweeps.cluster import workers_of
-
-        return workers_of(self.scheduler)
 
 
 def changed(given: Any, usual: Any) -> Iterator[str]:
@@ -328,15 +322,18 @@ def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
 Options = TypeVar("Options")
 
 
-def hiding(usual: Options, names: Collection[str]) -> Options:
-    """Options to begin with, of which a command does not offer some, those of parts too: these keep their values."""
+def hiding(usual: Options, names: Collection[str], about: str = "") -> Options:
+    """Options to begin with, of which a command does not offer some, those of parts too: these keep their values.
+
+    `about` is said of the others, unless what is usual says it.
+    """
     whole, base = cast(Any, usual), type(usual)
     values = {one.name: getattr(usual, one.name) for one in fields(whole)}
     parts = {name: hiding(value, names) for name, value in values.items() if is_dataclass(value) and name != "body"}
     if isinstance(usual, Conditions):
         return replace(usual, **parts)
     hidden = [(name, Annotated[type(values[name]), Fixed, Suppress], values[name]) for name in names if name in values]
-    namespace = {"__doc__": usual.__doc__}
+    namespace = {"__doc__": about or usual.__doc__}
     kind = make_dataclass(base.__name__, hidden, bases=(base,), namespace=namespace, frozen=True) if hidden else base
     return kind(**values | parts)
 

@@ -9,7 +9,7 @@ from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
 from hexmj.cli.study import lists_of
-from hexmj.cli.tables import new_table, print_json, save_figure, show
+from hexmj.cli.tables import print_json, save_figure, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
 from hexmj.starts import MOST_DRAWN, check_draw
@@ -78,7 +78,4 @@ class Readings:
             told = {"readings": [dict(zip(HEADS, row, strict=True)) for row in rows]}
             print_json(lists_of(scores) | told | {"files": files})
             return
-        table = new_table(*HEADS)
-        for row in rows:
-            table.add_row(*row)
-        show("Readings of the 1998 paper", table, *map(str, files))
+        show("Readings of the 1998 paper", table(HEADS, rows), *map(str, files))

@@ -17,7 +17,6 @@ from hexmj.cli.recorded import walk_summary, walked_start
 from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
-from hexmj.process.progress import progress_bar
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.storage.literal import literal
 from hexmj.storage.results import results_folder
@@ -75,8 +74,7 @@ class Render(WalkingCommand):
             print(f"hexmj: {literal(str(out / one))} was there; the new one takes its place", file=sys.stderr)
         out.mkdir(parents=True, exist_ok=True)
         files = [save_recording(one, out / to) for one, to in zip(shown, walks, strict=False)]  # none that was given
-        with progress_bar("rendering") as progress:
-            frames = render(shown, out / video, self.film, progress)
+        frames = render(shown, out / video, self.film, progress=True)
         files.append(out / video)
         files.append(save_manifest(self, settings, files, out / manifest))
         if self.json:

@@ -7,7 +7,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Sweepers
-from hexmj.cli.tables import new_table, print_json, show
+from hexmj.cli.tables import print_json, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
 from hexmj.storage.results import results_folder
@@ -57,7 +57,5 @@ class Reproduce:
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return
-        table = new_table(*heads(rows))
-        for row in rows:
-            table.add_row(*row.cells)
-        show("The claims of the 1998 paper", table, *summary(rows), *summary_beside(rows), *map(str, files))
+        claims = table(heads(rows), [row.cells for row in rows])
+        show("The claims of the 1998 paper", claims, *summary(rows), *summary_beside(rows), *map(str, files))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import Positional
 
 from hexmj.cli.manifest import Manifest, changed_files, differences, manifests, told
-from hexmj.cli.tables import new_table, print_json, show
+from hexmj.cli.tables import print_json, show, table
 from hexmj.cli.words import deciding, typed
 from hexmj.errors import InputError, SimulationError
 from hexmj.storage.same_numbers import Compared, compared, holds_numbers
@@ -116,15 +116,14 @@ class _Repeated:
 
     def shown(self) -> "Iterator[str | Table]":
         """As lines and a table."""
-        table = new_table("file", "variable", "values", "equal to the last bit")
-        for name, rows in self.files.items():
-            if isinstance(rows, str):
-                table.add_row(name, "", "", rows)
+        rows = []
+        for name, found in self.files.items():
+            if isinstance(found, str):
+                rows.append((name, "", "", found))
             else:
-                for one in rows:
-                    table.add_row(name, one.name, str(one.values), _verdict(one))
+                rows += [(name, one.name, str(one.values), _verdict(one)) for one in found]
         yield f"{self.path}: hexmj {shlex.join(self.command)}"
-        yield table
+        yield table(("file", "variable", "values", "equal to the last bit"), rows)
         yield self.sentence
 
 

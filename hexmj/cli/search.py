@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Controlled, Figures, Workers, loaded
-from hexmj.cli.tables import interval, new_table, print_json, save_figure, show
+from hexmj.cli.tables import interval, print_json, save_figure, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
 from hexmj.starts import SAMPLE
@@ -96,8 +96,7 @@ class Search(WalkingCommand):
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
-        with progress_bar("searching") as progress:
-            found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=progress)
+        found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
         with progress_bar("judging") as progress:
             judged = {"found": problem.controller(found.vector)} | beside
             verdict = fresh.verdict(judged, self.workers.threads, progress)
@@ -112,8 +111,7 @@ class Search(WalkingCommand):
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
             told |= {"minimised": problem.minimised, "lost": found.lost, "starts": found.starts}
-            told |= {"refused": len(found.refused)}
-            told |= {"verdict": _judged(verdict), "settings": settings, "files": files}
+            told |= {"refused": len(found.refused), "verdict": _judged(verdict), "settings": settings, "files": files}
             vector = dict(zip(problem.form.names, found.vector.tolist(), strict=True))
             print_json({"found": vector} | told)
         else:
@@ -233,9 +231,9 @@ class Search(WalkingCommand):
 
         if isinstance(problem.form, NetworkForm):
             return network_toml(problem.form.controller(found.vector))
-        table = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
-        values = table.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
-        return tomli_w.dumps({"controller": table["controller"], "fields": values})
+        told = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
+        values = told.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
+        return tomli_w.dumps({"controller": told["controller"], "fields": values})
 
     def _counted(self, problem: "Problem", found: "Found") -> str:
         """What the least cost is where it is no FLSS, and how many starts were lost at it."""
@@ -248,21 +246,20 @@ class Search(WalkingCommand):
         self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
     ) -> None:
         vectors = {name: _numbers(problem.form, loaded(one)) for name, one in self._beside.items()}
-        parameters = new_table("parameter", "found", *vectors)
-        for row in zip(problem.form.names, found.vector, *vectors.values(), strict=True):
-            parameters.add_row(row[0].replace("_", " "), *(f"{value:.4g}" for value in row[1:]))
+        rows = zip(problem.form.names, found.vector, *vectors.values(), strict=True)
+        numbers = [(name.replace("_", " "), *(f"{value:.4g}" for value in values)) for name, *values in rows]
         refused = f"; {len(found.refused)} were refused, the first by {found.refused[0]}" if found.refused else ""
         over = f"{self.over} over {len(problem.variants)} variants of " if self.over != "usual" else ""
         windows = verdict.window.values.tolist()
-        judged = new_table("model", *(f"window {window}" for window in windows))
-        for name in verdict.controller.values.tolist():
-            one = verdict.sel(controller=name)
-            judged.add_row(name, *(interval(one.sel(window=window), "flss") for window in windows))
+        judged = [
+            (name, *(interval(verdict.sel(controller=name, window=window), "flss") for window in windows))
+            for name in verdict.controller.values.tolist()
+        ]
         show(
             self._title,
-            parameters,
+            table(("parameter", "found", *vectors), numbers),
             f"{over}{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
-            judged,
+            table(("model", *(f"window {window}" for window in windows)), judged),
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
             f" least cost {found.cost:.4g}{self._counted(problem, found)}{refused}",
             self.conditions_line(self.physical),

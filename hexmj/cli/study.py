@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import OmitArgPrefixes
 
@@ -41,6 +41,8 @@ class Outputs:
 class StudyCommand(WalkingCommand):
     """Base of the commands that conduct a study."""
 
+    outputs: ClassVar[Outputs]
+    """What is written."""
     sweepers: OmitArgPrefixes[Sweepers] = field(default_factory=Sweepers)
     drawn: OmitArgPrefixes[Figures] = field(default_factory=Figures)
     out: Path = Path("results")
@@ -48,10 +50,6 @@ class StudyCommand(WalkingCommand):
 
     def study(self) -> Study:
         """What is to be conducted; its cells name the function that walks."""
-        raise NotImplementedError
-
-    def outputs(self) -> Outputs:
-        """What is written."""
         raise NotImplementedError
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
@@ -68,7 +66,7 @@ class StudyCommand(WalkingCommand):
 
     def run(self) -> None:
         """Conduct the study in the folder, write its result, and print."""
-        study, outputs = self.study(), self.outputs()
+        study, outputs = self.study(), self.outputs
         figures = {self.drawn.named(name): draw for name, draw in outputs.figures.items()}
         folder = results_folder(self.out, [outputs.data, *figures, outputs.manifest, *outputs.others])
         with self.sweepers.executor() as executor, progress_bar(outputs.doing) as progress:

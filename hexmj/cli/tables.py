@@ -1,6 +1,6 @@
 """Tables, lines and JSON that the commands print, and the small files they write."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,14 +54,16 @@ def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path
         return results.save_figure(draw(data), path, dpi=150, metadata=undated.get(path.suffix))
 
 
-def new_table(*columns: str) -> "Table":
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
-    for column in columns:
-        table.add_column(column.replace("_", " "), overflow="fold")
-    return table
+    made = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+    for column in head:
+        made.add_column(column.replace("_", " "), overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
 
 
 def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iterator[Table]":
@@ -83,10 +85,7 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
         parts[-1].append(column)
         used += GAP + width
     for part in parts:
-        table = new_table(*(head[column] for column in part))
-        for row in rows:
-            table.add_row(*(row[column] for column in part))
-        yield table
+        yield table([head[column] for column in part], [[row[column] for column in part] for row in rows])
 
 
 def show(*parts: Any) -> None:

@@ -9,9 +9,10 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import interval, new_table
+from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions, Ground
 from hexmj.studies.terrain import study as terrain
+from hexmj.studies.terrain.figure import terrain_figure
 from hexmj.studies.terrain.study import FARTHER, VARIED, ObstacleKind
 
 if TYPE_CHECKING:
@@ -20,11 +21,6 @@ if TYPE_CHECKING:
 
 TABLED = ("flss", "flss_low", "flss_high", "reached", "crossed")
 """What is printed as JSON of every obstacle, grasp and velocity."""
-
-
-@dataclass(frozen=True)
-class _Walks(Walks):
-    """Each start walks a distance instead of a time."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +51,16 @@ class Terrain(StudyCommand):
     starts: int = terrain.Terrain.n_starts
     """Number of random starts, the same for every obstacle."""
     out: Path = Path("results/terrain")
-    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: hiding(_Walks(), ["window"]))
+    walks: OmitArgPrefixes[Walks] = field(
+        default_factory=lambda: hiding(Walks(), ["window"], "Each start walks a distance instead of a time.")
+    )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     conditions: OmitArgPrefixes[Conditions] = field(
         default_factory=lambda: hiding(replace(FARTHER, ground=_Ground()), VARIED)
     )
+    outputs = Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
 
     def study(self) -> terrain.Terrain:
-        """See `StudyCommand.study`."""
         controller = self.controlled.controller(self.model)
         self.refuse_contact_gap(controller)
         return terrain.Terrain(
@@ -77,12 +75,6 @@ class Terrain(StudyCommand):
             conditions=self.conditions,
             stride=self.walks.stride,
         )
-
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.terrain.figure import terrain_figure
-
-        return Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """Every obstacle, grasp and velocity."""
@@ -103,14 +95,14 @@ class Terrain(StudyCommand):
 def _table(result: "xr.Dataset", trunk: tuple[str, ...]) -> "Table":
     """A row for each obstacle and grasp, a column for each velocity."""
     velocities = result.velocity.values
-    table = new_table("obstacle", "grasp", *(f"V = {v:g}" for v in velocities), "crossed", "fell on")
+    rows = []
     for name in result.obstacle.values:
         for grasp in result.grasp.values:
             one = result.sel(obstacle=name, grasp=grasp)
             frequencies = (interval(one.sel(velocity=v), "flss") for v in velocities)
             crossed = f"{one.crossed.sum().item()} of {one.reached.sum().item()}"
-            table.add_row(name, f"{grasp:g}", *frequencies, crossed, _parts(one, trunk))
-    return table
+            rows.append((name, f"{grasp:g}", *frequencies, crossed, _parts(one, trunk)))
+    return table(("obstacle", "grasp", *(f"V = {v:g}" for v in velocities), "crossed", "fell on"), rows)
 
 
 def _parts(one: "xr.Dataset", trunk: tuple[str, ...]) -> str:

@@ -9,11 +9,12 @@ from tyro.conf import OmitArgPrefixes, arg
 
 from hexmj.cli.options import CONTROLLER, Controlled, hiding
 from hexmj.cli.study import Outputs, StudyCommand, lists_of
-from hexmj.cli.tables import interval, new_table
+from hexmj.cli.tables import interval, table
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError, check_distinct
 from hexmj.studies.short_names import short_names
 from hexmj.studies.variants import study
+from hexmj.studies.variants.figure import variants_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,11 +22,6 @@ if TYPE_CHECKING:
 
 OF_EACH = "-V"
 """What a model's name ends with where each velocity has a set of its own."""
-
-
-@dataclass(frozen=True)
-class _Controlled(Controlled):
-    """Order and reading are varied from what is given here; a variant has no feedback."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +40,16 @@ class Variants(StudyCommand):
     """Number of random starts, the same for every set, variant and velocity; 2000 unless given, 50 if physical."""
     out: Path = Path("results/variants")
     """Folder for figure, NetCDF, manifest and finished walks."""
-    controlled: OmitArgPrefixes[Controlled] = field(default_factory=lambda: hiding(_Controlled(), ["feedback"]))
+    controlled: OmitArgPrefixes[Controlled] = field(
+        default_factory=lambda: hiding(
+            Controlled(),
+            ["feedback"],
+            "Order and reading are varied from what is given here; a variant has no feedback.",
+        )
+    )
+    outputs = Outputs("walking every variant", "variants.nc", {"variants.png": variants_figure})
 
     def study(self) -> study.Variants:
-        """See `StudyCommand.study`."""
         if not self.physical:
             self.refuse_physical("without --physical")
         check_distinct("models", self.models)
@@ -66,7 +68,6 @@ class Variants(StudyCommand):
 
     @property
     def names(self) -> Sequence[str]:
-        """See `WalkingCommand.names`."""
         return list(dict.fromkeys(_own(name, v) for name in self.models for v in self.velocities))
 
     def _network(self, name: str, velocity: float) -> Cruse1998:
@@ -75,12 +76,6 @@ class Variants(StudyCommand):
         if not isinstance(found, Cruse1998):
             raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
         return found
-
-    def outputs(self) -> Outputs:
-        """See `StudyCommand.outputs`."""
-        from hexmj.studies.variants.figure import variants_figure
-
-        return Outputs("walking every variant", "variants.nc", {"variants.png": variants_figure})
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """All frequencies."""
@@ -106,24 +101,23 @@ def _own(name: str, velocity: float) -> str:
 
 def _table(one: "xr.Dataset") -> "Table":
     """A row for each variant, a column for each set; an asterisk where a set has the variant anyway."""
-    table = new_table("variant", *one.network.values)
+    rows = []
     for variant in one.variant.values:
-        row = one.sel(variant=variant)
-        cells = zip(row.flss.values, row.instead, strict=True)
-        table.add_row(variant, *(f"{flss:.4f}{_mark(note)}" for flss, note in cells))
-    return table
+        cells = zip(one.flss.sel(variant=variant).values, one.instead.sel(variant=variant), strict=True)
+        rows.append((variant, *(f"{flss:.4f}{_mark(note)}" for flss, note in cells)))
+    return table(("variant", *one.network.values), rows)
 
 
 def _together(result: "xr.Dataset") -> "Table":
     """A row for each set and velocity."""
-    table = new_table("set", "V", "mean", "worst", "which")
+    rows = []
     for name in result.network.values:
         for velocity in result.velocity.values:
             one = result.sel(network=name, velocity=velocity)
             which = one.worst_variant.item()
             which += _mark(one.instead.sel(variant=which))
-            table.add_row(name, f"{velocity:g}", interval(one, "mean"), interval(one, "worst"), which)
-    return table
+            rows.append((name, f"{velocity:g}", interval(one, "mean"), interval(one, "worst"), which))
+    return table(("set", "V", "mean", "worst", "which"), rows)
 
 
 def _mark(note: "xr.DataArray") -> str:

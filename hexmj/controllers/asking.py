@@ -151,15 +151,21 @@ def check_same(one: PlannedWalk, other: PlannedWalk, whose: str, before: int = 0
     Raises:
         InputError: they differ.
     """
+    if differ := difference(one, other, before):
+        raise InputError(
+            f"{whose} plans another walk when it begins again: {differ}; expected the same numbers each time, as from"
+            " seeds that are fields"
+        )
+
+
+def difference(one: PlannedWalk, other: PlannedWalk, before: int = 0) -> str:
+    """The first number that differs between two walks of the same starts, and where; nothing if they are the same."""
     for name in PLANNED:
         a, b = getattr(one, name), getattr(other, name)
-        same = (a == b) | (a != a) & (b != b)
-        if not same.all():
-            at = tuple(np.argwhere(~same)[0])
-            raise InputError(
-                f"{whose} plans another walk when it begins again: {name} is {a[at]:g} and {b[at]:g} in"
-                f" {place(one, at, before)}; expected the same numbers each time, as from seeds that are fields"
-            )
+        if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
+            at = tuple(bad[0])
+            return f"{name} is {a[at]!s} and {b[at]!s} in {place(one, at, before)}"
+    return ""
 
 
 def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.asking import advanced, begin, place, said, tell
+from hexmj.controllers.asking import advanced, begin, difference, place, said, tell
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import (
     Controller,
     Plan,
     ReadingPlan,
     Sensed,
+    SteerablePlan,
     check_controller_type,
     claims_mirrored,
     settings_of,
@@ -279,6 +280,63 @@ def _reading(trial: Trial) -> None:
     _same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
 
 
+def _seen(trial: Trial) -> None:
+    if isinstance(plan := trial.begin(), SteerablePlan):
+        last = advanced(plan, 250)
+        _is_where(plan, last.x[-1], last.stance[-1], "after a step")
+        tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
+        with said("a plan, see"):
+            plan.see(tips.copy(), standing.copy())
+        _is_where(plan, tips, standing, "after see")
+
+
+def _restarted(trial: Trial) -> None:
+    if isinstance(plan := trial.begin(), SteerablePlan):
+        which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, 250)
+        with said("a plan, restart"):
+            plan.restart(which.copy(), trial.starts.copy())
+        rows = which[:, None]
+        _is_where(
+            plan, np.where(rows, trial.starts, last.x[-1]), rows | last.stance[-1], "after restart of some starts"
+        )
+        on = advanced(plan, 250)
+        _same(of_starts(on, which), of_starts(advanced(trial.begin(), 250), which), "restart, and beginning,")
+        _same(of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that restart,")
+
+
+def _slowed(trial: Trial) -> None:
+    if isinstance(plan := trial.begin(), SteerablePlan):
+        which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
+        advanced(plan, 250)
+        with said("a plan, slow_down"):
+            plan.slow_down(which.copy())
+        on = advanced(plan, 250)
+        ages = np.where(which, 0, 250)
+        commanded = commanded_velocities(v, ages, 250, trial.stride, trial.acceleration)
+        if (bad := np.argwhere(on.velocity != commanded)).size:
+            step, start = bad[0]
+            asked = "" if which[start] else ", which was not asked to,"
+            raise InputError(
+                f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} {step} steps after slow_down;"
+                f" expected {commanded[step, start]:.6g}"
+            )
+        _same(of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that slow down,")
+
+
+def _later(trial: Trial) -> PlannedWalk:
+    """From step 250 to 500."""
+    advanced(plan := trial.begin(), 250)
+    return advanced(plan, 250)
+
+
+def _is_where(plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray, when: str) -> None:
+    """Refuse a plan whose own tips and states are not these, (start, leg)."""
+    for name, expected in (("tips", tips), ("standing", standing)):
+        if (bad := np.argwhere((found := np.asarray(getattr(plan, name))) != expected)).size:
+            at = tuple(bad[0])
+            raise InputError(f"{name} of start {at[0]}, leg {at[1]} is {found[at]!s} {when}; expected {expected[at]!s}")
+
+
 LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "settings": (_settings, "a frozen dataclass with a name, its settings plain data"),
     "begin": (_begin, "plans begin at time 0 of the starts and stride asked for"),
@@ -294,6 +352,9 @@ LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "batch": (_batch, "a start walks alike alone, in another order and among others"),
     "first losses": (_fast_losses, "first_losses, where plans have it, are those of the plan"),
     "at speed": (_at_speed, "begin_at_speed, where there is one, walks as begin does without an acceleration"),
+    "see": (_seen, "a plan that can be steered is where its last step says, and goes on from other legs where told"),
+    "restart": (_restarted, "its starts restart as they begin, and the others do not feel it"),
+    "slow down": (_slowed, "its starts begin at V_r(0) again when told, and the others do not feel it"),
     "mirrored": (_mirrored, "mirrored starts give mirrored walks, where it claims that"),
     "sense": (_reading, "a plan that reads the legs can be told of some starts, and the others do not feel it"),
 }
@@ -323,13 +384,8 @@ def _sliding(trials: list[Trial]) -> str:
 
 def _same(one: PlannedWalk, other: PlannedWalk, what: str) -> None:
     """Refuse two walks that differ."""
-    for name in PLANNED:
-        a, b = getattr(one, name), getattr(other, name)
-        if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
-            at = tuple(bad[0])
-            raise InputError(
-                f"{what} differ: {name} is {a[at]!s} and {b[at]!s} in {place(one, at)}; expected the same bits"
-            )
+    if differ := difference(one, other):
+        raise InputError(f"{what} differ: {differ}; expected the same bits")
 
 
 def _as_planned(walk: PlannedWalk, ids: np.ndarray, stride: Stride) -> Sensed:

@@ -52,21 +52,13 @@ class LamePlan:
 
     def __init__(self, plan: Plan, leg: int) -> None:
         """Around a plan at time 0."""
-        self.starts, self.stride, self._plan, self._leg = plan.starts, plan.stride, plan, leg
-
-    @property
-    def made_for(self) -> object:
-        """The conditions that its controller's plan is made for, if it tells them; see `protocol.Plan`."""
-        return getattr(self._plan, "made_for", None)
-
-    @property
-    def done(self) -> int:
-        """See `protocol.Plan`."""
-        return self._plan.done
+        self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
+        self._plan, self._leg, self.made_for = plan, leg, getattr(plan, "made_for", None)
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next steps; the lost leg is moved to and fro in the air."""
         walk = self._plan.advance(steps)
+        self.done = self._plan.done
         stance, height = walk.stance.copy(), walk.height.copy()
         stance[..., self._leg] = False
         height[..., self._leg] = HELD * np.minimum(walk.time / RAISED, 1.0)[:, None]

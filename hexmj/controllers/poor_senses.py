@@ -69,24 +69,17 @@ class PoorlyToldPlan:
 
     def __init__(self, plan: ReadingPlan, error: float, late: int) -> None:
         """Around a plan at time 0; `error` [mm], `late` in steps."""
-        self.starts, self.stride, self._plan, self._error = plan.starts, plan.stride, plan, error
+        self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
+        self._plan, self._error, self.made_for = plan, error, getattr(plan, "made_for", None)
         self._draws = [np.random.default_rng(np.frombuffer(start.tobytes(), np.uint32)) for start in plan.starts]
         self._coming: deque[Sensed] = deque()
         self._late = late
 
-    @property
-    def made_for(self) -> object:
-        """The conditions that its controller's plan is made for, if it tells them; see `protocol.Plan`."""
-        return getattr(self._plan, "made_for", None)
-
-    @property
-    def done(self) -> int:
-        """See `protocol.Plan`."""
-        return self._plan.done
-
     def advance(self, steps: int) -> PlannedWalk:
         """See `protocol.Plan`."""
-        return self._plan.advance(steps)
+        walk = self._plan.advance(steps)
+        self.done = self._plan.done
+        return walk
 
     def sense(self, sensed: Sensed) -> None:
         """Hand on what was told some steps ago, of those that still walk; nothing until then."""

@@ -39,7 +39,7 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.grounds import beyond_the_ground
-from hexmj.checks import numbers, typed
+from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -81,15 +81,13 @@ class Task:
     """Of an episode [time units]."""
 
     def __post_init__(self) -> None:
-        if not 0 < typed("velocity", self.velocity, float) < 1:
+        check_types(self)
+        if not 0 < self.velocity < 1:
             raise InputError(
                 f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p"
             )
-        typed("actions", self.actions, Actions)
         check_controller_type(self.controller)
-        typed("conditions", self.conditions, Conditions)
-        typed("stride", self.stride, Stride)
-        steps_within(typed("duration", self.duration, float), self.stride)
+        steps_within(self.duration, self.stride)
 
     @property
     def steps(self) -> int:

@@ -7,18 +7,19 @@ depends neither on how many there are nor on who began with it.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.controllers.asking import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
+from hexmj.environments.alone import Alone
 from hexmj.environments.observing import Observer, Places, Planned
 from hexmj.environments.passes import ROUNDING, judge, keep, order, scaled
 from hexmj.environments.task import Task, action_bounds, action_names, at_the_end
 from hexmj.errors import InputError
-from hexmj.physics.backend import Diverged
+from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import Shown
 from hexmj.physics.foot_path import TipTargets, standing_tips
@@ -32,33 +33,8 @@ AHEAD = 128
 Take = Callable[[np.ndarray, np.ndarray], Shown]
 """One step of some bodies, (n,), with these controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
 
-
-class Bodies(Protocol):
-    """What insects are made of: they can be looked at, and put where they stand."""
-
-    @property
-    def qpos(self) -> np.ndarray:
-        """(n, position)."""
-        ...
-
-    @property
-    def qvel(self) -> np.ndarray:
-        """(n, velocity)."""
-        ...
-
-    @property
-    def rotation(self) -> np.ndarray:
-        """From the root frames to the world, (n, axis, axis)."""
-        ...
-
-    @property
-    def sensors(self) -> np.ndarray:
-        """(n, column), of which those that measure places are current."""
-        ...
-
-    def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
-        """Put some bodies where they stand at rest, (n, state), by controls, (n, actuator)."""
-        ...
+Bodies = Alone | MujocoBatch
+"""What insects are made of: they can be looked at, and put where they stand."""
 
 
 class Acted(NamedTuple):

@@ -3,7 +3,6 @@
 import cmaes
 import numpy as np
 
-from hexmj.errors import InputError
 from hexmj.search.domain import Domain
 
 STEP = 0.5
@@ -17,8 +16,6 @@ class CovarianceAdaptation:
     """
 
     def __init__(self, domain: Domain, population: int = 10, seed: int = 0) -> None:
-        if population < 4:
-            raise InputError(f"population = {population}; expected at least 4 individuals for CMA-ES")
         self._domain, self._population, self._rng = domain, population, np.random.default_rng([seed, 3])
         self._middle = np.where(domain.binary, 0.0, (domain.low + domain.high) / 2)
         self._half = np.where(domain.binary, 1.0, (domain.high - domain.low) / 2)

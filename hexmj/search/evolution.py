@@ -7,7 +7,6 @@ the nearer of 0 and 1 (`Domain.read`); the '0'-individual is individual 1 of the
 
 import numpy as np
 
-from hexmj.errors import InputError
 from hexmj.search.domain import Domain
 
 SIGMA = 0.3
@@ -19,8 +18,6 @@ class Evolution:
 
     def __init__(self, domain: Domain, population: int = 10, seed: int = 0) -> None:
         """Q^0: the '0'-individual or the domain's `begin`, and `population` - 1 individuals drawn over the domain."""
-        if population < 2:
-            raise InputError(f"population = {population}; expected at least 2 individuals")
         self._domain, self._rng = domain, np.random.default_rng([seed, 2])
         self.individuals = domain.draw(population, self._rng)
         """(individual, parameter) before binary parameters are read."""

@@ -269,10 +269,11 @@ class Sample:
         windows, told = self.problem.windows, part_of(progress, 1.0 / len(controllers) / len(self.variants))
 
         def losses(variant: str, controller: Controller) -> np.ndarray:
-            lost = self.variants[variant]._losses(varied(controller, variant), windows, threads)
+            """Number of starts that lose stability, or fall, within each window, (window,)."""
+            times, ends = self.variants[variant]._times(varied(controller, variant), windows, threads)
             if told:
                 told(1.0)
-            return lost
+            return (times <= ends).sum(axis=1)
 
         lost = self._together([[losses(name, one) for one in controllers.values()] for name in self.variants])
         low, high = wilson_intervals(np.rint(lost), self.n_starts)
@@ -285,11 +286,6 @@ class Sample:
             },
             coords={"controller": list(controllers), "window": [str(window) for window in windows]},
         )
-
-    def _losses(self, controller: Controller, windows: list[str | float], threads: int | None) -> np.ndarray:
-        """Number of starts that lose stability, or fall, within each window, (window,)."""
-        times, ends = self._times(controller, windows, threads)
-        return (times <= ends).sum(axis=1)
 
     def _times(
         self, controller: Controller, windows: list[str | float], threads: int | None

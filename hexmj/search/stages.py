@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -27,23 +27,13 @@ from hexmj.sweeps.plain import plain
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hexmj.search.covariance import CovarianceAdaptation
+
 Costs = Callable[[np.ndarray], np.ndarray]
 """(candidate, parameter) -> (candidate,)."""
 
 MOST = 10_000
 """Individuals of the largest population."""
-
-
-class Searcher(Protocol):
-    """An algorithm that sees only vectors and their costs."""
-
-    def ask(self) -> np.ndarray:
-        """The next candidates, (candidate, parameter)."""
-        ...
-
-    def tell(self, costs: np.ndarray) -> None:
-        """Their costs, (candidate,)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -176,7 +166,8 @@ def _search(
     return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
 
 
-def _searcher(effort: Effort, domain: Domain) -> Searcher:
+def _searcher(effort: Effort, domain: Domain) -> "Evolution | CovarianceAdaptation":
+    """An algorithm that sees only vectors and their costs."""
     if effort.algorithm == "evolution":
         return Evolution(domain, effort.population, effort.seed)
     from hexmj.search.covariance import CovarianceAdaptation
@@ -184,7 +175,7 @@ def _searcher(effort: Effort, domain: Domain) -> Searcher:
     return CovarianceAdaptation(domain, effort.population, effort.seed)
 
 
-def run(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:
+def run(searcher: "Evolution | CovarianceAdaptation", costs: Costs, budget: int) -> tuple[np.ndarray, float]:
     """Drive a searcher for as many whole generations as `budget` evaluations allow; the best vector and its cost."""
     done, tried = 0, []
     while done + len(candidates := searcher.ask()) <= budget:

@@ -59,8 +59,7 @@ def check_port(host: str, port: int) -> None:
         raise InputError(f"--port {port}; expected 1 to {MOST_PORT}, or 0 for any that is free")
     try:
         socket.getaddrinfo(host, None)
-        with socket.create_server((host, 0)):
-            pass
+        socket.create_server((host, 0)).close()
     except (OSError, UnicodeError) as error:
         unknown = isinstance(error, socket.gaierror | UnicodeError)
         raise InputError(
@@ -68,8 +67,7 @@ def check_port(host: str, port: int) -> None:
             " machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
     try:
-        with socket.create_server((host, port)):
-            pass
+        socket.create_server((host, port)).close()
     except OSError as error:
         raise InputError(f"--port {port} at {host}: {error.strerror}; expected a free port, or 0 for any") from None
 

@@ -21,41 +21,10 @@ from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
 
-BIASES: dict[str, np.ndarray] = {
-    "tripod": np.array(
-        [
-            [0, 1, 0, 1, 0, 1],
-            [1, 0, 1, 0, 1, 0],
-            [0, 1, 0, 1, 0, 1],
-            [1, 0, 1, 0, 1, 0],
-            [0, 1, 0, 1, 0, 1],
-            [1, 0, 1, 0, 1, 0],
-        ]
-    )
-    / 2,
-    "tetrapod": np.array(
-        [
-            [0, 1, 2, 2, 0, 1],
-            [2, 0, 1, 1, 2, 0],
-            [1, 2, 0, 0, 1, 2],
-            [1, 2, 0, 0, 1, 2],
-            [0, 1, 2, 2, 0, 1],
-            [2, 0, 1, 1, 2, 0],
-        ]
-    )
-    / 3,
-    "wave": np.array(
-        [
-            [0, 1, 2, 3, 4, 5],
-            [5, 0, 1, 2, 3, 4],
-            [4, 5, 0, 1, 2, 3],
-            [3, 4, 5, 0, 1, 2],
-            [2, 3, 4, 5, 0, 1],
-            [1, 2, 3, 4, 5, 0],
-        ]
-    )
-    / 6,
-}
+AHEAD = {"tripod": (2, (0, 1, 0, 1, 0, 1)), "tetrapod": (3, (0, 1, 2, 2, 0, 1)), "wave": (6, (0, 1, 2, 3, 4, 5))}
+"""Into how many parts a gait divides its period, and how many of them each leg is to be ahead of leg 1."""
+
+BIASES = {gait: -np.subtract.outer(ahead, ahead) % parts / parts for gait, (parts, ahead) in AHEAD.items()}
 """phi_ij / 2 pi, how far leg j is to be ahead of leg i [periods], (leg i, leg j)."""
 
 
