@@ -11,16 +11,13 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hexmj.bodies.description import Body
-from hexmj.bodies.numeric import HingeChains, over_tips
+from hexmj.bodies.numeric import Bools, Floats, HingeChains, over_tips
 from hexmj.bodies.reading import joint_numbers
 from hexmj.jitted import jitted
 from hexmj.legs import SIDE
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SAMPLES, SAME = 32, 1e-9
 """Postures in which a chain is compared with the closed form, and how far apart their tips may be [mm]."""

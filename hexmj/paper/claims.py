@@ -85,42 +85,18 @@ def _both(
 
 
 SLOWLY = "the regimes become stable, but later: see the rows on limit regimes"
-UNSTABLE = (
-    "beyond V = 0.5 some starts stay in unstable regimes; at V = 0.85, 0.2 to 0.65 of them with dt = 0.01, the other"
-    " geometry, another order of updates or PEP_min = -15 or -30 too; none of the accelerated walks up to 0.95"
-)
 COEXIST = "other regimes coexist below V = 0.35, not beyond; accelerated walks have little time there from V_r(0) = 0.1"
 OVERLAP = "0.02 to 0.03 less than 1/(1 + V) at V = 0.1; from V = 0.25 on they are the same to 0.003"
-FEW = "in walk the 500 starts of a candidate lose two or three and hardly tell sets apart; in start they lose none"
-START_IS_SHORT = "the window start is shorter than a period there: 0.74 at V = 0.75, 0.80 to 0.85 beyond"
-ONLY_WHERE_IDLE = (
-    "the search keeps P^2 = 1 where it does nothing: in start, V = 0.15 to 0.35, the same sets with 0 differ by 0.002"
-    " at most; in walk only at V = 0.9, where every set loses every start"
-)
-LITTLE = (
-    "where it ends at 0 and a start survives (V = 0.3; in start 0.2, 0.8, 0.85) the same set with 1 differs by 0.008 at"
-    " most; at V = 0.5 and 0.7 in walk 1 is better by 0.04 and 0.05"
-)
 ANY_RATIO = (
     "many ratios are as good: at V = 0.2 in walk two seeds end at P_i^{3,3} / P_i^{3,2} = 0.03 and 4.1 with FLSS 0.046"
     " and 0.045; at V = 0.85 nothing is found"
 )
+FEW = "in walk the 500 starts of a candidate lose two or three and hardly tell sets apart; in start they lose none"
+LITTLE = (
+    "where it ends at 0 and a start survives (V = 0.3; in start 0.2, 0.8, 0.85) the same set with 1 differs by 0.008 at"
+    " most; at V = 0.5 and 0.7 in walk 1 is better by 0.04 and 0.05"
+)
 BETTER = "the same algorithm finds better sets than the printed: at V = 0.4 0.30 not 0.41 (start 0.21, not 0.28)"
-SPOILED = "it is as good as the ideal from V = 0.3 to 0.45 (start: at 0.4), and 0.04 to 0.12 above it at both ends"
-
-EARLY = "so it is up to V = 0.25 in walk; the sets of start are made for its 40 time units, and fall soon after"
-AGAIN = "the same algorithm finds a better one of the same form, for HWS in walk by 0.04, averaged over V"
-KEEPS = "40 time units at V = 0.1 lose hardly a start, and the accelerated walk passes thousands before its window"
-RISES = "0.714 at V = 0.35 already, and at 0.4"
-FOUND_FAST = "own-0.7, with 29 free weights, has 0.67 in walk where HWS has 0.95"
-POSITIONS = (
-    "where all legs stand, positions help at V = 0.5 (0.04, without 0.32), not at 0.3 or 0.7; with the states of the"
-    " legs they do, see the next row"
-)
-POSTURES = (
-    "none is lost at V = 0.5 and 0.7; at 0.3 this seed's postures are of a regime that coexists there; those of seeds 0"
-    " to 3 lose none of 200"
-)
 
 NONE, ALL = (0, 100), (100, 100)
 """What the paper saw in the starts of Section 5.3."""
@@ -135,7 +111,7 @@ CLAIMS = (
     Claim(
         "ideal-0.7", "5.1.1", "ideal FLSS beyond V = 0.7", "> 0.8",
         Band(Lost("ideal"), (0.75, 0.9), least=0.8),
-        START_IS_SHORT,
+        "the window start is shorter than a period there: 0.74 at V = 0.75, 0.80 to 0.85 beyond",
     ),
     Claim("ideal-rises", "5.1.1", "FLSS 'steadily increases'", "rising", Trend(Lost("ideal"), (0.1, 0.9), 1)),
     Claim(
@@ -145,7 +121,8 @@ CLAIMS = (
     Claim(
         "p2", "5.1.1", "the search sets P^2 = 0 for every V", "0",
         Band(Weight("p2"), EVERY, 0.0, 0.0),
-        ONLY_WHERE_IDLE,
+        "the search keeps P^2 = 1 where it does nothing: in start, V = 0.15 to 0.35, the same sets with 0 differ by"
+        " 0.002 at most; in walk only at V = 0.9, where every set loses every start",
     ),
     Claim("p4", "5.1.1", "the search retains P_i^4 for every V", "1", Band(Weight("p4_i"), EVERY, 1.0, 1.0), LITTLE),
     Claim(
@@ -176,12 +153,12 @@ CLAIMS = (
     *_both(
         "optimal", "5.1.2", "the printed set is the optimum of Problem 2", "none better",
         lambda model: Band(Lost(model, f"{model} again"), RANGES[f"{model} again"], most=0.0, averaged=True),
-        AGAIN,
+        "the same algorithm finds a better one of the same form, for HWS in walk by 0.04, averaged over V",
     ),
     Claim(
         "hws-spoiled", "5.1.2", "HWS fitted on [0.1, 0.7] is spoiled everywhere", "not close",
         Band(Lost("wide", "ideal"), (0.1, 0.7), least=CLOSE),
-        SPOILED,
+        "it is as good as the ideal from V = 0.3 to 0.45 (start: at 0.4), and 0.04 to 0.12 above it at both ends",
     ),
     Claim(
         "ldvs-close", "5.1.2", "LDVS in good agreement with ideal on [0.1, 0.5]", "close",
@@ -205,7 +182,7 @@ CLAIMS = (
     Claim(
         "ideal-late", "5.2", "the same of the sets adjusted to each V, HWS form", "about 0",
         Band(Lost("ideal late"), (0.1, 0.6), most=ABOUT_ZERO),
-        EARLY,
+        "so it is up to V = 0.25 in walk; the sets of start are made for its 40 time units, and fall soon after",
     ),
     Claim(
         "own-late", "5.2", "the same of our own sets for each V", "about 0",
@@ -219,7 +196,9 @@ CLAIMS = (
     *_both(
         "regimes", "5.2", "no unstable limit regime up to V = 0.85", "none",
         lambda model: Seen(Regime(model, "unstable"), (0.1, 0.85), *NONE),
-        UNSTABLE,
+        "beyond V = 0.5 some starts stay in unstable regimes; at V = 0.85, 0.2 to 0.65 of them with dt = 0.01, the"
+        " other geometry, another order of updates or PEP_min = -15 or -30 too; none of the accelerated walks up to"
+        " 0.95",
     ),
     Claim(
         "ldvs-accelerated", "5.2", "accelerated FLSS on [0.1, 0.9], LDVS", "< 0.05",
@@ -232,7 +211,7 @@ CLAIMS = (
     *_both(
         "keeps", "5.2", "accelerated FLSS is kept at that of V_r(0)", "fits",
         lambda model: Band(Lost(f"{model} accelerated", model, at=0.1), (0.1, 0.9), -FITS, FITS),
-        KEEPS,
+        "40 time units at V = 0.1 lose hardly a start, and the accelerated walk passes thousands before its window",
     ),
     *_both(
         "periodic", "5.3", "only periodic oscillations", "all",
@@ -272,7 +251,7 @@ CLAIMS = (
     Claim(
         "hws-phase-rises", "5.3", "grows with V from 0.1 to 0.4, HWS", "rising",
         Trend(Phase("hws", "ipsilateral"), (0.1, 0.4), 1),
-        RISES,
+        "0.714 at V = 0.35 already, and at 0.4",
     ),
     Claim(
         "hws-phase-falls", "5.3", "decreases continuously above V = 0.4, HWS", "falling",
@@ -317,7 +296,7 @@ CLAIMS = (
     Claim(
         "found-fast", "6", "it is impossible to decrease it by adjusting the parameters", "none below 0.7",
         Band(Lost("own"), (0.7, 0.9), least=0.7),
-        FOUND_FAST,
+        "own-0.7, with 29 free weights, has 0.67 in walk where HWS has 0.95",
     ),
     Claim(
         "obstacle", "6", "an obstacle makes the more walks lose stability the higher V, LDVS", "rising",
@@ -327,12 +306,14 @@ CLAIMS = (
         "obstacle-positions", "6", "drastically fewer at the nearest of a small set of leg positions of walking, LDVS",
         "to a tenth",
         Band(Lost("ldvs halted, positions", "ldvs halted", 0.1), (0.3, 0.7), most=0.0),
-        POSITIONS,
+        "where all legs stand, positions help at V = 0.5 (0.04, without 0.32), not at 0.3 or 0.7; with the states of"
+        " the legs they do, see the next row",
     ),
     Claim(
         "obstacle-postures", "6", "the same with the states of the legs in that posture, LDVS", "to a tenth",
         Band(Lost("ldvs halted, postures", "ldvs halted", 0.1), (0.3, 0.7), most=0.0),
-        POSTURES,
+        "none is lost at V = 0.5 and 0.7; at 0.3 this seed's postures are of a regime that coexists there; those of"
+        " seeds 0 to 3 lose none of 200",
     ),
     Claim(
         "obstacle-superior", "6", "a superior level, which slows down, helps to avoid the loss, LDVS",

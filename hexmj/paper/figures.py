@@ -58,20 +58,39 @@ CURVES: dict[int, dict[str, tuple[str, dict[str, Any]]]] = {
 """Figures of FLSS: by their numbers, the measurements drawn, each with its label and the symbols of the paper."""
 
 
-def figure_5(measured: Measured) -> "tuple[Figure, xr.Dataset]":
-    """Phases of legs 2 (upper line) and 3 (lower line) relative to leg 1, HWS."""
-    return _phase_figure(measured["hws gaits"], HWS)
+def phase_figure(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
+    """Phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks; those of
+    Wilson's Gait II as crosses beside LDVS."""
+    import xarray as xr
 
-
-def figure_6(measured: Measured) -> "tuple[Figure, xr.Dataset]":
-    """Phases of legs 2 (upper line) and 3 (lower line) relative to leg 1, LDVS, with Wilson's Gait II (crosses)."""
-    figure, data = _phase_figure(measured["ldvs gaits"], LDVS)
-    (axes,) = figure.axes
-    v = data.velocity.values
-    data["wilson"] = (("leg", "velocity"), np.array([wilson_phase(v), 2 * wilson_phase(v) - 1]))
-    for leg in data.leg.values:
-        label = "Gait II (Wilson)" if leg == 2 else None
-        axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
+    gaits, colour = measured[f"{model} gaits"], MODELS[model]
+    v = gaits.velocity.values
+    phase = np.full((len(RELATIVE), len(v), gaits.sizes["start"]), np.nan)  # (leg, velocity, start)
+    peak = np.full((len(RELATIVE), len(v)), np.nan)
+    for i, (_, one) in enumerate(kept_gaits(gaits)):
+        second = one.phase.sel(pair="1-2").values
+        third = (second + one.phase.sel(pair="2-3").values) % 1.0
+        for row, values in enumerate((second, third)):
+            phase[row, i, : len(values)] = values
+            if len(values):
+                peak[row, i] = circular_mean(values[main_peak(values)])
+    dims = ("leg", "velocity")
+    data = xr.Dataset(
+        {"phase": ((*dims, "gait"), phase, {"units": "1"}), "main_peak": (dims, peak, {"units": "1"})},
+        {"velocity": v, "leg": list(RELATIVE)},
+    )
+    figure = _figure(6.4, 4.6)
+    axes = figure.subplots()
+    for row, (leg, marker) in enumerate(RELATIVE.items()):
+        axes.plot(np.repeat(v, phase.shape[2]), phase[row].ravel(), ".", color=colour, markersize=4, alpha=0.25,
+                  label="single starts" if row == 0 else None)  # fmt: skip
+        label = f"leg {leg} relative to leg 1"
+        axes.plot(v, peak[row], color=colour, marker=marker, markersize=5, linewidth=1.3, label=label)
+    if model == "ldvs":
+        data["wilson"] = (dims, np.array([wilson_phase(v), 2 * wilson_phase(v) - 1]))
+        for leg, label in zip(RELATIVE, ("Gait II (Wilson)", None), strict=True):
+            axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
+    axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 
@@ -168,37 +187,6 @@ def _samples(lost: "xr.DataArray") -> "xr.Dataset":
     )
 
 
-def _phase_figure(gaits: "xr.Dataset", colour: str) -> "tuple[Figure, xr.Dataset]":
-    """Phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks."""
-    import xarray as xr
-
-    v = gaits.velocity.values
-    phase = np.full((len(RELATIVE), len(v), gaits.sizes["start"]), np.nan)  # (leg, velocity, start)
-    peak = np.full((len(RELATIVE), len(v)), np.nan)
-    for i, (_, one) in enumerate(kept_gaits(gaits)):
-        second = one.phase.sel(pair="1-2").values
-        third = (second + one.phase.sel(pair="2-3").values) % 1.0
-        for row, values in enumerate((second, third)):
-            phase[row, i, : len(values)] = values
-            if len(values):
-                peak[row, i] = circular_mean(values[main_peak(values)])
-    dims = ("leg", "velocity")
-    data = xr.Dataset(
-        {"phase": ((*dims, "gait"), phase, {"units": "1"}), "main_peak": (dims, peak, {"units": "1"})},
-        {"velocity": v, "leg": list(RELATIVE)},
-    )
-    figure = _figure(6.4, 4.6)
-    axes = figure.subplots()
-    for row, (leg, marker) in enumerate(RELATIVE.items()):
-        axes.plot(np.repeat(v, phase.shape[2]), phase[row].ravel(), ".", color=colour, markersize=4, alpha=0.25,
-                  label="single starts" if row == 0 else None)  # fmt: skip
-        label = f"leg {leg} relative to leg 1"
-        axes.plot(v, peak[row], color=colour, marker=marker, markersize=5, linewidth=1.3, label=label)
-    axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
-    axes.legend(frameon=False, fontsize=10)
-    return figure, data
-
-
 def _figure(width: float, height: float) -> "Figure":
     from hexmj.pictures import picture
 
@@ -213,8 +201,8 @@ FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
         for number, curves in CURVES.items()
         for window in WINDOWS
     },
-    "figure-5": (("hws gaits",), figure_5),
-    "figure-6": (("ldvs gaits",), figure_6),
+    "figure-5": (("hws gaits",), partial(phase_figure, model="hws")),
+    "figure-6": (("ldvs gaits",), partial(phase_figure, model="ldvs")),
     **{f"phases-{model}": ((f"{model} gaits",), partial(phase_histograms, model=model)) for model in MODELS},
     **{f"footfall-{model}": ((f"{model} footfall",), partial(footfall_diagrams, model=model)) for model in MODELS},
 }

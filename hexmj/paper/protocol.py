@@ -117,17 +117,14 @@ class Losses:
     late: bool = False
     """Look only after five periods of a single leg."""
     function = staticmethod(losses)
-
-    def velocities(self, protocol: Protocol) -> tuple[float, ...]:
-        """Where it is measured."""
-        return protocol.velocities
+    at = "velocities"
+    """Field of a protocol: where it is measured."""
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """All that its outcomes depend on."""
+        """All that its outcomes depend on, but for velocity and seed."""
         return {
             "sets": tuple(protocol.network(self.preset, window, velocity) for window in WINDOWS),
             "n_starts": protocol.samples * protocol.sample,
-            "seed": protocol.seed,
             "stride": protocol.stride,
             "acceleration": protocol.acceleration if self.accelerated else None,
             "late": self.late,
@@ -144,16 +141,16 @@ class Gaits:
     accelerated: bool = True
     function = staticmethod(limit_regimes)
 
-    def velocities(self, protocol: Protocol) -> tuple[float, ...]:
-        """Where it is measured."""
-        return protocol.gait_velocities if self.accelerated else protocol.velocities
+    @property
+    def at(self) -> str:
+        """See `Losses.at`."""
+        return "gait_velocities" if self.accelerated else "velocities"
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """All that its outcomes depend on."""
+        """All that its outcomes depend on, but for velocity and seed."""
         return {
             "controller": protocol.network(self.preset, "walk", velocity),
             "n_starts": protocol.gait_starts,
-            "seed": protocol.seed,
             "stride": protocol.gait_stride if self.accelerated else protocol.stride,
             "acceleration": protocol.acceleration if self.accelerated else None,
         }
@@ -165,15 +162,15 @@ class Footfall:
 
     preset: str
     function = staticmethod(footfalls)
-
-    def velocities(self, protocol: Protocol) -> tuple[float, ...]:
-        """Where it is measured."""
-        return protocol.footfall_velocities
+    at = "footfall_velocities"
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """All that its outcomes depend on."""
-        constants = {"stride": protocol.stride, "acceleration": protocol.acceleration}
-        return {"controller": protocol.network(self.preset, "walk", velocity), "seed": protocol.seed} | constants
+        """All that its outcomes depend on, but for velocity and seed."""
+        return {
+            "controller": protocol.network(self.preset, "walk", velocity),
+            "stride": protocol.stride,
+            "acceleration": protocol.acceleration,
+        }
 
 
 @dataclass(frozen=True)
@@ -183,18 +180,14 @@ class Obstacles:
     preset: str
     answer: Answer
     function = staticmethod(losses_after)
-
-    def velocities(self, protocol: Protocol) -> tuple[float, ...]:
-        """Where it is measured."""
-        return protocol.obstacle_velocities
+    at = "obstacle_velocities"
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """All that its outcomes depend on."""
+        """All that its outcomes depend on, but for velocity and seed."""
         return {
             "controller": protocol.network(self.preset, "walk", velocity),
             "answer": self.answer,
             "n_starts": protocol.obstacle_starts,
-            "seed": protocol.seed,
             "stride": protocol.stride,
             "acceleration": protocol.acceleration if self.answer == "slow down" else None,
         }
@@ -238,6 +231,11 @@ SECONDS = {
 """That the long ones take on two cores, for the progress bar; the others take about one."""
 
 
+def velocities_of(name: str, protocol: Protocol) -> tuple[float, ...]:
+    """Where one of `MEASUREMENTS` is taken."""
+    return getattr(protocol, MEASUREMENTS[name].at)
+
+
 def cells(name: str, protocol: Protocol) -> list[Cell]:
     """One of `MEASUREMENTS`, a cell for each velocity.
 
@@ -246,10 +244,11 @@ def cells(name: str, protocol: Protocol) -> list[Cell]:
     """
     if name not in MEASUREMENTS:
         raise InputError(f"measurement {name!r:.80}; valid names: {', '.join(MEASUREMENTS)}")
-    measurement = MEASUREMENTS[name]
-    velocities = measurement.velocities(protocol)
+    measurement, velocities = MEASUREMENTS[name], velocities_of(name, protocol)
     work = SECONDS.get(name, 1.0) / len(velocities)
-    return [
-        Cell(f"{name} {v:g}", measurement.function, {"velocity": v} | measurement.settings(v, protocol), work)
-        for v in velocities
-    ]
+
+    def cell(v: float) -> Cell:
+        told = {"velocity": v, "seed": protocol.seed} | measurement.settings(v, protocol)
+        return Cell(f"{name} {v:g}", measurement.function, told, work)
+
+    return [cell(v) for v in velocities]

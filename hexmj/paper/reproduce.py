@@ -1,7 +1,8 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
@@ -10,11 +11,11 @@ from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError, check_distinct
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES, SAMPLES
-from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells
+from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
 from hexmj.storage import results
 from hexmj.storage.results import json_text, results_folder, save_dataset, save_text
-from hexmj.sweeps import Execution, finish, over_axes, run
+from hexmj.sweeps import Execution, over_axes, run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,10 +55,10 @@ def reproduce(
     readings = {name: named_reading(name) for name in beside}
     results_folder(out := path_of(out), TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
-    measured = dict(_measurements(_needed(claims, figures=not only), protocol, out / KEPT, how))
+    measured = _measurements(_needed(claims, figures=not only), protocol, out / KEPT, how)
     rows = [judge(claim, measured) for claim in claims]
     for name, reading in readings.items():
-        other = dict(_measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, how))
+        other = _measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, how)
         rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
     texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
     files = [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
@@ -80,23 +81,15 @@ def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
     return [name for name in MEASUREMENTS if name in needed]
 
 
-def _measurements(
-    names: Sequence[str], protocol: Protocol, folder: Path, how: Execution
-) -> "Iterator[tuple[str, xr.Dataset]]":
-    """Measurements, each as soon as it has come together, from one sweep over the velocities of all."""
+def _measurements(names: Sequence[str], protocol: Protocol, folder: Path, how: Execution) -> "dict[str, xr.Dataset]":
+    """Measurements from one sweep over the velocities of all."""
     parts = {name: cells(name, protocol) for name in names}
-    places = [(name, row) for name, part in parts.items() for row in range(len(part))]
-    found: dict[str, dict[int, xr.Dataset]] = {name: {} for name in names}
-    for i, data in finish([cell for part in parts.values() for cell in part], folder, **how):
-        name, row = places[i]
-        found[name][row] = data
-        if len(found[name]) == len(parts[name]):
-            rows = found.pop(name)
-            yield name, _over_velocities(name, protocol, [rows[row] for row in sorted(rows)])
+    data = iter(run([cell for part in parts.values() for cell in part], folder, **how))
+    return {name: _over_velocities(name, protocol, [*islice(data, len(part))]) for name, part in parts.items()}
 
 
 def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]") -> "xr.Dataset":
-    velocities = list(MEASUREMENTS[name].velocities(protocol))
+    velocities = list(velocities_of(name, protocol))
     return over_axes({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(velocity=velocities)
 
 

@@ -66,15 +66,10 @@ def thread_count(threads: int | None = None) -> int:
 def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads: int | None = None) -> None:
     """Call ``work(begin, end)`` for consecutive blocks of range(size); results must not depend on the order."""
     count = thread_count(threads)
-    bounds = [(begin, min(begin + block, size)) for begin in range(0, size, block)]
-    if count == 1 or len(bounds) == 1:
-        for begin, end in bounds:
-            work(begin, end)
+    begins = range(0, size, block)
+    ends = [min(begin + block, size) for begin in begins]
+    if count == 1 or len(ends) == 1:
+        list(map(work, begins, ends))
         return
     with ThreadPoolExecutor(count) as pool:
-        futures = [pool.submit(work, begin, end) for begin, end in bounds]
-        try:
-            for future in futures:
-                future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        list(pool.map(work, begins, ends))  # which cancels the others after an error

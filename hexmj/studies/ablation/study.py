@@ -14,12 +14,11 @@ from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.frequencies import came, differences, frequencies, padded
-from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_part
+from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_counts
 from hexmj.studies.short_names import short_names
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
@@ -98,9 +97,7 @@ class Ablation:
 
     def __post_init__(self) -> None:
         check_types(self)
-        for count in (self.n_starts, self.n_physical):
-            check_draw(count, self.seed)
-        check_part(self, "n_physical")
+        check_counts(self, "n_physical")
         whole("periods", self.periods, CYCLES + 2)
         if not self.models:
             raise InputError("no controller was given; expected at least one")

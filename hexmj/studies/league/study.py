@@ -1,6 +1,6 @@
 """The league: every entrant on paper, in physics, and in every trial; a cell for each."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -43,17 +43,10 @@ REGIMES = 50
 """Starts whose limit regime is looked at, at most."""
 
 
-def check_part(study: Any, *names: str) -> None:
-    """Refuse more starts in physics than there are on paper, of which they are a part.
-
-    Args:
-        study: has `n_starts`.
-        names: of its other numbers of starts.
-
-    Raises:
-        InputError: one is above it.
-    """
-    for name in names:
+def check_counts(study: Any, *names: str) -> None:
+    """Refuse numbers of starts that make no sense, and more in physics, by the names of their fields, than on paper."""
+    for name in ("n_starts", *names):
+        check_draw(getattr(study, name), study.seed)
         if getattr(study, name) > study.n_starts:
             raise InputError(f"{name} = {getattr(study, name)}; expected at most n_starts = {study.n_starts}")
 
@@ -89,9 +82,7 @@ class League:
 
     def __post_init__(self) -> None:
         check_types(self)
-        for count in (self.n_starts, self.n_physical, self.n_tried):
-            check_draw(count, self.seed)
-        check_part(self, "n_physical", "n_tried")
+        check_counts(self, "n_physical", "n_tried")
         whole("periods", self.periods, CYCLES + 2)
         if not self.entrants:
             raise InputError("no controller was given; expected at least one")
@@ -109,11 +100,7 @@ class League:
 
     def named_cells(self) -> dict[tuple[str, str], Cell]:
         """Every cell by its entrant and what it is asked."""
-        asked = {
-            name: self._on_paper(entrant) | self._in_physics(entrant) | ({} if entrant.ideal else self._random(entrant))
-            for name, entrant in self.entrants.items()
-        }
-        return {(name, what): cell for name, cells in asked.items() for what, cell in cells.items()}
+        return {(name, what): cell for name, entrant in self.entrants.items() for what, cell in self._asked(entrant)}
 
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`."""
@@ -123,86 +110,58 @@ class League:
         """All that the table, the figures and the ranks are made of; see `standings.standings`."""
         from hexmj.studies.league.standings import standings
 
-        told = (
-            "velocities",
-            "n_starts",
-            "n_physical",
-            "n_tried",
-            "tried_at",
-            "window",
-            "periods",
-            "seed",
-            "accelerating",
-        )
+        told = ("velocities", "n_starts", "n_physical", "n_tried", "tried_at", "window", "periods", "seed")
+        told += ("accelerating",)
         settings: dict[str, Any] = {"study": "league"} | {name: plain(getattr(self, name)) for name in told}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
         settings["controllers"] = {name: plain(entrant) for name, entrant in self.entrants.items()}
         settings["not_printed"] = not_printed(settings)
         return standings(self, dict(zip(self.named_cells(), data, strict=True))).assign_attrs(attributes(settings))
 
-    def _on_paper(self, entrant: Entrant) -> dict[str, Cell]:
-        """Losses at every velocity."""
-        return {
-            f"paper {v}": self._cell(
-                f"paper-V-{v:g}", paper.losses, time * PAPER, entrant, {"velocity": v, "window": self.window}
-            )
-            for v, time in self._velocities
-        }
-
-    def _in_physics(self, entrant: Entrant) -> dict[str, Cell]:
-        """Walks at every velocity."""
+    def _asked(self, entrant: Entrant) -> Iterator[tuple[str, Cell]]:
+        """Every cell of an entrant by what it is asked: random starts alone for regimes and in trials, too."""
         from hexmj.studies.league import physics
 
-        how = {"controller": entrant.controller, "window": self.window, "conditions": self.conditions}
-        how["n_starts"] = self.n_physical
-        return {
-            f"physics {v}": self._cell(f"physics-V-{v:g}", physics.walks, time, entrant, how | {"velocity": v})
-            for v, time in self._velocities
-        }
-
-    def _random(self, entrant: Entrant) -> dict[str, Cell]:
-        """What random starts alone are asked."""
         window = {"window": self.window}
-        few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-        found = {
-            f"regime {v}": self._cell(
-                f"regime-V-{v:g}", paper.regimes, 20 * time * PAPER, entrant, few | {"velocity": v}
-            )
-            for v, time in self._velocities
-        }
-        over = window | dict(zip(("low", "high"), RANGE, strict=True))
-        found["range"] = self._cell("range", paper.losses_over_range, 600 * PAPER, entrant, over)
+        walked = window | {"controller": entrant.controller, "conditions": self.conditions}
+        at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
+        for v, time in at:
+            own = window | {"velocity": v}
+            yield f"paper {v}", self._cell(f"paper-V-{v:g}", paper.losses, time * PAPER, entrant, own)
+        for v, time in at:
+            own = walked | {"velocity": v, "n_starts": self.n_physical}
+            yield f"physics {v}", self._cell(f"physics-V-{v:g}", physics.walks, time, entrant, own)
+        if entrant.ideal:
+            return
+        for v, time in at:
+            own = {"velocity": v, "n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
+            yield f"regime {v}", self._cell(f"regime-V-{v:g}", paper.regimes, 20 * time * PAPER, entrant, own)
+        own = window | dict(zip(("low", "high"), RANGE, strict=True))
+        yield "range", self._cell("range", paper.losses_over_range, 600 * PAPER, entrant, own)
         if self.accelerating:
-            eq11 = window | {"velocity": FINAL, "acceleration": Acceleration()}
-            found["accelerated"] = self._cell("accelerated", paper.losses, 10_000 * PAPER, entrant, eq11)
-        return found | self._lamed(entrant) | self._tried(entrant)
+            own = window | {"velocity": FINAL, "acceleration": Acceleration()}
+            yield "accelerated", self._cell("accelerated", paper.losses, 10_000 * PAPER, entrant, own)
+        tried = window | {"velocity": self.tried_at}
+        for trial, leg in LEGS_LOST.items():
+            own = tried | {"leg_lost": leg}
+            yield f"paper, {trial}", self._cell(f"paper-{trial}", paper.losses, 200 * PAPER, entrant, own)
+        for trial, function, cost, own in self._tried(entrant):
+            yield trial, self._cell(trial, function, cost, entrant, tried | own | {"n_starts": self.n_tried})
 
-    def _lamed(self, entrant: Entrant) -> dict[str, Cell]:
-        """Losses on paper without one leg."""
-        at = {"velocity": self.tried_at, "window": self.window}
-        return {
-            f"paper, {trial}": self._cell(f"paper-{trial}", paper.losses, 200 * PAPER, entrant, at | {"leg_lost": leg})
-            for trial, leg in LEGS_LOST.items()
-        }
-
-    def _tried(self, entrant: Entrant) -> dict[str, Cell]:
-        """Every trial that the entrant can take."""
+    def _tried(self, entrant: Entrant) -> Iterator[tuple[str, Callable[..., Any], float, dict[str, Any]]]:
+        """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
         from hexmj.studies.disturbance.disturbances import GRID
         from hexmj.studies.league import physics
 
-        found: dict[str, Cell] = {}
-        at = {"velocity": self.tried_at, "window": self.window, "n_starts": self.n_tried}
         way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
         for trial in TRIALS:
             if trial in DISTURBED and entrant.steerable:
-                how = at | {"case": DISTURBED[trial], "conditions": self.conditions, "grid": GRID}
-                found[trial] = self._cell(trial, physics.disturbed, 300, entrant, how)
+                how = {"case": DISTURBED[trial], "conditions": self.conditions, "grid": GRID}
+                yield trial, physics.disturbed, 300, how
             elif trial in DISTURBED or (trial in GROUNDS and way < CROSSED):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
-                how = at | {"controller": one.controller, "conditions": one.conditions}
-                found[trial] = self._cell(trial, physics.walks, 180, entrant, how)
-        return found
+                yield trial, physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}
 
     def _cell(
         self, name: str, function: Callable[..., Any], time: float, entrant: Entrant, own: Mapping[str, Any]
@@ -210,8 +169,3 @@ class League:
         """A cell whose cost goes by the time walked, of all starts unless its own settings say how many."""
         told = {"entrant": entrant, "n_starts": self.n_starts, "seed": self.seed, "stride": self.stride, **own}
         return Cell(f"{entrant.controller.name}-{name}", function, told, float(time * told["n_starts"]))
-
-    @property
-    def _velocities(self) -> list[tuple[float, float]]:
-        """Every velocity with its observation time [time units]."""
-        return [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]

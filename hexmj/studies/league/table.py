@@ -41,8 +41,10 @@ def tables(result: "xr.Dataset") -> list[Table]:
     """
     check_axes(result)
     with what_parts_may_lack(result, "the tables of a league cannot be made"):
-        over_velocity = [_over_velocity(result, measure, title) for measure, title in MEASURES.items()]
-        return [_ranks(result), *over_velocity, _regimes(result), _trials(result), _costs(result)]
+        shown = by_rank(result)
+        over_velocity = [_over_velocity(shown, measure, title) for measure, title in MEASURES.items()]
+        at = shown.isel(velocity=int(np.abs(shown.velocity.values - shown.attrs["tried_at"]).argmin()))  # or nearest
+        return [_ranks(shown), *over_velocity, _regimes(at), _trials(shown), _costs(at)]
 
 
 def league_markdown(result: "xr.Dataset") -> str:
@@ -73,10 +75,13 @@ def frequency(one: "xr.Dataset", name: str) -> str:
     return "-" if np.isnan(middle) else f"{_short(middle)} ({_short(low)}-{_short(high)})"
 
 
-def _ranks(result: "xr.Dataset") -> Table:
-    rows, controllers = [], settings(result)["controllers"]
-    for name in (shown := by_rank(result)).entrant.values:
-        one = shown.sel(entrant=name)
+def _entrants(shown: "xr.Dataset") -> "list[tuple[str, xr.Dataset]]":
+    return [(name, shown.sel(entrant=name)) for name in shown.entrant.values]
+
+
+def _ranks(shown: "xr.Dataset") -> Table:
+    rows, controllers = [], settings(shown)["controllers"]
+    for name, one in _entrants(shown):
         told = f" ({words})" if (words := rules(controllers[name])) else ""
         told += f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
         places = [_mean(one[measure]) + place(one.sel(measure=measure)) for measure in MEASURES]
@@ -101,15 +106,15 @@ def place(one: "xr.Dataset") -> str:
     return "" if best == 0 else f" ({best})" if best == worst else f" (={best}-{worst})"
 
 
-def _over_velocity(result: "xr.Dataset", measure: str, title: str) -> Table:
+def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
     rows = []
-    for name in (shown := by_rank(result)).entrant.values:
-        cells = (shown.sel(entrant=name).isel(velocity=i) for i in range(result.sizes["velocity"]))
+    for name, one in _entrants(shown):
+        cells = (one.isel(velocity=i) for i in range(shown.sizes["velocity"]))
         rows.append((name, *(frequency(one, measure) + _left(one, measure) + _against(one, measure) for one in cells)))
-    reference, starts = result.attrs["reference"], result[f"{measure}_starts"].max().item()
+    reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
     told = f"{title} of {starts} starts"
     told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
-    return Table(told, ("controller", *(f"V = {v:g}" for v in result.velocity.values)), rows)
+    return Table(told, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
 
 def _against(one: "xr.Dataset", measure: str) -> str:
@@ -117,11 +122,9 @@ def _against(one: "xr.Dataset", measure: str) -> str:
     return f" {LESS}" if high < 0 else f" {MORE}" if low > 0 else ""
 
 
-def _regimes(result: "xr.Dataset") -> Table:
-    at = _at_trials(result)
+def _regimes(at: "xr.Dataset") -> Table:
     rows = []
-    for name in at.entrant.values:
-        one = at.sel(entrant=name)
+    for name, one in _entrants(at):
         shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
         phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
         regime = *shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"
@@ -130,33 +133,25 @@ def _regimes(result: "xr.Dataset") -> Table:
     return Table(f"Limit regimes at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows)
 
 
-def _trials(result: "xr.Dataset") -> Table:
-    rows, most = [], result.fell_starts.max().item()
-    for name in (shown := by_rank(result)).entrant.values:
-        one = shown.sel(entrant=name)
+def _trials(shown: "xr.Dataset") -> Table:
+    rows, most = [], shown.fell_starts.max().item()
+    for name, one in _entrants(shown):
         falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
         rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
-    v = result.attrs["tried_at"]
+    v = shown.attrs["tried_at"]
     title = f"Falls at V = {v:g} in {most} starts; at last losses on paper without a leg.  {TOLD}"
-    return Table(title, ("controller", *result.trial.values, "paper"), rows)
+    return Table(title, ("controller", *shown.trial.values, "paper"), rows)
 
 
-def _costs(result: "xr.Dataset") -> Table:
-    at = _at_trials(result)
+def _costs(at: "xr.Dataset") -> Table:
     rows = []
-    for name in at.entrant.values:
-        one = at.sel(entrant=name)
+    for name, one in _entrants(at):
         cells = [f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque")]
         cells.append(f"{one.torque.item() / WEDGED:.2f}")
         missing = f" (walks missing: {one.missing.item():g})" if one.missing else ""
         rows.append((name + missing, *map(_known, cells)))
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
     return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
-
-
-def _at_trials(result: "xr.Dataset") -> "xr.Dataset":
-    """The entrants in their order at the velocity of the trials, or that nearest to it."""
-    return by_rank(result).isel(velocity=int(np.abs(result.velocity.values - result.attrs["tried_at"]).argmin()))
 
 
 def _short(value: float) -> str:

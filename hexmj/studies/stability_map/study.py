@@ -119,7 +119,7 @@ class StabilityMap(SameStarts):
         from hexmj.studies.stability_map.differences import froude, with_differences
 
         table = self._over_values(data)
-        usual = _usual(self.over)
+        usual = Conditions().flat()[self.over]
         reference = usual if usual in self.chosen else self.chosen[0]
         numbers = np.array([froude(one, self.observed[0]) for one in self.varied])
         table = with_differences(table, reference).assign(froude=(("value", "velocity"), numbers, {"units": "1"}))
@@ -141,7 +141,3 @@ class StabilityMap(SameStarts):
             value=("value", self.chosen, {"units": condition.unit, "long_name": condition.name}),
             mechanism_name=("mechanism_name", list(MECHANISMS)),
         ).assign(stand=("value", stand, {"units": "1", "long_name": "starts that stand on six feet"}))
-
-
-def _usual(over: Over) -> float:
-    return Conditions().flat()[over]
