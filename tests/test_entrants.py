@@ -103,6 +103,24 @@ def test_an_ideal_start_is_one_start() -> None:
         Entrant(Many(), ideal=True).starts(1, 0, 0.5, Stride())
 
 
+def test_an_ideal_start_may_be_a_list_but_not_another_each_time() -> None:
+    @dataclass(frozen=True)
+    class Listed(Still):
+        def ideal_start(self, velocity, stride):
+            return [[1, 2, 3, 4, 5, -6]]
+
+    assert Entrant(Listed(), ideal=True).starts(3, 0, 0.5, Stride()).tolist() == [[1.0, 2.0, 3.0, 4.0, 5.0, -6.0]]
+    draws = np.random.default_rng(0)
+
+    @dataclass(frozen=True)
+    class Drawn(Still):
+        def ideal_start(self, velocity, stride):
+            return draws.uniform(-10.0, 10.0, (1, 6))
+
+    with pytest.raises(InputError, match="still, ideal_start gave another start when it was asked again"):
+        Entrant(Drawn(), ideal=True).starts(3, 0, 0.5, Stride())
+
+
 def test_an_ideal_start_that_raises_is_one_sentence() -> None:
     @dataclass(frozen=True)
     class Gone(Still):

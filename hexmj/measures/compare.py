@@ -14,6 +14,7 @@ from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
 from hexmj.measures.velocities import observed, several, velocity_axis
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw, draw_starts
 from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell, Execution, conduct, over_axes
@@ -75,10 +76,9 @@ class Comparison:
         """See `sweeps.Study`; each is an `outcome_table`."""
         from hexmj.measures.outcome_table import outcome_table
 
-        same = {name: getattr(self, name) for name in ("n_starts", "seed", "conditions", "stride", "acceleration")}
-
+        same = self.n_starts, self.seed, self.conditions, self.stride, self.acceleration
         return [
-            Cell(f"{name}-V-{v:g}", outcome_table, same | {"controller": one, "velocity": v, "duration": t}, work=t)
+            Cell(f"{name}-V-{v:g}", outcome_table, {"walks": WalkSettings(one, v, t, *same)}, work=t)
             for name, one in self.controllers.items()
             for v, t in zip(*self.observed, strict=True)
         ]

@@ -1,18 +1,19 @@
 """How every start goes, as a table: the cell of all sweeps that need nothing else of a physical walk."""
 
-from dataclasses import fields
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
 from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.outcomes import Outcomes
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import Settled, settle
 from hexmj.process.progress import Progress
 from hexmj.starts import draw_starts
 from hexmj.storage.mjcf import content
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,38 +40,19 @@ def settled_starts(
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
 
 
-def outcome_table(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    *,
-    n_starts: int,
-    seed: int,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> "xr.Dataset":
-    """Every field of `Outcomes` over start; arguments as of `physical.physical_outcomes`.
+def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
+    """Every field of `Outcomes` over start."""
+    files = content(walks.conditions.body.mjcf)
+    settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads, files)
+    outcomes = physical_outcomes(
+        settled, walks.controller, walks.velocity, walks.duration,
+        acceleration=walks.acceleration, threads=threads, progress=progress,
+    )  # fmt: skip
+    return over_start(vars(outcomes), UNITS)
 
-    Args:
-        controller: plans the walks.
-        velocity: V_r, or its final value.
-        duration: observation time [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        conditions: of the physical walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the table does not depend on it.
-        progress: told the fraction done since it was last called.
-    """
+
+def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> "xr.Dataset":
+    """A table of columns over start; those whose unit is not told are numbers."""
     import xarray as xr
 
-    settled = settled_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
-    outcomes = physical_outcomes(
-        settled, controller, velocity, duration, acceleration=acceleration, threads=threads, progress=progress
-    )
-    columns = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
-    return xr.Dataset({name: ("start", values, {"units": UNITS.get(name, "1")}) for name, values in columns.items()})
+    return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})

@@ -1,6 +1,6 @@
 """What studies have in common: one controller plans, and the same starts walk in every cell."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,9 +9,9 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import settings
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
-from hexmj.sweeps import Cell
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -52,17 +52,10 @@ class SameStarts:
         """Conditions that are varied, and the names of the lists in which they are given."""
         return {}
 
-    def cell(self, name: str, function: Callable[..., Any], work: float, **own: Any) -> Cell:
-        """A cell whose function walks all starts.
-
-        Args:
-            name: for people.
-            function: takes what `measures.outcome_table.outcome_table` takes, and whatever else is its own.
-            work: relative cost.
-            own: `velocity`, `duration` and `conditions`, and further settings.
-        """
-        same = "controller", "n_starts", "seed", "stride", "acceleration"
-        return Cell(name, function, {name: getattr(self, name) for name in same} | own, work)
+    def walks(self, velocity: float, duration: float, conditions: Conditions) -> WalkSettings:
+        """What a cell is told that walks all starts."""
+        same = self.n_starts, self.seed, conditions, self.stride, self.acceleration
+        return WalkSettings(self.controller, velocity, duration, *same)
 
     def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
         """A result with all that is needed to run the study again: what all studies have, and its own; conditions but

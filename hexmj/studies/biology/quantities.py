@@ -6,17 +6,14 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.reading import joint_numbers, posed
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.legs import SIDE
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import settle
 from hexmj.process.threads import check_memory
 from hexmj.rotations import heading, rotated, turned
-from hexmj.starts import draw_starts
 from hexmj.studies.biology.names import EACH, JOINTS, SEGMENTS, UNITS
 from hexmj.studies.biology.strides import Strides, last_strides
-from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,43 +31,21 @@ TO_MN_MM, TO_J_PER_KG_M = 1e-3, 1e-3
 """From g mm^2/s^2 and from mm/s^2."""
 
 
-def quantity_table(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    measured: float,
-    *,
-    n_starts: int,
-    seed: int,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None,
-    threads: int | None = None,
-) -> "xr.Dataset":
-    """Every quantity of every start, over (quantity, start); NaN where the start fell.
-
-    Args:
-        controller: plans the walks.
-        velocity: V_r.
-        duration: of the walks [time units].
-        measured: how much of it counts, at its end [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        conditions: of the walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: none.
-        threads: one per core unless given; the table does not depend on it.
+def quantity_table(walks: WalkSettings, measured: float, threads: int | None = None) -> "xr.Dataset":
+    """Every quantity of every start, over (quantity, start), within the last time that is `measured` [time units]; NaN
+    where the start fell.
 
     Raises:
         InputError: the strides do not fit into memory.
     """
     import xarray as xr
 
+    n_starts, conditions, stride = walks.n_starts, walks.conditions, walks.stride
     steps = measured / stride.dt * conditions.substeps(stride)
     check_memory(f"the last strides of {n_starts} starts", KEPT * steps * n_starts)
-    settled = settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
+    settled = settle(walks.starts, conditions, stride, threads)
     values = np.full((len(UNITS), n_starts), np.nan)
-    for start, strides in last_strides(settled, controller, velocity, duration, measured, threads):
+    for start, strides in last_strides(settled, walks.controller, walks.velocity, walks.duration, measured, threads):
         values[:, start] = list(quantities(strides, settled.compiled).values())
     return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 

@@ -49,10 +49,9 @@ class Biology(SameStarts):
         def cell(speed: float) -> Cell:
             velocity = speed / self.conditions.time.vp
             period = float(self.stride.periods(velocity))
-            return self.cell(
-                f"{speed:g}-mm-s", quantity_table, 1 / velocity, velocity=velocity, conditions=self.conditions,
-                duration=self.periods * period, measured=MEASURED * period,
-            )  # fmt: skip
+            walks = self.walks(velocity, self.periods * period, self.conditions)
+            own = {"walks": walks, "measured": MEASURED * period}
+            return Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity)
 
         return [cell(speed) for speed in SPEEDS]
 

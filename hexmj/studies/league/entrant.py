@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, numbers
 from hexmj.controllers.asking import begin, said
 from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type, is_steerable
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -48,7 +48,9 @@ class Entrant:
         if not (self.ideal and isinstance(self.controller, HasIdealStart)):
             return draw_starts(n_starts, seed, stride)
         with said(name := f"{self.controller.name}, ideal_start"):
-            start = self.controller.ideal_start(velocity, stride)
+            start, again = (numbers(name, self.controller.ideal_start(velocity, stride)) for _ in range(2))
+        if not np.array_equal(start, again, equal_nan=True):
+            raise InputError(f"{name} gave another start when it was asked again; expected the same numbers each time")
         if np.shape(start) != (1, len(LEGS)):
             raise InputError(
                 f"{name} gave something of the shape {np.shape(start)}; expected the tips of one start, (1, 6)"

@@ -29,16 +29,10 @@ def losses(
 ) -> "xr.Dataset":
     """Whether each start loses static stability on paper, `lost`, over start.
 
-    Args:
+    Args, beside those of `WalkSettings`:
         entrant: who walks.
-        velocity: V_r, or its final value.
         window: 'walk', 'start' or the observation time [time units]; a number, too, from when on V_r is reached.
-        n_starts: number of starts.
-        seed: of the starts.
-        stride: step range, lines of the tips and time step.
-        acceleration: Eq. 11.
         leg_lost: index of a leg that is lost.
-        threads: one per core unless given; the answers do not depend on it.
     """
     controller = entrant.controller if leg_lost is None else LegLost(entrant.controller, leg_lost)
     starts = entrant.starts(n_starts, seed, velocity, stride)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from hexmj.controllers.asking import begin, check_repeats
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.outcome_table import UNITS
+from hexmj.measures.outcome_table import UNITS, over_start
 from hexmj.physics.drive import drive
 from hexmj.physics.effort import EffortSoFar
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
@@ -78,16 +78,10 @@ def walks(
 ) -> "xr.Dataset":
     """How every start goes.
 
-    Args:
+    Args, beside those of `WalkSettings`:
         entrant: with whose starts it is walked.
         controller: plans: the entrant's own, or what was made of it.
-        velocity: V_r.
         window: 'walk', 'start' or the observation time [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        conditions: of the walks.
-        stride: step range, lines of the tips and time step.
-        threads: one per core unless given; the outcomes do not depend on it.
 
     Returns:
         Over start all `Outcomes`; of the joints the `work` over the insect's weight [mm] and the greatest `torque` over
@@ -97,11 +91,24 @@ def walks(
         SimulationError: none of the random starts comes to rest, whoever walks.
     """
     starts = entrant.starts(n_starts, seed, velocity, stride)
-    how: Any = {"conditions": conditions, "stride": stride, "threads": threads}
-    walked = controller, velocity, float(observation_time(window, velocity, stride))
-    found = unless_refused(lambda which: _outcomes(starts[which], *walked, **how), len(starts), COLUMNS)
+    duration = float(observation_time(window, velocity, stride))
+
+    def walked(which: np.ndarray) -> "xr.Dataset":
+        some = starts[which]
+        check_repeats(controller, some, velocity, int(steps_within(duration, stride)), stride)
+        settled = settle(some, conditions, stride, threads)
+        lost = first_loss(some, controller, velocity, duration, stride=stride, threads=threads)
+        so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)
+        for chunk in drive(settled, begin(controller, some, velocity, stride), duration, threads=threads):
+            so_far.add(chunk)
+            effort.add(chunk)
+        outcomes = so_far.outcomes()
+        told = vars(outcomes) | {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
+        return over_start(told | {"way": np.minimum(outcomes.fall, duration) * velocity * outcomes.speed}, COLUMNS)
+
+    found = unless_refused(walked, len(starts), COLUMNS)
     if found.fall.isnull().all():
-        _check_settles(draw_starts(n_starts, seed, stride), **how)
+        _check_settles(draw_starts(n_starts, seed, stride), conditions, stride, threads)
     return found
 
 
@@ -115,33 +122,6 @@ def _check_settles(starts: np.ndarray, conditions: Conditions, stride: Stride, t
         except SimulationError as error:
             refused.append(error)
     raise refused[0]
-
-
-def _outcomes(
-    starts: np.ndarray,
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    *,
-    conditions: Conditions,
-    stride: Stride,
-    threads: int | None,
-) -> "xr.Dataset":
-    """Of all starts, (start, leg); see `walks`."""
-    import xarray as xr
-
-    check_repeats(controller, starts, velocity, int(steps_within(duration, stride)), stride)
-    settled = settle(starts, conditions, stride, threads)
-    lost = first_loss(starts, controller, velocity, duration, stride=stride, threads=threads)
-    so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)
-    for chunk in drive(settled, begin(controller, starts, velocity, stride), duration, threads=threads):
-        so_far.add(chunk)
-        effort.add(chunk)
-    outcomes = so_far.outcomes()
-    told = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
-    told |= {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
-    told["way"] = np.minimum(outcomes.fall, duration) * velocity * outcomes.speed
-    return xr.Dataset({name: ("start", told[name], {"units": units}) for name, units in COLUMNS.items()})
 
 
 def disturbed(
@@ -159,13 +139,11 @@ def disturbed(
 ) -> "xr.Dataset":
     """Whether starts `fell` that a disturbance met, over start: 1 or 0, or NaN where too few starts are stable until
     then, the insect fell before, or the walk is refused, see `unless_refused`; arguments as of `StableWalks`."""
-    import xarray as xr
-
     found = StableWalks(entrant.controller, velocity, n_starts, seed, stride, grid)
     asked = case, float(observation_time(window, velocity, stride)), None, conditions, threads
     try:
         times = unless_refused(lambda which: found.times(*asked, which)[[*DISTURBED]], n_starts, DISTURBED)
     except TooFewStable:
-        return xr.Dataset({"fell": ("start", np.full(n_starts, np.nan), {"units": "1"})})
+        return over_start({"fell": np.full(n_starts, np.nan)}, {})
     fell = came(times.fall).where(~(times.fall <= times.time))
-    return xr.Dataset({"fell": ("start", fell.values, {"units": "1"})})
+    return over_start({"fell": fell.values}, {})

@@ -1,23 +1,21 @@
 """What happens to every start at one velocity and one value of a condition: a cell of a stability map."""
 
-from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, SimulationError
-from hexmj.measures.outcome_table import UNITS
-from hexmj.measures.physical import PhysicalWalk, physical_walk
-from hexmj.physics.outcomes import Outcomes
+from hexmj.measures.outcome_table import UNITS, over_start
+from hexmj.measures.physical import PhysicalWalk, walk_of_settings
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import settle
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.storage.mjcf import content
 from hexmj.studies.stability_map.mechanisms import fall_direction, mechanisms, static_plan
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,53 +24,25 @@ BLOCK = 100
 """Starts walked at a time: their walks are kept whole, 0.5 GB at V = 0.1."""
 
 
-def fates(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    *,
-    n_starts: int,
-    seed: int,
-    over: str,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None,
-    threads: int | None = None,
-) -> "xr.Dataset":
+def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
     """Every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad], over start.
 
-    Args:
-        controller: plans the walks.
-        velocity: V_r, or its final value.
-        duration: observation time [time units].
-        n_starts: number of starts; those that cannot stand on six feet are left out.
-        seed: of the starts.
-        over: the condition that the map varies.
-        conditions: of the walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the table does not depend on it.
+    Starts that cannot stand on six feet are left out; `over` is the condition that the map varies.
 
     Raises:
         InputError, SimulationError: no start that stands; see `measures.physical.physical_walk`.
     """
-    import xarray as xr
-
-    stands = standing_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
+    n_starts, conditions = walks.n_starts, walks.conditions
+    files = content(conditions.body.mjcf)
+    stands = standing_starts(n_starts, walks.seed, conditions, walks.stride, threads, files)
     if not stands.size:
         value = conditions.flat()[over]
         raise InputError(f"{over} = {value:g}; none of {n_starts} starts stands on six feet there")
-    starts, parts = draw_starts(n_starts, seed, stride)[stands], []
-    for block in np.split(starts, range(BLOCK, len(starts), BLOCK)):
-        walk = physical_walk(
-            block, controller, velocity, duration,
-            conditions=conditions, stride=stride, acceleration=acceleration, threads=threads,
-        )  # fmt: skip
-        parts.append(_fates_of(walk, threads))
-    units = UNITS | {"static_loss": "time unit", "direction": "rad"}
+    starts = walks.starts[stands]
+    blocks = np.split(starts, range(BLOCK, len(starts), BLOCK))
+    parts = [_fates_of(walk_of_settings(walks, block, threads), threads) for block in blocks]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    variables = {name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()}
-    return xr.Dataset(variables, {"start": stands})
+    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(start=stands)
 
 
 @lru_cache(maxsize=1)
@@ -99,8 +69,7 @@ def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads:
 
 
 def _fates_of(walk: PhysicalWalk, threads: int | None) -> dict[str, np.ndarray]:
-    outcomes = {one.name: getattr(walk.outcomes, one.name) for one in fields(Outcomes)}
     static_loss = loss_time(static_plan(walk), threads=threads)
-    return outcomes | {
+    return vars(walk.outcomes) | {
         "static_loss": static_loss, "mechanism": mechanisms(walk), "direction": fall_direction(walk)
     }  # fmt: skip

@@ -97,8 +97,7 @@ class StabilityMap(SameStarts):
         def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
             name = f"{self.over}-{conditions.flat()[self.over]:g}-V-{velocity:g}"
             work = time * conditions.substeps(self.stride)
-            own = {"velocity": velocity, "duration": time, "conditions": conditions, "over": self.over}
-            return self.cell(name, fates, work, **own)
+            return Cell(name, fates, {"walks": self.walks(velocity, time, conditions), "over": self.over}, work)
 
         return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
 

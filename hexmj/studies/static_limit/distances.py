@@ -4,13 +4,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
-from hexmj.measures.physical import PhysicalWalk, physical_walk
+from hexmj.measures.physical import PhysicalWalk, walk_of_settings
 from hexmj.measures.support import grounded, pressure_margin
+from hexmj.measures.walk_settings import WalkSettings
 from hexmj.stability import loss_time, walk_margin
-from hexmj.starts import draw_starts
-from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,37 +36,11 @@ REPORTED = {"slip": "mm/s", "tracking": "mm"}
 """Other outcomes that are kept, with their units."""
 
 
-def distance_table(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    *,
-    n_starts: int,
-    seed: int,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None,
-    threads: int | None = None,
-) -> "xr.Dataset":
-    """The outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start.
-
-    Args:
-        controller: plans the walks.
-        velocity: V_r, or its final value.
-        duration: observation time [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        conditions: of the walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the table does not depend on it.
-    """
+def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
+    """The outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start."""
     import xarray as xr
 
-    walk = physical_walk(
-        draw_starts(n_starts, seed, stride), controller, velocity, duration,
-        conditions=conditions, stride=stride, acceleration=acceleration, threads=threads,
-    )  # fmt: skip
+    walk = walk_of_settings(walks, walks.starts, threads)
     happened = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
     lost = {name: ("start", happened[name], {"units": "time unit"}) for name in LOSSES.values()}
     off = {

@@ -68,10 +68,8 @@ class StaticLimit(SameStarts):
 
         def cell(conditions: Conditions) -> Cell:
             name = f"leg-mass-{conditions.masses.leg_mass:g}-vp-{conditions.time.vp:g}"
-            return self.cell(
-                name, distance_table, conditions.substeps(self.stride),
-                velocity=self.velocity, duration=self.duration, conditions=conditions,
-            )  # fmt: skip
+            walks = self.walks(self.velocity, self.duration, conditions)
+            return Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride))
 
         return [cell(one) for one in self.varied]
 

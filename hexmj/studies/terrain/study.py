@@ -109,8 +109,8 @@ class Terrain(SameStarts):
 
         def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
             name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", before[obstacle].but(grasp=grasp)
-            own = {"velocity": velocity, "duration": self.distance / velocity, "conditions": conditions}
-            return self.cell(name, outcome_table, 1 / velocity, **own)
+            walks = self.walks(velocity, self.distance / velocity, conditions)
+            return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
 
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 

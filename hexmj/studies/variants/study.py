@@ -165,16 +165,7 @@ def losses(
 ) -> "xr.Dataset":
     """Which starts lose static stability on paper, or fall, as `lost`, 0 or 1, over start.
 
-    Args:
-        network: plans the walks.
-        velocity: V_r, or its final value.
-        duration: observation time [time units].
-        n_starts: number of starts.
-        seed: of the starts.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        conditions: of physical walks; without it on paper.
-        threads: one per core unless given; the answers do not depend on it.
+    Arguments are as of `WalkSettings`; without conditions the network walks on paper.
     """
     import xarray as xr
 
