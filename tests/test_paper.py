@@ -268,6 +268,13 @@ def test_nonsense_gets_a_clear_sentence_and_destroys_nothing(tmp_path):
         reproduce(tmp_path / "file", TINY)
 
 
+@pytest.mark.parametrize(("seed", "told"), [(0, True), (1998, False)])
+def test_starts_on_which_ideal_sets_were_searched_are_told(tmp_path, seed, told):
+    _, (page, data) = reproduce(tmp_path, replace(TINY, seed=seed), only=("hws-late",))
+    for text in (page.read_text(), data.read_text()):
+        assert (f"seed {seed}: ideal sets were searched on these starts" in text) == told
+
+
 def test_figures_of_other_samples_are_refused_before_the_work(tmp_path):
     with pytest.raises(InputError, match="samples = 3; expected 7, as the figures draw"):
         reproduce(tmp_path / "paper", replace(TINY, samples=3))

@@ -17,6 +17,8 @@ from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
 from hexmj.starts import draw_starts
+from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.timing import Stride
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +118,18 @@ def test_a_push_depends_on_no_start_beside(vp):
         assert_allclose(alone.speed, together.speed[n], rtol=1e-12)
         for name in {one.name for one in fields(Outcomes)} - {"speed"}:
             assert getattr(alone, name).tobytes() == getattr(together, name)[[n]].tobytes(), name
+
+
+@pytest.mark.parametrize(("vp", "dt", "told"), [(8.0, 1.0, "125 ms"), (20.0, 1.0, "50 ms"), (21.0, 1.0, None)])
+def test_steps_in_which_no_push_fits_are_refused(vp, dt, told):
+    """One of 25 ms, to the nearest step; who pushes nobody is told nothing."""
+    conditions, stride = Conditions.of(vp=vp), Stride(dt=dt)
+    sentence = f"steps of the plan last {told}; expected less than 50 ms, since a push lasts 25 ms"
+    with pytest.raises(InputError, match=sentence) if told else nullcontext():
+        DisturbedWalks(LDVS, conditions=conditions, stride=stride, velocities=[0.5], n_starts=2)
+    DisturbedWalks(LDVS, conditions=conditions, stride=stride, velocities=[0.5], n_starts=2, disturbances=["halt"])
+    settled = settle(draw_starts(1, 0, stride), conditions, stride)
+    for impulse in (0.0, 1.0):
+        push = Push(np.full(1, impulse), np.ones(1))
+        with pytest.raises(InputError, match=sentence) if told and impulse else nullcontext():
+            list(drive(settled, begin(LDVS, settled.starts, 0.5, stride), 4.0, push=push))

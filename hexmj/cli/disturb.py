@@ -92,7 +92,12 @@ class Disturb(StudyCommand):
         starts = f"{self.starts} starts whose plan is stable until it is disturbed"
         yield "takes off: how much lower than without a strategy, on the same starts"
         yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
-        yield f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}; grasp {self.adhesion:g}"
+        told = {
+            "slow_down": f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}",
+            "grasp": f"grasp {self.adhesion:g}",
+        }
+        if lines := [line for strategy, line in told.items() if strategy in result.strategy.values]:
+            yield "; ".join(lines)
         yield self.conditions_line(physical=not self.kinematic)
 
 

@@ -14,6 +14,9 @@ from hexmj.timing import WINDOWS
 TABLE = Path(__file__).with_name("ideal.toml")
 PRINTED = READINGS["printed"]
 
+SEARCHED = 0, 1
+"""Seeds of the starts on which they were searched."""
+
 
 @dataclass(frozen=True)
 class FoundSet:

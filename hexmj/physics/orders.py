@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import advanced, check_plan
+from hexmj.controllers.asking import advanced, check_plan, said
 from hexmj.controllers.protocol import Plan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
@@ -110,7 +110,8 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
     Raises:
         InputError: it does.
     """
-    made_for = getattr(plan, "made_for", None)
+    with said("a plan, made_for"):
+        made_for = getattr(plan, "made_for", None)
     if isinstance(made_for, Conditions):
         here, there = conditions.settings(), made_for.settings()
         for name in (*vars(conditions.time), *vars(conditions.path), "body"):

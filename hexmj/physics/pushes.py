@@ -15,8 +15,20 @@ PUSH_LASTS = 0.025
 
 
 def steps_pushed(time: TimeScale, stride: Stride) -> int:
-    """Steps of the plan that a push lasts."""
-    return max(1, round(PUSH_LASTS / time.seconds(stride)))
+    """Steps of the plan that a push lasts.
+
+    Raises:
+        InputError: not even one.
+    """
+    if not can_push(time, stride):
+        told = f"{1e3 * time.seconds(stride):g} ms; expected less than {2e3 * PUSH_LASTS:g} ms"
+        raise InputError(f"steps of the plan last {told}, since a push lasts {1e3 * PUSH_LASTS:g} ms")
+    return round(PUSH_LASTS / time.seconds(stride))
+
+
+def can_push(time: TimeScale, stride: Stride) -> bool:
+    """Whether steps of the plan are short enough for a push."""
+    return round(PUSH_LASTS / time.seconds(stride)) > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +52,13 @@ class Push:
         return np.floor(self.time / stride.dt + 1e-9).astype(int)
 
     def divisor(self, time: TimeScale, stride: Stride) -> int:
-        """The most steps of which beginnings and ends are multiples: chunks of these cut no push."""
-        return gcd(steps_pushed(time, stride), *self.begins(stride)[self.impulse != 0.0].tolist())
+        """The most steps of which beginnings and ends are multiples: chunks of these cut no push; 0 without one.
+
+        Raises:
+            InputError: see `steps_pushed`.
+        """
+        begins = self.begins(stride)[self.impulse != 0.0]
+        return gcd(steps_pushed(time, stride), *begins.tolist()) if begins.size else 0
 
     def check_within(self, duration: float, stride: Stride, n_starts: int) -> None:
         """Refuse a push that is not of so many starts, or begins in none of the steps within a duration [time units].

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS
-from hexmj.checks import numbers, typed
+from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.asking import begin, said, tell
 from hexmj.controllers.protocol import (
@@ -151,7 +151,8 @@ class LiveWalk:
             InputError: a value that makes no sense.
         """
         self.controller, self.velocity, self.start = controller, velocity, numbers("start", in_order(start))
-        self.conditions, self.stride = conditions or Conditions(), stride or Stride()
+        self.conditions = given("conditions", conditions, Conditions)
+        self.stride = given("stride", stride, Stride)
         self.begin()
 
     def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
@@ -167,7 +168,7 @@ class LiveWalk:
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
         self._insects = Insects(settled, self._push, threads=1)
-        self._lasts = steps_pushed(conditions.time, self.stride)
+        self._lasts = steps_in_chunk(settled.substeps)
         self.start, self.conditions, self.settled = start, conditions, settled
         self.trace, self.fell_on = [], ""
         self._before: PlannedWalk | None = None
@@ -210,9 +211,10 @@ class LiveWalk:
             impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
 
         Raises:
-            InputError: one of more than 80.
+            InputError: one of more than 80, or see `pushes.steps_pushed`.
         """
         PUSHES.check("impulse", impulse := typed("impulse", impulse, float))
+        self._lasts = steps_pushed(self.conditions.time, self.stride)
         self._push.impulse[:] = impulse * self.conditions.body.mass * self.conditions.time.vp
         self._push.time[:] = (self._plan.done // self._lasts + 1) * self._lasts * self.stride.dt
 

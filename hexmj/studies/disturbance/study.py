@@ -12,6 +12,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.physics.pushes import steps_pushed
 from hexmj.starts import checked_list
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
@@ -60,6 +61,8 @@ class DisturbedWalks(SameStarts):
             raise InputError(
                 f"velocities = {v.tolist()}; expected above 0 and at least V_r(0), {low:g}, if it slows down"
             )
+        if self.physical and "push" in self.disturbances:
+            steps_pushed(self.conditions.time, self.stride)
         self.conditions.but(grasp=self.adhesion)
         _ = self.cells()
 

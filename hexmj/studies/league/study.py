@@ -150,15 +150,19 @@ class League:
 
     def _tried(self, entrant: Entrant) -> Iterator[tuple[str, Callable[..., Any], float, dict[str, Any]]]:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
+        from hexmj.physics.pushes import can_push
         from hexmj.studies.disturbance.disturbances import GRID
         from hexmj.studies.league import physics
 
         way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
         for trial in TRIALS:
-            if trial in DISTURBED and entrant.steerable:
-                how = {"case": DISTURBED[trial], "conditions": self.conditions, "grid": GRID}
+            case = DISTURBED.get(trial)
+            if case and case.kind == "push" and not can_push(self.conditions.time, self.stride):
+                continue
+            if case and entrant.steerable:
+                how = {"case": case, "conditions": self.conditions, "grid": GRID}
                 yield trial, physics.disturbed, 300, how
-            elif trial in DISTURBED or (trial in GROUNDS and way < CROSSED):
+            elif case or (trial in GROUNDS and way < CROSSED):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
                 yield trial, physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}

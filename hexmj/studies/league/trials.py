@@ -56,7 +56,7 @@ TOLD = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
     " until then; step and rough ground of 3 mm; load: twice the weight; lost: one leg, from the front; reads: the legs"
     " are read; noise, late: with errors of 10 % of the step range, 20 ms late, in whole steps; - where plans cannot be"
-    " steered or read no legs, or the walk ends before the ground"
+    " steered or read no legs, a step is too long for what happens, or the walk ends before the ground"
 )
 """What they are."""
 
