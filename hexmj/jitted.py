@@ -17,9 +17,19 @@ def jitted(function: Function) -> Function:
     """
     made: Any = njit(cache=True, nogil=True)(function)
     if made is not function:  # as it is with NUMBA_DISABLE_JIT
-        kept = made._cache._cache_file
-        kept._source_stamp = (*kept._source_stamp, sha256(_made_of(function).encode()).hexdigest())
+        _stamp_when_asked(made._cache, function)
     return made
+
+
+def _stamp_when_asked(cache: Any, function: Callable[..., Any]) -> None:
+    """Let what a cache keeps tell all that is compiled into it, as soon as the whole module is there."""
+    usual, load = cache._cache_file._source_stamp, cache.load_overload
+
+    def load_overload(*asked: Any) -> Any:
+        cache._cache_file._source_stamp = (*usual, sha256(_made_of(function).encode()).hexdigest())
+        return load(*asked)
+
+    cache.load_overload = load_overload
 
 
 def _made_of(function: Callable[..., Any]) -> str:

@@ -195,6 +195,8 @@ def steered(**changed: Any) -> Any:
 BROKEN: list[tuple[str, Any, str]] = [
     ("see", steered(see=lambda *_: None), "tips of start 0, leg 0 is .* after see; expected"),
     ("see", steered(see=lambda plan, tips, _: LiftedPlan.see(plan, tips, plan.standing)), "standing of .* after see"),
+    ("see", steered(tips=property(lambda plan: plan.starts[:, :5])), r"tips has the shape \(8, 5\) after a step; exp"),
+    ("see", steered(standing=property(lambda plan: 1 / 0)), "a plan, tips and standing: ZeroDivisionError"),
     ("see", steered(tips=property(lambda plan: plan.starts)), "tips of start 1, leg 0 is .* after a step; expected"),
     (
         "restart",
@@ -205,7 +207,7 @@ BROKEN: list[tuple[str, Any, str]] = [
     (
         "slow down",
         steered(slow_down=lambda *_: None),
-        "accelerating: velocity of start 2 is 0.225 0 steps after slow_d",
+        "accelerating: velocity of start 2 is 0.225 in step 1 after slow_d",
     ),
     (
         "slow down",

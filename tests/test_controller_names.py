@@ -117,7 +117,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Literal, Optional
+from typing import TYPE_CHECKING, ClassVar, Literal, Optional, Sequence
 
 if TYPE_CHECKING:
     from nowhere import Thing
@@ -130,7 +130,14 @@ class Inner:
     g: float = 1.0
 
 @dataclass(frozen=True)
+class Named:
+    g: str = ""
+
+@dataclass(frozen=True)
 class Odd:
+    class Own(Enum):
+        HERE = 1
+
     name: str = "odd"
     mode: Mode = Mode.SLOW
     inner: Inner | dict = Inner()
@@ -144,6 +151,12 @@ class Odd:
     plain: Inner = Inner()
     mixed: tuple[bool, str] = (True, "a")
     none: tuple[()] = ()
+    modes: tuple[Mode, ...] = ()
+    inners: tuple[Inner, ...] = ()
+    some: Sequence = ()
+    fixed: ClassVar[int] = 3
+    own: Own = Own.HERE
+    which: Named | Inner = Inner()
 
     def __post_init__(self):
         if isinstance(self.made, dict) and "g" in self.made:
@@ -185,10 +198,13 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     """Rows are tuples, which may be added to and hashed, tables records, texts members of enumerations."""
     monkeypatch.chdir(tmp_path)
     Path("odd.py").write_text(KINDS)
-    told = {"legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
+    told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
+    told |= {"legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
+    assert repr([odd.modes, odd.inners, odd.some]) == "[(<Mode.SLOW: 'slow'>,), (Inner(g=2.0),), [1, 2]]"
+    assert repr([odd.own, odd.which]) == "[<Own.HERE: 1>, Inner(g=2.0)]"
     assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"
     assert repr([odd.plain, odd.inner]) == "[Inner(g=2.0), {'g': 2}]"
     assert plain(odd)["mode"]["member"] == "SLOW"

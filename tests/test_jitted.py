@@ -7,6 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from hexmj import rotations, stability
+from hexmj.bodies import newton
+from hexmj.controllers.cruse1998 import kernel
+from hexmj.environments import passes
+from hexmj.jitted import _made_of
+from hexmj.physics import outcomes
+
 HELPER = "from hexmj.jitted import jitted\nFACTOR = 2.0\n@jitted\ndef inner(x):\n    return x + 1.0\n"
 OUTER = "from hexmj.jitted import jitted\nfrom helper import FACTOR, inner\n@jitted\ndef outer(x):\n"
 OUTER += "    return FACTOR * inner(x)\nprint(outer(1.0), *outer.stats.cache_hits.values())\n"
@@ -30,3 +37,22 @@ def test_an_edit_of_another_file_is_compiled(tmp_path, old, new, told):
     assert ran(tmp_path) == [4.0, 1.0]
     (tmp_path / "helper.py").write_text(HELPER.replace(old, new))
     assert ran(tmp_path) == ([told] if new else [4.0, 1.0])
+
+
+def test_helpers_that_stand_below_count_too(tmp_path):
+    """And what they take from other files."""
+    low = OUTER.replace("return FACTOR * inner(x)", "return below(x)")
+    low = low.replace("print(", "@jitted\ndef below(x):\n    return FACTOR * inner(x)\nprint(")
+    for name, text in (("helper", HELPER), ("outer", low)):
+        (tmp_path / f"{name}.py").write_text(text)
+    assert ran(tmp_path) == [4.0]
+    (tmp_path / "helper.py").write_text(HELPER.replace("FACTOR = 2.0", "FACTOR = 3.0"))
+    assert ran(tmp_path) == [6.0]
+
+
+def test_what_the_package_compiles_is_told_the_same_in_any_process():
+    """No address of an object is in it, with which nothing that is kept would ever be found again."""
+    modules = kernel, stability, rotations, newton, passes, outcomes
+    compiled = [one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")]
+    assert len(compiled) > 30
+    assert not any(" at 0x" in _made_of(one) for one in compiled)

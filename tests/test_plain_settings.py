@@ -6,7 +6,7 @@ import sys
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import InitVar, dataclass, make_dataclass
-from enum import Enum, StrEnum
+from enum import Enum, IntFlag, StrEnum
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -69,6 +69,10 @@ class Way(Enum):
     FAST = "fast"
 
 
+class Flags(IntFlag):
+    ONE = 1
+
+
 class Tone(StrEnum):
     LOW = "low"
 
@@ -79,6 +83,7 @@ def test_a_member_of_an_enumeration_is_its_class_and_name() -> None:
         for name, member in (("Way", "FAST"), ("Tone", "LOW"))
     ]
     assert plain([Way.FAST, Tone.LOW]) == told
+    assert plain(Flags(4)) != plain(Flags(8))
     assert list(classes({"ways": [Way.FAST], "tone": Tone.LOW})) == [Way, Tone]
 
 

@@ -185,6 +185,20 @@ def test_fields_are_searched_of_a_controller_without_equality():
     assert FieldsForm(Unequal()).names == FieldsForm(Pace()).names
 
 
+@dataclass(frozen=True)
+class Twice(Pace):
+    """With a field that follows the searched ones."""
+
+    twice: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "twice", 2.0 * self.good)
+
+
+def test_a_search_begins_with_any_of_the_fields_that_it_chooses():
+    assert FieldsForm(Twice()).vector(Twice(good=3.0)).tolist() == [3.0, -0.5]
+
+
 @pytest.mark.parametrize(
     ("least", "sentence"), [(1, r"to begin with has least = 1; expected 2, as of what is"), (2, None)]
 )

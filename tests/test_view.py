@@ -170,6 +170,16 @@ def test_a_key_that_asks_for_what_is_refused_is_told(monkeypatch):
     assert session.walk.velocity == 0.5
 
 
+def test_a_push_that_is_taken_back_ends():
+    walk = LiveWalk(LDVS, 0.5, STARTS[0])
+    walk.push(10.0)
+    while not (force := walk._insects._batch.push).any():
+        walk.advance(0.00125)
+    walk.push(0.0)
+    walk.advance(0.00125)
+    assert not force.any()
+
+
 def test_a_push_moves_the_insect_to_its_side():
     aside = []
     for impulse in (0.0, 6.0, -6.0):

@@ -98,7 +98,7 @@ class Disturb(StudyCommand):
         }
         if lines := [line for strategy, line in told.items() if strategy in result.strategy.values]:
             yield "; ".join(lines)
-        yield self.conditions_line(physical=not self.kinematic)
+        yield self.conditions_line(physical=not self.kinematic, varied=["ground_at"])
 
 
 def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":

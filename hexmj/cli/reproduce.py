@@ -35,7 +35,7 @@ class Reproduce:
         """Measure, judge, draw, and print the table."""
         from hexmj.paper.protocol import FULL, QUICK
         from hexmj.paper.reproduce import reproduce
-        from hexmj.paper.table import claims_json, heads, searched_on, summary, summary_beside
+        from hexmj.paper.table import claims_json, heads, on_searched_starts, summary, summary_beside
         from hexmj.pictures import as_shipped
 
         if self.only == ():
@@ -58,5 +58,5 @@ class Reproduce:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return
         claims = table(heads(rows), [row.cells for row in rows])
-        lines = *summary(rows), *searched_on(self.seed), *summary_beside(rows)
+        lines = *summary(rows), *on_searched_starts(self.seed), *summary_beside(rows)
         show("The claims of the 1998 paper", claims, *lines, *map(str, files))

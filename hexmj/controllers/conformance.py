@@ -280,8 +280,15 @@ def _reading(trial: Trial) -> None:
     _same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
 
 
+def _steerable(trial: Trial) -> SteerablePlan | None:
+    """A new plan, if it can be steered."""
+    plan = trial.begin()
+    with said("a plan, tips and standing"):
+        return plan if isinstance(plan, SteerablePlan) else None
+
+
 def _seen(trial: Trial) -> None:
-    if isinstance(plan := trial.begin(), SteerablePlan):
+    if plan := _steerable(trial):
         last = advanced(plan, 250)
         _is_where(plan, last.x[-1], last.stance[-1], "after a step")
         tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
@@ -291,7 +298,7 @@ def _seen(trial: Trial) -> None:
 
 
 def _restarted(trial: Trial) -> None:
-    if isinstance(plan := trial.begin(), SteerablePlan):
+    if plan := _steerable(trial):
         which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, 250)
         with said("a plan, restart"):
             plan.restart(which.copy(), trial.starts.copy())
@@ -301,11 +308,13 @@ def _restarted(trial: Trial) -> None:
         )
         on = advanced(plan, 250)
         _same(of_starts(on, which), of_starts(advanced(trial.begin(), 250), which), "restart, and beginning,")
-        _same(of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that restart,")
+        _same(
+            of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that restart,", 250
+        )
 
 
 def _slowed(trial: Trial) -> None:
-    if isinstance(plan := trial.begin(), SteerablePlan):
+    if plan := _steerable(trial):
         which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
         advanced(plan, 250)
         with said("a plan, slow_down"):
@@ -317,10 +326,15 @@ def _slowed(trial: Trial) -> None:
             step, start = bad[0]
             asked = "" if which[start] else ", which was not asked to,"
             raise InputError(
-                f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} {step} steps after slow_down;"
-                f" expected {commanded[step, start]:.6g}"
+                f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} in step {step + 1} after"
+                f" slow_down; expected {commanded[step, start]:.6g}"
             )
-        _same(of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that slow down,")
+        _same(
+            of_starts(on, ~which),
+            of_starts(_later(trial), ~which),
+            "starts alone, and beside some that slow down,",
+            250,
+        )
 
 
 def _later(trial: Trial) -> PlannedWalk:
@@ -332,6 +346,10 @@ def _later(trial: Trial) -> PlannedWalk:
 def _is_where(plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray, when: str) -> None:
     """Refuse a plan whose own tips and states are not these, (start, leg)."""
     for name, expected in (("tips", tips), ("standing", standing)):
+        with said(f"a plan, {name}"):
+            shape = np.shape(getattr(plan, name))
+        if shape != expected.shape:
+            raise InputError(f"{name} has the shape {shape} {when}; expected {expected.shape}")
         if (bad := np.argwhere((found := np.asarray(getattr(plan, name))) != expected)).size:
             at = tuple(bad[0])
             raise InputError(f"{name} of start {at[0]}, leg {at[1]} is {found[at]!s} {when}; expected {expected[at]!s}")
@@ -382,9 +400,9 @@ def _sliding(trials: list[Trial]) -> str:
     return found
 
 
-def _same(one: PlannedWalk, other: PlannedWalk, what: str) -> None:
-    """Refuse two walks that differ."""
-    if differ := difference(one, other):
+def _same(one: PlannedWalk, other: PlannedWalk, what: str, before: int = 0) -> None:
+    """Refuse two walks, from a step on, that differ."""
+    if differ := difference(one, other, before):
         raise InputError(f"{what} differ: {differ}; expected the same bits")
 
 

@@ -6,6 +6,7 @@ what a robot would know.
 """
 
 from dataclasses import dataclass, is_dataclass
+from enum import Enum
 from inspect import getattr_static
 from typing import Any, Protocol, TypeGuard, runtime_checkable
 
@@ -101,7 +102,10 @@ class SteerablePlan(Plan, Protocol):
         ...
 
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm]."""
+        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
+
+        They go on as a plan does that begins there, to the last bit.
+        """
         ...
 
     def slow_down(self, which: np.ndarray) -> None:
@@ -237,6 +241,8 @@ def settings_of(controller: Controller) -> dict[str, Any]:
 
 def _bare(value: Any) -> Any:
     """A setting without the names of its classes."""
+    if isinstance(value, Enum):
+        return value.name or value.value
     if (names := field_names(value)) is not None:
         return {name: _bare(getattr(value, name)) for name in names}
     if type(value) is dict:

@@ -1,12 +1,12 @@
 """Fields as a TOML file tells them: members of an enumeration by name or value, records as tables, rows as lists."""
 
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from functools import partial
-from types import NoneType, SimpleNamespace, UnionType
+from itertools import repeat
+from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hexmj.checks import typed
@@ -15,7 +15,7 @@ from hexmj.errors import InputError
 _PLAIN = bool, int, float, str
 """Types of fields whose values are as a file tells them."""
 
-_CHOICES = Union, UnionType
+_CHOICES, _ROWS = (Union, UnionType), (tuple, Sequence)
 
 
 def with_fields(usual: Any, values: dict[str, Any]) -> Any:
@@ -40,18 +40,20 @@ def _made(kind: type, make: Callable[..., Any], values: dict[str, Any]) -> Any:
 def _types(kind: type) -> dict[str, Any]:
     """What a class's fields are annotated with, but for names that only type checkers know."""
     types = {}
-    for base in reversed(kind.__mro__):
-        known = vars(sys.modules.get(base.__module__, object))
-        for name, annotation in vars(base).get("__annotations__", {}).items():
-            with suppress(NameError):
-                types |= get_type_hints(SimpleNamespace(__annotations__={name: annotation}), dict(known))
+    for one in fields(kind):
+        own = (base for base in kind.__mro__[::-1] if vars(base).get("__dataclass_fields__", {}).get(one.name) is one)
+        base = next(own, kind)
+        alone = type("", (), {"__annotations__": {one.name: one.type}, "__module__": base.__module__})
+        with suppress(NameError):
+            types |= get_type_hints(alone, localns=dict(vars(base)))
     return types
 
 
 def _is_checked(kind: Any) -> bool:
     """Whether a type is plain, an enumeration, a record, or a choice or row of such."""
-    if (origin := get_origin(kind)) in (*_CHOICES, tuple, Sequence):
-        return all(one is Ellipsis or _is_checked(one) for one in get_args(kind))
+    if (origin := get_origin(kind)) in (*_CHOICES, *_ROWS):
+        of = get_args(kind)
+        return bool(of) and all(one is Ellipsis or _is_checked(one) for one in of)
     if origin is Literal or kind in (*_PLAIN, NoneType):
         return True
     return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
@@ -64,13 +66,28 @@ def _fitting(name: str, value: Any, kind: Any) -> Any:
     except InputError:
         if kind in _PLAIN:
             raise
-    for one in get_args(kind) if get_origin(kind) in _CHOICES else [kind]:
-        if isinstance(one, type) and issubclass(one, Enum):
-            if isinstance(value, str) and value in one.__members__:
-                return one[value]
-            with suppress(ValueError):
-                return one(value)
-        if isinstance(one, type) and is_dataclass(one) and isinstance(value, dict):
-            with suppress(TypeError):  # of other fields
-                return _made(one, one, value)
+    choices = get_args(kind) if get_origin(kind) in _CHOICES else (kind,)
+    for one in choices:
+        with suppress(*(InputError, TypeError) if len(choices) > 1 else ()):
+            if (made := _as_one(name, value, one)) is not None:
+                return made
     return value
+
+
+def _as_one(name: str, value: Any, kind: Any) -> Any:
+    """A member of an enumeration, a record or a row, as a file tells them; None where it tells something else."""
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        if isinstance(value, str) and value in kind.__members__:
+            return kind[value]
+        with suppress(ValueError):
+            return kind(value)
+    elif isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict):
+        if value.keys() <= {one.name for one in fields(kind) if one.init}:
+            return _made(kind, kind, value)
+    elif get_origin(kind) in _ROWS and isinstance(value, list):
+        of = get_args(kind)
+        each = of[:1] * len(value) if Ellipsis in of or get_origin(kind) is Sequence else of
+        if len(each) == len(value):
+            with suppress(InputError):  # the sentence is of the whole row
+                return tuple(map(_fitting, repeat(name), value, each))
+    return None

@@ -36,7 +36,7 @@ class Frames:
         """The body at some `qpos`, (height, width, 3) of uint8.
 
         Raises:
-            InputError: another thread has drawn before, to which the GL belongs until it is freed.
+            InputError: another thread has drawn before, and the environment was not closed since.
             RenderingError: nothing can be rendered here, or the process was forked from one that had drawn.
         """
         renderer = self._begun()

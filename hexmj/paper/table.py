@@ -93,7 +93,7 @@ def summary(rows: Sequence[Row]) -> list[str]:
     return [*lines, f"which window the paper's numbers fit: {counts}"]
 
 
-def searched_on(seed: int) -> list[str]:
+def on_searched_starts(seed: int) -> list[str]:
     """That ideal sets look better than they are on starts on which they were searched, if those of a seed are."""
     told = f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"
     return [told] if seed in SEARCHED else []
@@ -104,7 +104,7 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     size = f"{settings['samples']} times {settings['sample']} starts, gaits from {settings['gait_starts']} starts"
     head = ["# The claims of the 1998 paper", "", f"{size}; seed {settings['seed']}.  An answer is the number that"]
     head[-1] += " strains the rule most, with its 95 % interval, and where."
-    told = [*summary(rows), *searched_on(settings["seed"])]
+    told = [*summary(rows), *on_searched_starts(settings["seed"])]
     lines = [*head, "", *(f"- {one}" for one in told), ""]
     beside = summary_beside(rows)
     lines += [*(f"- {one}" for one in beside), ""] if beside else []
@@ -127,7 +127,7 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
         how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": _command(row, settings)}
         beside = {name: _answers(other) for name, other in row.beside.items()}
         claims.append(told | {"ours": _answers(row), "beside": beside} | how)
-    return {"claims": claims, "summary": [*summary(rows), *searched_on(settings["seed"])], "protocol": settings}
+    return {"claims": claims, "summary": [*summary(rows), *on_searched_starts(settings["seed"])], "protocol": settings}
 
 
 def summary_beside(rows: Sequence[Row]) -> list[str]:

@@ -149,6 +149,8 @@ class Insects:
 
     def _apply_push(self, orders: Orders) -> None:
         """Push those whose push goes on as the orders begin."""
+        if self._push:
+            self._batch.push[:] = 0.0
         if self._push and self._push.impulse.any():
             stride, seconds = self.settled.stride, self.settled.conditions.time.seconds(self.settled.stride)
             first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions.time, stride)

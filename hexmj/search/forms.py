@@ -94,9 +94,10 @@ class FieldsForm:
         """See `Form.vector`."""
         if type(controller) is not type(self.usual):
             raise InputError(f"{controller.name} to begin with; expected a {type(self.usual).__name__}")
-        here, there = plain(self.usual), plain(controller)
-        for name in here.keys() - {*self.names, "name"}:
-            if here[name] != there[name]:
-                told = f"{name} = {there[name]}; expected {here[name]}, as of what is searched"
+        of: Any = self.usual
+        for name in (one.name for one in fields(of) if one.init and one.name not in (*self.names, "name")):
+            here, there = (plain(getattr(one, name)) for one in (of, controller))
+            if here != there:
+                told = f"{name} = {there}; expected {here}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
         return np.array([getattr(controller, name) for name in self.names], dtype=float)

@@ -47,6 +47,8 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     Raises:
         InputError: it is none of the things that a setting can be.
     """
+    if isinstance(value, Enum):
+        return {"class": label(type(value)), "member": value.name or plain(value.value, folders, exact)}
     if (names := field_names(value)) is not None:
         _check_fields(value, names)
         of_class = [*folders, *_folders(type(value))]
@@ -59,8 +61,6 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         return f"{value}@{held}"
     if value is None or type(value) in (bool, int, float, str):
         return value
-    if isinstance(value, Enum):
-        return {"class": label(type(value)), "member": value.name}
     if type(value) is list or type(value) is tuple:
         return [plain(item, folders, exact) for item in value]
     if type(value) is dict and all(isinstance(key, str) for key in value):

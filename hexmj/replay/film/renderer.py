@@ -24,8 +24,8 @@ def kept_current() -> Iterator[None]:
     finally:
         if egl := sys.modules.get("OpenGL.EGL"):
             atexit.unregister(egl.eglTerminate)
-            display, *ours = _current(egl)
             with suppress(Exception):  # it was freed meanwhile
+                display, *ours = _current(egl)
                 if before and before[-1]:
                     egl.eglMakeCurrent(*before)
                 elif ours[-1]:
