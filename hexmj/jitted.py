@@ -35,6 +35,7 @@ def _stamp_when_asked(cache: Any, function: Callable[..., Any]) -> None:
 def _made_of(function: Callable[..., Any]) -> str:
     """The code of a function, and all that it looks up in its module: compiled functions, modules and constants."""
     code: Any = function.__code__
-    known = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    names = [name for name in code.co_names if name != function.__name__]
+    known = {name: function.__globals__[name] for name in names if name in function.__globals__}
     told = [_made_of(one.py_func) if hasattr(one, "py_func") else repr(one) for one in known.values()]
     return repr((code.co_code, code.co_consts, code.co_names, told))

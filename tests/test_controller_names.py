@@ -117,6 +117,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
+from hexmj import timing
 from typing import TYPE_CHECKING, ClassVar, Literal, Optional, Sequence
 
 if TYPE_CHECKING:
@@ -140,6 +142,8 @@ class Odd:
 
     name: str = "odd"
     mode: Mode = Mode.SLOW
+    timing: timing.Stride = timing.Stride()
+    place: str = "here"
     inner: Inner | dict = Inner()
     made: Inner = Inner()
     legs: tuple[float, ...] = (1.0,)
@@ -159,6 +163,7 @@ class Odd:
     which: Named | Inner = Inner()
 
     def __post_init__(self):
+        object.__setattr__(self, "place", Path(self.place))
         if isinstance(self.made, dict) and "g" in self.made:
             object.__setattr__(self, "made", Inner(**self.made))
 
@@ -199,7 +204,7 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("odd.py").write_text(KINDS)
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
-    told |= {"legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
+    told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"

@@ -50,6 +50,12 @@ def test_helpers_that_stand_below_count_too(tmp_path):
     assert ran(tmp_path) == [6.0]
 
 
+def test_a_function_may_call_itself(tmp_path):
+    text = "from hexmj.jitted import jitted\n@jitted\ndef outer(n):\n    return 1 if n < 2 else n * outer(n - 1)\n"
+    (tmp_path / "outer.py").write_text(text + "print(outer(5))\n")
+    assert ran(tmp_path) == [120.0]
+
+
 def test_what_the_package_compiles_is_told_the_same_in_any_process():
     """No address of an object is in it, with which nothing that is kept would ever be found again."""
     modules = kernel, stability, rotations, newton, passes, outcomes

@@ -207,3 +207,14 @@ def test_a_search_begins_with_the_fields_that_it_does_not_choose(least, sentence
     begin = Picky(good=2.005, least=least, name="begun")
     with pytest.raises(InputError, match=sentence) if sentence else nullcontext():
         assert FieldsForm(Picky()).vector(begin).tolist() == [2.005, -0.5]
+
+
+@dataclass(frozen=True)
+class Unlimited(Pace):
+    """With a field that equals nothing."""
+
+    limit: float | None = float("nan")
+
+
+def test_a_search_begins_with_fields_that_are_no_numbers():
+    assert FieldsForm(Unlimited()).begin.tolist() == [2.0, -0.5]

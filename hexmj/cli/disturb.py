@@ -98,7 +98,11 @@ class Disturb(StudyCommand):
         }
         if lines := [line for strategy, line in told.items() if strategy in result.strategy.values]:
             yield "; ".join(lines)
-        yield self.conditions_line(physical=not self.kinematic, varied=["ground_at"])
+        yield self.conditions_line(physical=not self.kinematic)
+
+    def _not_reached(self) -> str:
+        """Nothing: a window begins with the disturbance, or later."""
+        return ""
 
 
 def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":

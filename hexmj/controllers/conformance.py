@@ -288,7 +288,7 @@ def _steerable(trial: Trial) -> SteerablePlan | None:
 
 
 def _seen(trial: Trial) -> None:
-    if plan := _steerable(trial):
+    if (plan := _steerable(trial)) is not None:
         last = advanced(plan, 250)
         _is_where(plan, last.x[-1], last.stance[-1], "after a step")
         tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
@@ -298,7 +298,7 @@ def _seen(trial: Trial) -> None:
 
 
 def _restarted(trial: Trial) -> None:
-    if plan := _steerable(trial):
+    if (plan := _steerable(trial)) is not None:
         which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, 250)
         with said("a plan, restart"):
             plan.restart(which.copy(), trial.starts.copy())
@@ -314,7 +314,7 @@ def _restarted(trial: Trial) -> None:
 
 
 def _slowed(trial: Trial) -> None:
-    if plan := _steerable(trial):
+    if (plan := _steerable(trial)) is not None:
         which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
         advanced(plan, 250)
         with said("a plan, slow_down"):

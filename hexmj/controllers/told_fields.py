@@ -1,10 +1,12 @@
 """Fields as a TOML file tells them: members of an enumeration by name or value, records as tables, rows as lists."""
 
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from functools import partial
+from inspect import signature
 from itertools import repeat
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -30,11 +32,19 @@ def with_fields(usual: Any, values: dict[str, Any]) -> Any:
 
 def _made(kind: type, make: Callable[..., Any], values: dict[str, Any]) -> Any:
     types = _types(kind)
-    made = make(**{name: _fitting(name, value, types.get(name)) for name, value in values.items()})
-    for name in values:
-        if _is_checked(of := types.get(name)):
+    told = {name: _fitting(name, value, types.get(name)) for name, value in values.items()}
+    made = make(**told)
+    for name, value in told.items():
+        if _is_checked(of := types.get(name)) and not _fits(value, of):
             typed(name, getattr(made, name), of)
     return made
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    with suppress(InputError):
+        typed("", value, kind)
+        return True
+    return False
 
 
 def _types(kind: type) -> dict[str, Any]:
@@ -44,8 +54,9 @@ def _types(kind: type) -> dict[str, Any]:
         own = (base for base in kind.__mro__[::-1] if vars(base).get("__dataclass_fields__", {}).get(one.name) is one)
         base = next(own, kind)
         alone = type("", (), {"__annotations__": {one.name: one.type}, "__module__": base.__module__})
-        with suppress(NameError):
-            types |= get_type_hints(alone, localns=dict(vars(base)))
+        module = vars(sys.modules.get(base.__module__, object))
+        with suppress(NameError, AttributeError, TypeError, SyntaxError):  # of whatever an annotation says
+            types |= get_type_hints(alone, dict(vars(base)), dict(module))
     return types
 
 
@@ -68,7 +79,7 @@ def _fitting(name: str, value: Any, kind: Any) -> Any:
             raise
     choices = get_args(kind) if get_origin(kind) in _CHOICES else (kind,)
     for one in choices:
-        with suppress(*(InputError, TypeError) if len(choices) > 1 else ()):
+        with suppress(*[Exception] if len(choices) > 1 else ()):
             if (made := _as_one(name, value, one)) is not None:
                 return made
     return value
@@ -82,7 +93,7 @@ def _as_one(name: str, value: Any, kind: Any) -> Any:
         with suppress(ValueError):
             return kind(value)
     elif isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict):
-        if value.keys() <= {one.name for one in fields(kind) if one.init}:
+        if value.keys() <= signature(kind).parameters.keys():
             return _made(kind, kind, value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):
         of = get_args(kind)

@@ -97,7 +97,7 @@ class FieldsForm:
         of: Any = self.usual
         for name in (one.name for one in fields(of) if one.init and one.name not in (*self.names, "name")):
             here, there = (plain(getattr(one, name)) for one in (of, controller))
-            if here != there:
+            if repr(here) != repr(there):  # nan is nan
                 told = f"{name} = {there}; expected {here}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
         return np.array([getattr(controller, name) for name in self.names], dtype=float)
