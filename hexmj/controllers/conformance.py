@@ -8,24 +8,23 @@ stride: tips within `REACH` of its range.
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.asking import advanced, begin, difference, place, said, tell
+from hexmj.controllers.asking import advanced, place, said, tell
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import (
     Controller,
-    Plan,
     ReadingPlan,
     Sensed,
-    SteerablePlan,
     check_controller_type,
     claims_mirrored,
     settings_of,
 )
+from hexmj.controllers.steering_laws import restarted, seen, slowed
+from hexmj.controllers.trial import DIVIDED, N_STARTS, STEPS, Trial, same
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import draw_starts
@@ -40,12 +39,6 @@ ACCELERATION = Acceleration(rate=0.005, start=0.1)
 
 SEEDS = (0, 1)
 """Of the starts."""
-
-N_STARTS, STEPS = 8, 600
-"""Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
-
-DIVIDED = (1, 7, 250, 342)
-"""The same steps in parts."""
 
 REACH = 1.0
 """How far a tip may be beyond PEP_min or AEP_0 on its own axis [mm]; legs overshoot both by a step."""
@@ -66,38 +59,6 @@ class Finding:
     """One sentence: what is wrong, with values, or what was looked at."""
     note: bool = False
     """Whether it is only told, and no law."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Some walks that a controller is asked for."""
-
-    controller: Controller
-    starts: np.ndarray
-    """(start, leg) [mm]."""
-    velocity: np.ndarray
-    """(start,)."""
-    stride: Stride
-    acceleration: Acceleration | None
-
-    def begin(self, threads: int | None = 1) -> Plan:
-        """A new plan."""
-        return begin(self.controller, self.starts, self.velocity, self.stride, self.acceleration, threads)
-
-    @cached_property
-    def walk(self) -> PlannedWalk:
-        """All steps at once."""
-        return advanced(self.begin(), STEPS)
-
-    @cached_property
-    def in_parts(self) -> PlannedWalk:
-        """The same, `DIVIDED`."""
-        plan = self.begin()
-        return joined([advanced(plan, steps) for steps in DIVIDED])
-
-    def of(self, which: Any) -> "Trial":
-        """The same of some starts."""
-        return replace(self, starts=self.starts[which], velocity=self.velocity[which])
 
 
 def check_controller(controller: object, stride: Stride | None = None) -> None:
@@ -218,12 +179,12 @@ def _reach(trial: Trial) -> None:
 
 
 def _again(trial: Trial) -> None:
-    _same(trial.walk, advanced(trial.begin(), STEPS), "two plans that are begun alike")
-    _same(trial.walk, advanced(trial.begin(threads=2), STEPS), "with 1 and 2 threads")
+    same(trial.walk, advanced(trial.begin(), STEPS), "two plans that are begun alike")
+    same(trial.walk, advanced(trial.begin(threads=2), STEPS), "with 1 and 2 threads")
 
 
 def _divided(trial: Trial) -> None:
-    _same(trial.walk, trial.in_parts, f"{STEPS} steps at once and in parts of {DIVIDED}")
+    same(trial.walk, trial.in_parts, f"{STEPS} steps at once and in parts of {DIVIDED}")
 
 
 def _side_by_side(trial: Trial) -> None:
@@ -231,13 +192,13 @@ def _side_by_side(trial: Trial) -> None:
     plans = [trial.begin(), other.begin()]
     walks = zip(*([advanced(plan, steps) for plan in plans] for steps in DIVIDED), strict=True)
     for alone, parts in zip((trial.walk, other.walk), walks, strict=True):
-        _same(alone, joined(parts), "a plan alone, and beside another of the same controller,")
+        same(alone, joined(parts), "a plan alone, and beside another of the same controller,")
 
 
 def _batch(trial: Trial) -> None:
     n = len(trial.starts)
     for which in ([0], [n - 2], [*range(n)[::-1]], np.arange(3 * n) % n):
-        _same(of_starts(trial.walk, which), trial.of(which).walk, "a start alone, in another order, or among others")
+        same(of_starts(trial.walk, which), trial.of(which).walk, "a start alone, in another order, or among others")
 
 
 def _fast_losses(trial: Trial) -> None:
@@ -254,14 +215,14 @@ def _at_speed(trial: Trial) -> None:
         with said("a controller, begin_at_speed"):
             plan = controller.begin_at_speed(trial.starts, trial.velocity, trial.stride, trial.acceleration, 1)
         usual = replace(trial, acceleration=None).walk
-        _same(usual, advanced(plan, STEPS), "begin without an acceleration, and begin_at_speed,")
+        same(usual, advanced(plan, STEPS), "begin without an acceleration, and begin_at_speed,")
 
 
 def _mirrored(trial: Trial) -> None:
     if claims_mirrored(trial.controller):
         other = replace(trial, starts=trial.starts[:, MIRROR]).walk
         back = replace(other, **{name: getattr(other, name)[..., MIRROR] for name in PLANNED})
-        _same(trial.walk, replace(back, y=-back.y), "mirrored starts, mirrored back,")
+        same(trial.walk, replace(back, y=-back.y), "mirrored starts, mirrored back,")
 
 
 def _reading(trial: Trial) -> None:
@@ -277,82 +238,7 @@ def _reading(trial: Trial) -> None:
                 raise InputError(f"sense changes what it is told, {one.name}; expected it to work on a copy")
         parts.append(advanced(plan, 1))
     by_itself = advanced(trial.begin(), len(parts))
-    _same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
-
-
-def _steerable(trial: Trial) -> SteerablePlan | None:
-    """A new plan, if it can be steered."""
-    plan = trial.begin()
-    with said("a plan, tips and standing"):
-        return plan if isinstance(plan, SteerablePlan) else None
-
-
-def _seen(trial: Trial) -> None:
-    if (plan := _steerable(trial)) is not None:
-        last = advanced(plan, 250)
-        _is_where(plan, last.x[-1], last.stance[-1], "after a step")
-        tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
-        with said("a plan, see"):
-            plan.see(tips.copy(), standing.copy())
-        _is_where(plan, tips, standing, "after see")
-
-
-def _restarted(trial: Trial) -> None:
-    if (plan := _steerable(trial)) is not None:
-        which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, 250)
-        with said("a plan, restart"):
-            plan.restart(which.copy(), trial.starts.copy())
-        rows = which[:, None]
-        _is_where(
-            plan, np.where(rows, trial.starts, last.x[-1]), rows | last.stance[-1], "after restart of some starts"
-        )
-        on = advanced(plan, 250)
-        _same(of_starts(on, which), of_starts(advanced(trial.begin(), 250), which), "restart, and beginning,")
-        _same(
-            of_starts(on, ~which), of_starts(_later(trial), ~which), "starts alone, and beside some that restart,", 250
-        )
-
-
-def _slowed(trial: Trial) -> None:
-    if (plan := _steerable(trial)) is not None:
-        which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
-        advanced(plan, 250)
-        with said("a plan, slow_down"):
-            plan.slow_down(which.copy())
-        on = advanced(plan, 250)
-        ages = np.where(which, 0, 250)
-        commanded = commanded_velocities(v, ages, 250, trial.stride, trial.acceleration)
-        if (bad := np.argwhere(on.velocity != commanded)).size:
-            step, start = bad[0]
-            asked = "" if which[start] else ", which was not asked to,"
-            raise InputError(
-                f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} in step {step + 1} after"
-                f" slow_down; expected {commanded[step, start]:.6g}"
-            )
-        _same(
-            of_starts(on, ~which),
-            of_starts(_later(trial), ~which),
-            "starts alone, and beside some that slow down,",
-            250,
-        )
-
-
-def _later(trial: Trial) -> PlannedWalk:
-    """From step 250 to 500."""
-    advanced(plan := trial.begin(), 250)
-    return advanced(plan, 250)
-
-
-def _is_where(plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray, when: str) -> None:
-    """Refuse a plan whose own tips and states are not these, (start, leg)."""
-    for name, expected in (("tips", tips), ("standing", standing)):
-        with said(f"a plan, {name}"):
-            shape = np.shape(getattr(plan, name))
-        if shape != expected.shape:
-            raise InputError(f"{name} has the shape {shape} {when}; expected {expected.shape}")
-        if (bad := np.argwhere((found := np.asarray(getattr(plan, name))) != expected)).size:
-            at = tuple(bad[0])
-            raise InputError(f"{name} of start {at[0]}, leg {at[1]} is {found[at]!s} {when}; expected {expected[at]!s}")
+    same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
 
 
 LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
@@ -370,9 +256,9 @@ LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "batch": (_batch, "a start walks alike alone, in another order and among others"),
     "first losses": (_fast_losses, "first_losses, where plans have it, are those of the plan"),
     "at speed": (_at_speed, "begin_at_speed, where there is one, walks as begin does without an acceleration"),
-    "see": (_seen, "a plan that can be steered is where its last step says, and goes on from other legs where told"),
-    "restart": (_restarted, "its starts restart as they begin, and the others do not feel it"),
-    "slow down": (_slowed, "its starts begin at V_r(0) again when told, and the others do not feel it"),
+    "see": (seen, "a plan that can be steered is where its last step says, and goes on from other legs where told"),
+    "restart": (restarted, "its starts restart as they begin, and the others do not feel it"),
+    "slow down": (slowed, "its starts begin at V_r(0) again when told, and the others do not feel it"),
     "mirrored": (_mirrored, "mirrored starts give mirrored walks, where it claims that"),
     "sense": (_reading, "a plan that reads the legs can be told of some starts, and the others do not feel it"),
 }
@@ -398,12 +284,6 @@ def _sliding(trials: list[Trial]) -> str:
                 " this costs nothing, in physics the feet scrape"
             )
     return found
-
-
-def _same(one: PlannedWalk, other: PlannedWalk, what: str, before: int = 0) -> None:
-    """Refuse two walks, from a step on, that differ."""
-    if differ := difference(one, other, before):
-        raise InputError(f"{what} differ: {differ}; expected the same bits")
 
 
 def _as_planned(walk: PlannedWalk, ids: np.ndarray, stride: Stride) -> Sensed:

@@ -1,0 +1,96 @@
+"""Laws of plans that can be steered: what `see`, `restart` and `slow_down` ask is what they do."""
+
+import numpy as np
+
+from hexmj.controllers.asking import advanced, said
+from hexmj.controllers.protocol import SteerablePlan
+from hexmj.controllers.trial import Trial, same
+from hexmj.errors import InputError
+from hexmj.timing import commanded_velocities
+from hexmj.walks import PlannedWalk, of_starts
+
+BEFORE = AFTER = 250
+"""Steps before a plan is steered, and after it: 25 time units, a swing and a quarter."""
+
+
+def _steerable(trial: Trial) -> SteerablePlan | None:
+    """A new plan, if it can be steered."""
+    plan = trial.begin()
+    with said("a plan, tips and standing"):
+        return plan if isinstance(plan, SteerablePlan) else None
+
+
+def seen(trial: Trial) -> None:
+    """A plan is where its last step says, and where `see` puts it.
+
+    Raises:
+        InputError: it is elsewhere.
+    """
+    if (plan := _steerable(trial)) is not None:
+        last = advanced(plan, BEFORE)
+        _is_where(plan, last.x[-1], last.stance[-1], "after a step")
+        tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
+        with said("a plan, see"):
+            plan.see(tips.copy(), standing.copy())
+        _is_where(plan, tips, standing, "after see")
+
+
+def restarted(trial: Trial) -> None:
+    """Starts that `restart` go on as they begin, to the last bit, and the others as if nothing were.
+
+    Raises:
+        InputError: they do not.
+    """
+    if (plan := _steerable(trial)) is not None:
+        which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, BEFORE)
+        with said("a plan, restart"):
+            plan.restart(which.copy(), trial.starts.copy())
+        tips = np.where(which[:, None], trial.starts, last.x[-1])
+        _is_where(plan, tips, which[:, None] | last.stance[-1], "after restart of some starts")
+        on = advanced(plan, AFTER)
+        same(of_starts(on, which), of_starts(advanced(trial.begin(), AFTER), which), "restart, and beginning,")
+        alone = of_starts(_later(trial), ~which)
+        same(of_starts(on, ~which), alone, "starts alone, and beside some that restart,", BEFORE)
+
+
+def slowed(trial: Trial) -> None:
+    """Starts that `slow_down` are at V_r(0) of Eq. 11 again, and the others go on as if nothing were.
+
+    Raises:
+        InputError: they do not.
+    """
+    if (plan := _steerable(trial)) is not None:
+        which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
+        advanced(plan, BEFORE)
+        with said("a plan, slow_down"):
+            plan.slow_down(which.copy())
+        on = advanced(plan, AFTER)
+        ages = np.where(which, 0, BEFORE)
+        commanded = commanded_velocities(v, ages, AFTER, trial.stride, trial.acceleration)
+        if (bad := np.argwhere(on.velocity != commanded)).size:
+            step, start = bad[0]
+            asked = "" if which[start] else ", which was not asked to,"
+            raise InputError(
+                f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} in step {step + 1} after"
+                f" slow_down; expected {commanded[step, start]:.6g}"
+            )
+        alone = of_starts(_later(trial), ~which)
+        same(of_starts(on, ~which), alone, "starts alone, and beside some that slow down,", BEFORE)
+
+
+def _later(trial: Trial) -> PlannedWalk:
+    """What it plans where it is not steered, after `BEFORE`."""
+    advanced(plan := trial.begin(), BEFORE)
+    return advanced(plan, AFTER)
+
+
+def _is_where(plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray, when: str) -> None:
+    """Refuse a plan whose own tips and states are not these, (start, leg)."""
+    for name, expected in (("tips", tips), ("standing", standing)):
+        with said(f"a plan, {name}"):
+            shape = np.shape(getattr(plan, name))
+        if shape != expected.shape:
+            raise InputError(f"{name} has the shape {shape} {when}; expected {expected.shape}")
+        if (bad := np.argwhere((found := np.asarray(getattr(plan, name))) != expected)).size:
+            at = tuple(bad[0])
+            raise InputError(f"{name} of start {at[0]}, leg {at[1]} is {found[at]!s} {when}; expected {expected[at]!s}")

@@ -1,0 +1,70 @@
+"""Walks that a controller is asked for when it is held to the laws of its protocol."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hexmj.controllers.asking import advanced, begin, difference
+from hexmj.controllers.protocol import Controller, Plan
+from hexmj.errors import InputError
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk, joined
+
+N_STARTS, STEPS = 8, 600
+"""Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
+
+DIVIDED = (1, 7, 250, 342)
+"""The same steps in parts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Some walks that a controller is asked for."""
+
+    controller: Controller
+    """Plans them."""
+    starts: np.ndarray
+    """Tips at time 0, (start, leg) [mm]."""
+    velocity: np.ndarray
+    """V_r, or its final value, (start,)."""
+    stride: Stride
+    """Step range, lines of the tips and time step."""
+    acceleration: Acceleration | None
+    """Eq. 11, if the walks accelerate."""
+
+    def begin(self, threads: int | None = 1) -> Plan:
+        """A new plan."""
+        return begin(self.controller, self.starts, self.velocity, self.stride, self.acceleration, threads)
+
+    @cached_property
+    def walk(self) -> PlannedWalk:
+        """All steps at once."""
+        return advanced(self.begin(), STEPS)
+
+    @cached_property
+    def in_parts(self) -> PlannedWalk:
+        """The same, `DIVIDED`."""
+        plan = self.begin()
+        return joined([advanced(plan, steps) for steps in DIVIDED])
+
+    def of(self, which: Any) -> "Trial":
+        """The same of some starts."""
+        return replace(self, starts=self.starts[which], velocity=self.velocity[which])
+
+
+def same(one: PlannedWalk, other: PlannedWalk, what: str, before: int = 0) -> None:
+    """Refuse two walks of the same starts that differ.
+
+    Args:
+        one: the first.
+        other: the second.
+        what: they are, in the sentence.
+        before: steps before both.
+
+    Raises:
+        InputError: they differ.
+    """
+    if differ := difference(one, other, before):
+        raise InputError(f"{what} differ: {differ}; expected the same bits")
