@@ -34,4 +34,5 @@ def run(monkeypatch, capsys):
             code = int(stop.code or 0)
         return code, *capsys.readouterr()
 
-    return call
+    yield call
+    LOADED.clear()
