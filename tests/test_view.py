@@ -106,6 +106,13 @@ class NeverAtSpeed(Cruse1998):
             raise ValueError("not at speed")
 
 
+def test_a_plan_whose_tips_fail_is_a_sentence(monkeypatch):
+    live = begun()
+    monkeypatch.setattr(type(live._plan._plan), "tips", property(lambda plan: 1 / 0))
+    with pytest.raises(InputError, match="a plan, tips and standing: ZeroDivisionError in "):
+        live.steer(velocity=0.3)
+
+
 def test_what_makes_no_sense_changes_nothing():
     live = begun()
     live.advance(0.1)
@@ -178,6 +185,16 @@ def test_a_push_that_is_taken_back_ends():
     walk.push(0.0)
     walk.advance(0.00125)
     assert not force.any()
+
+
+@pytest.mark.parametrize("pushes", [(80.0, 1.0), (80.0, 80.0, 80.0)])
+def test_pushes_in_flight_add_up(pushes):
+    """No walk is called exploded since the last of its pushes alone is too weak for it."""
+    live = begun()
+    for impulse in pushes:
+        live.push(impulse)
+        live.advance(0.06)
+    assert live.advance(0.1).qpos[1] > 500.0
 
 
 def test_a_push_moves_the_insect_to_its_side():

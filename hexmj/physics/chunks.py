@@ -63,7 +63,7 @@ class Insects:
     def __init__(self, settled: Settled, push: Push | None = None, threads: int | None = None) -> None:
         """Put all at rest; `threads` step them, one per core unless given."""
         self.settled, self._push, self._columns = settled, push, settled.compiled.columns
-        self._impulse = push.impulse if push else np.zeros(len(settled.starts))
+        self._pushed = np.zeros(len(settled.starts))  # by impulses that add up, whatever their direction [g mm/s]
         self._batch = MujocoBatch(settled.compiled, len(settled.starts), threads)
         self._batch.put(np.arange(len(settled.starts)), settled.state)
         self._steps, self._senses = FineSteps.of(self._batch, settled.substeps, settled.compiled), Senses(settled)
@@ -93,7 +93,7 @@ class Insects:
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
         centre = whole["sensors"][:, :, self._columns.centre_of_mass]
-        if odd := explosion(whole["qpos"], centre, valid, self._impulse[first.ids], self.settled):
+        if odd := explosion(whole["qpos"], centre, valid, self._pushed[first.ids], self.settled):
             control = _joined([orders.control for orders in done])[odd.row, : odd.substep + 1]
             start = int(first.ids[odd.row])
             state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
@@ -110,7 +110,7 @@ class Insects:
         Raises:
             StillThrown: the first of them.
         """
-        check_landed(ids, self._batch.qpos[ids], self._batch.qvel[ids], self._impulse[ids], self.settled)
+        check_landed(ids, self._batch.qpos[ids], self._batch.qvel[ids], self._pushed[ids], self.settled)
 
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
         """Refuse walks, (n, substep, column) until they fall, that lead beyond the ground that was laid."""
@@ -157,6 +157,7 @@ class Insects:
             begin = self._push.begins(stride)
             now = (begin <= first) & (first < begin + lasts)
             self._batch.push[:] = now * (self._push.impulse / (lasts * seconds))
+            self._pushed += (begin == first) * np.abs(self._push.impulse)
 
 
 def _joined(values: list[np.ndarray]) -> np.ndarray:

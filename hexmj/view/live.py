@@ -105,9 +105,12 @@ class Steered:
         Returns:
             Whether both the last plan and the controller can do so; else nothing has changed.
         """
-        if not (isinstance(self._plan, SteerablePlan) and is_steerable(controller)):
+        if not is_steerable(controller):
             return False
-        tips, standing = self._plan.tips, self._plan.standing
+        with said("a plan, tips and standing"):
+            if not isinstance(self._plan, SteerablePlan):
+                return False
+            tips, standing = self._plan.tips, self._plan.standing
         with said("a controller, begin_at_speed"):
             plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
         if not hasattr(plan, "see"):
