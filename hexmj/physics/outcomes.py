@@ -201,7 +201,8 @@ class OutcomesSoFar:
         depth = np.where(np.arange(chunk.depth.shape[1]) < until[:, None], chunk.depth, 0.0)
         self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
         share = np.clip(until / m - np.arange(len(chunk.plan.time))[:, None], 0.0, 1.0)
-        self._commanded[ids] += np.cumsum(share * chunk.plan.velocity[:, ids], axis=0)[-1] * dt
+        for commanded in share * chunk.plan.velocity[:, ids]:  # step by step: the same bits, however chunks are cut
+            self._commanded[ids] += commanded
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
         _, measured, _ = measured_walk(chunk, settled, stable)
         if measured.stance.size:
@@ -216,7 +217,7 @@ class OutcomesSoFar:
         """
         sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
         with np.errstate(invalid="ignore", divide="ignore"):
-            speed = np.where(self._commanded > 0, self._walked / self._commanded, np.nan)
+            speed = np.where(self._commanded > 0, self._walked / (self._commanded * self._settled.stride.dt), np.nan)
             slip = sums.slid / (sums.contacts * compiled.model.opt.timestep)
             saturation = sums.saturated / (sums.shown * compiled.joints)
         found = Outcomes(
