@@ -186,6 +186,12 @@ def put_back(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
     plan.see(np.where(rows, tips, plan.tips), plan.standing | rows)
 
 
+def with_the_first(plan: LiftedPlan, tips: np.ndarray, standing: np.ndarray) -> None:
+    """All starts walk as fast as the first one after they were seen."""
+    LiftedPlan.see(plan, tips, standing)
+    plan._final = np.full_like(plan._final, plan._final[0])
+
+
 def steered(**changed: Any) -> Any:
     """A rival whose plans do something else where they are steered."""
     plan = type("SteeredPlan", (LiftedPlan,), changed)
@@ -198,6 +204,7 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("see", steered(tips=property(lambda plan: plan.starts[:, :5])), r"tips has the shape \(8, 5\) after a step; exp"),
     ("see", steered(standing=property(lambda plan: 1 / 0)), "a plan, tips and standing: ZeroDivisionError"),
     ("see", steered(tips=property(lambda plan: plan.starts)), "tips of start 1, leg 0 is .* after a step; expected"),
+    ("see", steered(see=with_the_first), "among others, that go on after see, differ: .* in step 2.., start "),
     (
         "restart",
         steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips)),

@@ -1,5 +1,7 @@
 """Laws of plans that can be steered: what `see`, `restart` and `slow_down` ask is what they do."""
 
+from typing import cast
+
 import numpy as np
 
 from hexmj.controllers.asking import advanced, said
@@ -7,7 +9,7 @@ from hexmj.controllers.protocol import SteerablePlan
 from hexmj.controllers.trial import Trial, same
 from hexmj.errors import InputError
 from hexmj.timing import commanded_velocities
-from hexmj.walks import PlannedWalk, of_starts
+from hexmj.walks import PLANNED, PlannedWalk, copied, of_starts
 
 BEFORE = AFTER = 250
 """Steps before a plan is steered, and after it: 25 time units, a swing and a quarter."""
@@ -21,10 +23,10 @@ def _steerable(trial: Trial) -> SteerablePlan | None:
 
 
 def seen(trial: Trial) -> None:
-    """A plan is where its last step says, and where `see` puts it.
+    """A plan is where its last step says, and where `see` puts it, and goes on from there as starts alone do.
 
     Raises:
-        InputError: it is elsewhere.
+        InputError: it is elsewhere, or goes on otherwise.
     """
     if (plan := _steerable(trial)) is not None:
         last = advanced(plan, BEFORE)
@@ -33,6 +35,12 @@ def seen(trial: Trial) -> None:
         with said("a plan, see"):
             plan.see(tips.copy(), standing.copy())
         _is_where(plan, tips, standing, "after see")
+        on, which = advanced(plan, AFTER), ~_every_other(trial)
+        advanced(alone := cast(SteerablePlan, trial.of(which).begin()), BEFORE)
+        with said("a plan, see"):
+            alone.see(tips[which].copy(), standing[which].copy())
+        expected = _beside(on, which, advanced(alone, AFTER))
+        same(on, expected, "starts alone, and among others, that go on after see,", BEFORE)
 
 
 def restarted(trial: Trial) -> None:
@@ -42,15 +50,15 @@ def restarted(trial: Trial) -> None:
         InputError: they do not.
     """
     if (plan := _steerable(trial)) is not None:
-        which, last = np.arange(len(trial.starts)) % 2 == 0, advanced(plan, BEFORE)
+        which, last = _every_other(trial), advanced(plan, BEFORE)
         with said("a plan, restart"):
             plan.restart(which.copy(), trial.starts.copy())
         tips = np.where(which[:, None], trial.starts, last.x[-1])
         _is_where(plan, tips, which[:, None] | last.stance[-1], "after restart of some starts")
-        on = advanced(plan, AFTER)
-        same(of_starts(on, which), of_starts(advanced(trial.begin(), AFTER), which), "restart, and beginning,")
-        alone = of_starts(_later(trial), ~which)
-        same(of_starts(on, ~which), alone, "starts alone, and beside some that restart,", BEFORE)
+        on, begun = advanced(plan, AFTER), advanced(trial.begin(), AFTER)
+        same(on, _beside(on, which, of_starts(begun, which)), "restart, and beginning,")
+        later = of_starts(_later(trial), ~which)
+        same(on, _beside(on, ~which, later), "starts alone, and beside some that restart,", BEFORE)
 
 
 def slowed(trial: Trial) -> None:
@@ -60,7 +68,7 @@ def slowed(trial: Trial) -> None:
         InputError: they do not.
     """
     if (plan := _steerable(trial)) is not None:
-        which, v = np.arange(len(trial.starts)) % 2 == 0, trial.velocity
+        which, v = _every_other(trial), trial.velocity
         advanced(plan, BEFORE)
         with said("a plan, slow_down"):
             plan.slow_down(which.copy())
@@ -74,8 +82,21 @@ def slowed(trial: Trial) -> None:
                 f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} in step {step + 1} after"
                 f" slow_down; expected {commanded[step, start]:.6g}"
             )
-        alone = of_starts(_later(trial), ~which)
-        same(of_starts(on, ~which), alone, "starts alone, and beside some that slow down,", BEFORE)
+        later = of_starts(_later(trial), ~which)
+        same(on, _beside(on, ~which, later), "starts alone, and beside some that slow down,", BEFORE)
+
+
+def _every_other(trial: Trial) -> np.ndarray:
+    """Every other start, (start,)."""
+    return np.arange(len(trial.starts)) % 2 == 0
+
+
+def _beside(walk: PlannedWalk, which: np.ndarray, other: PlannedWalk) -> PlannedWalk:
+    """A walk in which some starts, (start,), walk as in another of these alone."""
+    mixed = copied(walk)
+    for name in PLANNED:
+        getattr(mixed, name)[:, which] = getattr(other, name)
+    return mixed
 
 
 def _later(trial: Trial) -> PlannedWalk:
