@@ -20,6 +20,9 @@ WINDOWS = ("walk", "start")
 MOST_STEPS = 10**7
 """Longest walk [steps]; far beyond any use."""
 
+AT_SPEED = 10**9
+"""Steps after which every acceleration has ended."""
+
 LEAST_STEP = 1e-5
 """Shortest time step of a plan [time units]; a ten-thousandth of the usual one."""
 

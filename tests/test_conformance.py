@@ -192,6 +192,20 @@ def with_the_first(plan: LiftedPlan, tips: np.ndarray, standing: np.ndarray) -> 
     plan._final = np.full_like(plan._final, plan._final[0])
 
 
+def forgetful(plan: LiftedPlan, which: np.ndarray) -> None:
+    """Forgets what the rule remembered."""
+    LiftedPlan.slow_down(plan, which)
+    plan._state = type(plan._state)(*(np.zeros_like(one) for one in plan._state))
+
+
+@dataclass(frozen=True)
+class NeverSlow(Metronome):
+    """Knows of no acceleration once it walks."""
+
+    def begin_at_speed(self, starts: Any, velocity: Any, stride: Any, *_: Any) -> LiftedPlan:
+        return LiftedPlan(self, starts, velocity, stride, None)
+
+
 def steered(**changed: Any) -> Any:
     """A rival whose plans do something else where they are steered."""
     plan = type("SteeredPlan", (LiftedPlan,), changed)
@@ -221,6 +235,13 @@ BROKEN: list[tuple[str, Any, str]] = [
         steered(slow_down=lambda plan, which: LiftedPlan.slow_down(plan, np.ones_like(which))),
         "accelerating: velocity of start 3, which was not asked to, is",
     ),
+    (
+        "slow down",
+        steered(slow_down=lambda plan, _: LiftedPlan.see(plan, plan.starts, plan.standing)),
+        "tips of start 1, leg 0 is .* after slow_down; expected",
+    ),
+    ("slow down", steered(slow_down=forgetful), "go on as fast, and the same without slow_down, differ: "),
+    ("slow down", NeverSlow(), "accelerating: velocity of start 2 is 0.5 in step 1 after slow_down; expected 0.1"),
     ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
     ("settings", Melting(), "not frozen"),
     ("settings", Hiding(), "object.*is no setting"),

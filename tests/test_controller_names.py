@@ -119,7 +119,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from hexmj import timing
-from typing import TYPE_CHECKING, ClassVar, Literal, Optional, Sequence
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Optional, Sequence
 
 if TYPE_CHECKING:
     from nowhere import Thing
@@ -134,6 +134,19 @@ class Inner:
 @dataclass(frozen=True)
 class Named:
     g: str = ""
+
+class Deep(NamedTuple):
+    a: float = 1.0
+    b: float = 2.0
+
+@dataclass(frozen=True)
+class Part:
+    deep: Deep = Deep()
+    c: int = 3
+
+@dataclass(frozen=True)
+class Fast:
+    g: float = 3.0
 
 @dataclass(frozen=True)
 class Odd:
@@ -161,6 +174,10 @@ class Odd:
     fixed: ClassVar[int] = 3
     own: Own = Own.HERE
     which: Named | Inner = Inner()
+    usual: Inner | Part | Fast = Fast()
+    part: Part = Part(deep=Deep(b=5.0))
+    file: Path | None = None
+    files: tuple[Path, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "place", Path(self.place))
@@ -183,6 +200,8 @@ class Odd:
         ('[fields]\nmade = {g = "x"}', "g = 'x'; expected a number"),
         ("[fields]\neither = 1.5", "either = 1.5; expected a whole number or a text"),
         ('[fields]\nmixed = ["b", true]', "mixed = .*; expected 2 values: True or False, a text"),
+        ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
+        ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
         ("name = 'x'", "holds controller, name; expected controller and a table"),
         (
@@ -205,6 +224,7 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     Path("odd.py").write_text(KINDS)
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
     told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
+    told |= {"usual": {"g": 4}, "part": {"c": 4, "deep": {"a": 7}}, "file": "gains.toml", "files": ["a", "b"]}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
@@ -212,6 +232,9 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     assert repr([odd.own, odd.which]) == "[<Own.HERE: 1>, Inner(g=2.0)]"
     assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"
     assert repr([odd.plain, odd.inner]) == "[Inner(g=2.0), {'g': 2}]"
+    assert repr(odd.part) == "Part(deep=Deep(a=7.0, b=5.0), c=4)", "what is not told is as usual"
+    assert repr(odd.usual) == "Fast(g=4.0)", "of the kind it is, where others fit too"
+    assert (odd.file, odd.files) == (Path("gains.toml"), (Path("a"), Path("b")))
     assert plain(odd)["mode"]["member"] == "SLOW"
 
 

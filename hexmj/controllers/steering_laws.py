@@ -1,25 +1,30 @@
 """Laws of plans that can be steered: what `see`, `restart` and `slow_down` ask is what they do."""
 
-from typing import cast
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 
 from hexmj.controllers.asking import advanced, said
-from hexmj.controllers.protocol import SteerablePlan
+from hexmj.controllers.protocol import SteerablePlan, is_steerable
 from hexmj.controllers.trial import Trial, same
 from hexmj.errors import InputError
-from hexmj.timing import commanded_velocities
+from hexmj.timing import AT_SPEED, commanded_velocities
 from hexmj.walks import PLANNED, PlannedWalk, copied, of_starts
 
 BEFORE = AFTER = 250
 """Steps before a plan is steered, and after it: 25 time units, a swing and a quarter."""
 
 
-def _steerable(trial: Trial) -> SteerablePlan | None:
-    """A new plan, if it can be steered."""
-    plan = trial.begin()
-    with said("a plan, tips and standing"):
-        return plan if isinstance(plan, SteerablePlan) else None
+def _steerable(trial: Trial) -> Iterator[tuple[Trial, SteerablePlan]]:
+    """A new plan, and one of `begin_at_speed`, of those that can be steered; and the trials that they are of."""
+    for one in (trial, replace(trial, at_speed=True))[: 1 + is_steerable(trial.controller)]:
+        plan: Any = one.begin()
+        with said("a plan, tips and standing"):
+            steerable = isinstance(plan, SteerablePlan)
+        if steerable:
+            yield one, plan
 
 
 def seen(trial: Trial) -> None:
@@ -28,7 +33,7 @@ def seen(trial: Trial) -> None:
     Raises:
         InputError: it is elsewhere, or goes on otherwise.
     """
-    if (plan := _steerable(trial)) is not None:
+    for one, plan in _steerable(trial):
         last = advanced(plan, BEFORE)
         _is_where(plan, last.x[-1], last.stance[-1], "after a step")
         tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
@@ -36,9 +41,9 @@ def seen(trial: Trial) -> None:
             plan.see(tips.copy(), standing.copy())
         _is_where(plan, tips, standing, "after see")
         on, which = advanced(plan, AFTER), ~_every_other(trial)
-        advanced(alone := cast(SteerablePlan, trial.of(which).begin()), BEFORE)
+        advanced(alone := one.of(which).begin(), BEFORE)
         with said("a plan, see"):
-            alone.see(tips[which].copy(), standing[which].copy())
+            cast(SteerablePlan, alone).see(tips[which].copy(), standing[which].copy())
         expected = _beside(on, which, advanced(alone, AFTER))
         same(on, expected, "starts alone, and among others, that go on after see,", BEFORE)
 
@@ -49,7 +54,7 @@ def restarted(trial: Trial) -> None:
     Raises:
         InputError: they do not.
     """
-    if (plan := _steerable(trial)) is not None:
+    for one, plan in _steerable(trial):
         which, last = _every_other(trial), advanced(plan, BEFORE)
         with said("a plan, restart"):
             plan.restart(which.copy(), trial.starts.copy())
@@ -57,24 +62,25 @@ def restarted(trial: Trial) -> None:
         _is_where(plan, tips, which[:, None] | last.stance[-1], "after restart of some starts")
         on, begun = advanced(plan, AFTER), advanced(trial.begin(), AFTER)
         same(on, _beside(on, which, of_starts(begun, which)), "restart, and beginning,")
-        later = of_starts(_later(trial), ~which)
+        later = of_starts(_later(one), ~which)
         same(on, _beside(on, ~which, later), "starts alone, and beside some that restart,", BEFORE)
 
 
 def slowed(trial: Trial) -> None:
-    """Starts that `slow_down` are at V_r(0) of Eq. 11 again, and the others go on as if nothing were.
+    """Starts that `slow_down` are at V_r(0) of Eq. 11 again, the legs as they are; the others go on as if nothing were.
+
+    So do all without an acceleration.
 
     Raises:
         InputError: they do not.
     """
-    if (plan := _steerable(trial)) is not None:
-        which, v = _every_other(trial), trial.velocity
-        advanced(plan, BEFORE)
+    for one, plan in _steerable(trial):
+        which, last, v = _every_other(trial), advanced(plan, BEFORE), trial.velocity
         with said("a plan, slow_down"):
             plan.slow_down(which.copy())
-        on = advanced(plan, AFTER)
-        ages = np.where(which, 0, BEFORE)
-        commanded = commanded_velocities(v, ages, AFTER, trial.stride, trial.acceleration)
+        _is_where(plan, last.x[-1], last.stance[-1], "after slow_down")
+        ages = np.where(which, 0, AT_SPEED if one.at_speed else BEFORE)
+        on, commanded = advanced(plan, AFTER), commanded_velocities(v, ages, AFTER, trial.stride, trial.acceleration)
         if (bad := np.argwhere(on.velocity != commanded)).size:
             step, start = bad[0]
             asked = "" if which[start] else ", which was not asked to,"
@@ -82,8 +88,9 @@ def slowed(trial: Trial) -> None:
                 f"velocity of start {start}{asked} is {on.velocity[step, start]:.6g} in step {step + 1} after"
                 f" slow_down; expected {commanded[step, start]:.6g}"
             )
-        later = of_starts(_later(trial), ~which)
-        same(on, _beside(on, ~which, later), "starts alone, and beside some that slow down,", BEFORE)
+        as_fast = ~which if trial.acceleration else np.ones_like(which)
+        later = of_starts(_later(one), as_fast)
+        same(on, _beside(on, as_fast, later), "starts that go on as fast, and the same without slow_down,", BEFORE)
 
 
 def _every_other(trial: Trial) -> np.ndarray:

@@ -1,13 +1,14 @@
-"""Fields as a TOML file tells them: members of an enumeration by name or value, records as tables, rows as lists."""
+"""Fields as a TOML file tells them: members of enumerations by name or value, records as tables, rows as lists."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from functools import partial
 from inspect import signature
 from itertools import repeat
+from pathlib import PurePath
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -27,13 +28,18 @@ def with_fields(usual: Any, values: dict[str, Any]) -> Any:
         InputError: a value of another type.
         Exception: whatever its class raises, and of fields that are not there.
     """
-    return _made(type(usual), partial(replace, usual), values)
+    return _made(type(usual), usual, values)
 
 
-def _made(kind: type, make: Callable[..., Any], values: dict[str, Any]) -> Any:
-    types = _types(kind)
-    told = {name: _fitting(name, value, types.get(name)) for name, value in values.items()}
-    made = make(**told)
+def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
+    """A record; what is not told is as in the usual one, if that is of this kind, else as its class has it."""
+    types, known = _types(kind), type(usual) is kind
+    told = {
+        name: _fitting(name, value, types.get(name), getattr(usual, name, None) if known else None)
+        for name, value in values.items()
+    }
+    change = (usual._replace if hasattr(usual, "_replace") else partial(replace, usual)) if known else kind
+    made = change(**told)
     for name, value in told.items():
         if _is_checked(of := types.get(name)) and not _fits(value, of):
             typed(name, getattr(made, name), of)
@@ -50,6 +56,10 @@ def _fits(value: Any, kind: Any) -> bool:
 def _types(kind: type) -> dict[str, Any]:
     """What a class's fields are annotated with, but for names that only type checkers know."""
     types = {}
+    if not is_dataclass(kind):
+        with suppress(NameError, AttributeError, TypeError, SyntaxError):
+            return get_type_hints(kind)
+        return types
     for one in fields(kind):
         own = (base for base in kind.__mro__[::-1] if vars(base).get("__dataclass_fields__", {}).get(one.name) is one)
         base = next(own, kind)
@@ -67,10 +77,15 @@ def _is_checked(kind: Any) -> bool:
         return bool(of) and all(one is Ellipsis or _is_checked(one) for one in of)
     if origin is Literal or kind in (*_PLAIN, NoneType):
         return True
-    return isinstance(kind, type) and (issubclass(kind, Enum) or is_dataclass(kind))
+    return isinstance(kind, type) and (issubclass(kind, Enum | PurePath) or _is_record(kind))
 
 
-def _fitting(name: str, value: Any, kind: Any) -> Any:
+def _is_record(kind: Any) -> bool:
+    """Whether a type is a dataclass or a named tuple."""
+    return isinstance(kind, type) and (is_dataclass(kind) or (issubclass(kind, tuple) and hasattr(kind, "_fields")))
+
+
+def _fitting(name: str, value: Any, kind: Any, usual: Any = None) -> Any:
     """What a file tells, as its type has it; of what does not fit a class may make its own, but for plain ones."""
     try:
         return value if kind is None else typed(name, value, kind)
@@ -78,23 +93,25 @@ def _fitting(name: str, value: Any, kind: Any) -> Any:
         if kind in _PLAIN:
             raise
     choices = get_args(kind) if get_origin(kind) in _CHOICES else (kind,)
-    for one in choices:
+    for one in sorted(choices, key=lambda one: one is not type(usual)):
         with suppress(*[Exception] if len(choices) > 1 else ()):
-            if (made := _as_one(name, value, one)) is not None:
+            if (made := _as_one(name, value, one, usual)) is not None:
                 return made
     return value
 
 
-def _as_one(name: str, value: Any, kind: Any) -> Any:
-    """A member of an enumeration, a record or a row, as a file tells them; None where it tells something else."""
+def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
+    """A member of an enumeration, path, record or row, as a file tells them; None where it tells something else."""
     if isinstance(kind, type) and issubclass(kind, Enum):
         if isinstance(value, str) and value in kind.__members__:
             return kind[value]
         with suppress(ValueError):
             return kind(value)
-    elif isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict):
+    elif isinstance(kind, type) and issubclass(kind, PurePath):
+        return kind(value) if isinstance(value, str) else None
+    elif _is_record(kind) and isinstance(value, dict):
         if value.keys() <= signature(kind).parameters.keys():
-            return _made(kind, kind, value)
+            return _made(kind, usual, value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):
         of = get_args(kind)
         each = of[:1] * len(value) if Ellipsis in of or get_origin(kind) is Sequence else of

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, begin, difference
+from hexmj.controllers.asking import advanced, begin, difference, said
 from hexmj.controllers.protocol import Controller, Plan
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
@@ -33,9 +33,16 @@ class Trial:
     """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None
     """Eq. 11, if the walks accelerate."""
+    at_speed: bool = False
+    """Whether they begin at their final velocity, and accelerate only where they are slowed down."""
 
     def begin(self, threads: int | None = 1) -> Plan:
         """A new plan."""
+        if self.at_speed:
+            controller: Any = self.controller
+            with said("a controller, begin_at_speed"):
+                asked = self.starts.copy(), self.velocity.copy(), self.stride, self.acceleration, threads
+                return controller.begin_at_speed(*asked)
         return begin(self.controller, self.starts, self.velocity, self.stride, self.acceleration, threads)
 
     @cached_property

@@ -14,11 +14,8 @@ from hexmj.checks import check_types
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.timing import Acceleration, Stride, commanded_velocities
+from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
 from hexmj.walks import PlannedWalk
-
-AT_SPEED = 10**9
-"""Steps after which every acceleration has ended."""
 
 
 @dataclass(frozen=True, eq=False)
