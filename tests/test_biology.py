@@ -264,7 +264,7 @@ def test_phases_around_zero_have_their_mean_there():
     ipsilateral = result.isel(row=result.name.values == "phase, ipsilateral")
     assert_allclose(ipsilateral["mean"], 0.9555)
     assert_allclose(ipsilateral.high - 0.9555, 0.9555 - ipsilateral.low)
-    assert_allclose(ipsilateral.high - ipsilateral.low, 2 * 1.959964 * 0.333 / 2, rtol=1e-6)
+    assert_allclose(ipsilateral.high - ipsilateral.low, 2 * 12.706205 * 0.333 / 2, rtol=1e-6)
     assert_allclose(result.isel(row=result.name.values == "duty factor")["mean"], 0.5)
     for turned in (result, result.transpose("row", "start", "quantity", "speed")):
         drawn = biology_figure(turned).axes[2].lines[0]

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import stdtrit
 
 from hexmj.checks import whole
 from hexmj.errors import InputError
 from hexmj.gaits import unrolled
-from hexmj.intervals import WILSON_Z
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
 from hexmj.studies.biology.names import PHASES, UNITS
 from hexmj.studies.same_starts import SameStarts
@@ -88,12 +88,12 @@ class Biology(SameStarts):
 
 
 def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
-    """Mean of those that are known, and its 95 % interval around it, which of phases may go beyond 0 or 1."""
+    """Mean of those that are known, and its 95 % interval by Student's t, which of phases may go beyond 0 or 1."""
     known = unrolled(values) if (phase := quantity in PHASES) else values
     known = known[np.isfinite(known)]
     if len(known) < 2:
         return (float(known.mean()) if len(known) else np.nan), np.nan, np.nan
-    middle, half = known.mean(), WILSON_Z * known.std(ddof=1) / np.sqrt(len(known))
+    middle, half = known.mean(), stdtrit(len(known) - 1, 0.975) * known.std(ddof=1) / np.sqrt(len(known))
     middle = middle % 1.0 if phase else middle
     return middle, middle - half, middle + half
 
