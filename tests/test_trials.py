@@ -38,10 +38,19 @@ def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
     assert np.array_equal(planned.stance[..., others], whole.stance[..., others])
     assert np.array_equal(planned.x, whole.x)
     walked = physical_walk(starts, lame, 0.3, 30.0)
-    held = walked.measured.time > 2 * RAISED
+    step = 20.0  # mm from PEP_0 to AEP_0
+    held = walked.measured.time > 2 * RAISED * step
     upright = np.isfinite(walked.height[held][..., leg])
     assert not walked.measured.stance[held][..., leg].any()
-    assert (walked.height[held][..., leg][upright] > HELD / 3).mean() > 0.9
+    assert (walked.height[held][..., leg][upright] > HELD * step / 3).mean() > 0.9
+
+
+def test_a_lost_leg_is_held_as_high_as_the_steps_are_long() -> None:
+    high = []
+    for stride in (Stride(), Stride(aep0=5.0, pep0=-5.0, pep_min=-10.0)):
+        plan = LegLost(hexmj.LDVS, 0).begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
+        high.append(np.nanmax(plan.advance(300).height[..., 0]))
+    assert high == [12.0, 6.0]
 
 
 def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:

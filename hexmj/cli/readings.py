@@ -60,7 +60,7 @@ class Readings:
             readings = [replace(protocol, reading=one) for one in named]
         best = min(12, len(readings)) if self.best is None else self.best
         if not 1 <= best <= len(readings):
-            raise InputError(f"--best = {best}; expected at least 1 and at most the {len(readings)} readings tried")
+            raise InputError(f"--best = {best}; expected 1 to {len(readings)}, as many readings as are tried")
         out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
         with self.sweepers.executor() as executor, progress_bar("reading") as progress:
             how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}

@@ -9,11 +9,11 @@ from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, ch
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
-HELD = 12.0
-"""Height at which the lost leg is held [mm]."""
+HELD = 0.6
+"""Height at which the lost leg is held, in steps from PEP_0 to AEP_0."""
 
-RAISED = 4.0
-"""Time in which it is raised there as the walk begins [time units]."""
+RAISED = 0.2
+"""Time in which it is raised there as the walk begins, in times of a swing over such a step."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ class LamePlan:
         self.done = self._plan.done
         stance, height = walk.stance.copy(), walk.height.copy()
         stance[..., self._leg] = False
-        height[..., self._leg] = HELD * np.minimum(walk.time / RAISED, 1.0)[:, None]
+        step = self.stride.aep0 - self.stride.pep0
+        height[..., self._leg] = HELD * step * np.minimum(walk.time / (RAISED * step), 1.0)[:, None]
         return replace(walk, stance=stance, height=height)
 
 
