@@ -7,8 +7,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from http.client import HTTPConnection
 from types import SimpleNamespace
 from typing import Any
 from urllib.request import urlopen
@@ -32,6 +34,7 @@ from hexmj.starts import draw_starts
 from hexmj.view import desktop
 from hexmj.view.browser import BrowserView, footfall
 from hexmj.view.live import LiveWalk
+from hexmj.view.served import page_server
 from hexmj.view.session import LiveSession
 
 STARTS = draw_starts(8, seed=1)
@@ -337,6 +340,19 @@ def test_who_hangs_up_is_no_error(view, caplog):
         assert answer.status == 200
     view.server.stop()
     assert not caplog.records
+
+
+def test_a_served_page_is_there_for_who_asks_for_its_head():
+    with page_server("<html></html>", "127.0.0.1", 0) as server, ThreadPoolExecutor(1) as thread:
+        serving = thread.submit(server.serve_forever)
+        for path, status, size in (("", 200, "13"), ("elsewhere", 404, "0")):
+            asked = HTTPConnection("127.0.0.1", server.server_port)
+            asked.request("HEAD", f"/{path}")
+            answer = asked.getresponse()
+            assert (answer.status, answer.getheader("Content-Length"), answer.read()) == (status, size, b"")
+            asked.close()
+        server.shutdown()
+        serving.result()
 
 
 @pytest.mark.slow

@@ -20,8 +20,10 @@ def page_server(text: str, host: str, port: int) -> ThreadingHTTPServer:
             self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(content) if self.path == "/" else 0))
             self.end_headers()
-            if self.path == "/":
+            if self.path == "/" and self.command == "GET":
                 self.wfile.write(content)
+
+        do_HEAD = do_GET
 
         def log_message(self, format: str, *args: object) -> None:
             """Nothing is told of who looked."""
