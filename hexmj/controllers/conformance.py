@@ -13,23 +13,22 @@ from typing import Any
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.asking import advanced, place, said, tell
+from hexmj.controllers.asking import advanced, place, said
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import (
     Controller,
-    ReadingPlan,
-    Sensed,
     check_controller_type,
     claims_mirrored,
     settings_of,
 )
+from hexmj.controllers.reading_law import told
 from hexmj.controllers.steering_laws import restarted, seen, slowed
 from hexmj.controllers.trial import DIVIDED, N_STARTS, STEPS, Trial, same
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, commanded_velocities
-from hexmj.walks import PLANNED, PlannedWalk, joined, of_starts
+from hexmj.walks import PLANNED, joined, of_starts
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
 """V_r of the starts of a trial, in turn."""
@@ -223,22 +222,6 @@ def _mirrored(trial: Trial) -> None:
         same(trial.walk, replace(back, y=-back.y), "mirrored starts, mirrored back,")
 
 
-def _reading(trial: Trial) -> None:
-    plan = trial.begin()
-    if not isinstance(plan, ReadingPlan):
-        return
-    told, others, parts = np.arange(0, len(trial.starts), 2), slice(1, None, 2), [advanced(plan, 1)]
-    for _ in range(99):
-        sensed, before = (_as_planned(parts[-1], told, trial.stride) for _ in range(2))
-        tell(plan, sensed)
-        for one in fields(Sensed):
-            if not np.array_equal(getattr(sensed, one.name), getattr(before, one.name)):
-                raise InputError(f"sense changes what it is told, {one.name}; expected it to work on a copy")
-        parts.append(advanced(plan, 1))
-    by_itself = advanced(trial.begin(), len(parts))
-    same(of_starts(by_itself, others), of_starts(joined(parts), others), "starts it is told nothing of")
-
-
 LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "settings": (_settings, "a frozen dataclass with a name, its settings plain data"),
     "begin": (_begin, "plans begin at time 0 of the starts and stride asked for"),
@@ -258,7 +241,7 @@ LAWS: dict[str, tuple[Callable[[Trial], None], str]] = {
     "restart": (restarted, "its starts restart as they begin, and the others do not feel it"),
     "slow down": (slowed, "its starts begin at V_r(0) again when told, and the others do not feel it"),
     "mirrored": (_mirrored, "mirrored starts give mirrored walks, where it claims that"),
-    "sense": (_reading, "a plan that reads the legs can be told of some starts, and the others do not feel it"),
+    "sense": (told, "a plan that reads the legs feels what it is told of each start, and nothing of others"),
 }
 """Every law by its name, and what it has looked at where it is kept."""
 
@@ -282,13 +265,3 @@ def _sliding(trials: list[Trial]) -> str:
                 " this costs nothing, in physics the feet scrape"
             )
     return found
-
-
-def _as_planned(walk: PlannedWalk, ids: np.ndarray, stride: Stride) -> Sensed:
-    """What legs would know that do as the last step says, their feet 10 mm below the root where they stand."""
-    x, y, stance, height = (getattr(walk, name)[-1, ids] for name in ("x", "y", "stance", "height"))
-    tips = np.stack([x + np.array(stride.geometry.origin), y, np.nan_to_num(height) - 10.0], axis=-1)
-    gained, lost = np.zeros_like(stance), np.zeros_like(stance)
-    load = np.where(stance, 9810.0 / np.maximum(stance.sum(axis=1, keepdims=True), 1), 0.0)
-    angles, vector = np.zeros(tips.shape), np.zeros((len(ids), 3))
-    return Sensed(ids, tips, stance, gained, lost, load, angles, angles.copy(), vector[:, :2], vector, vector.copy())

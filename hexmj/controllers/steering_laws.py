@@ -8,10 +8,10 @@ import numpy as np
 
 from hexmj.controllers.asking import advanced, said
 from hexmj.controllers.protocol import SteerablePlan, is_steerable
-from hexmj.controllers.trial import Trial, same
+from hexmj.controllers.trial import Trial, every_other, mixed, same
 from hexmj.errors import InputError
 from hexmj.timing import AT_SPEED, commanded_velocities
-from hexmj.walks import PLANNED, PlannedWalk, copied, of_starts
+from hexmj.walks import PlannedWalk, of_starts
 
 BEFORE = AFTER = 250
 """Steps before a plan is steered, and after it: 25 time units, a swing and a quarter."""
@@ -40,11 +40,11 @@ def seen(trial: Trial) -> None:
         with said("a plan, see"):
             plan.see(tips.copy(), standing.copy())
         _is_where(plan, tips, standing, "after see")
-        on, which = advanced(plan, AFTER), ~_every_other(trial)
+        on, which = advanced(plan, AFTER), ~every_other(trial)
         advanced(alone := one.of(which).begin(), BEFORE)
         with said("a plan, see"):
             cast(SteerablePlan, alone).see(tips[which].copy(), standing[which].copy())
-        expected = _beside(on, which, advanced(alone, AFTER))
+        expected = mixed(on, which, advanced(alone, AFTER))
         same(on, expected, "starts alone, and among others, that go on after see,", BEFORE)
 
 
@@ -55,15 +55,15 @@ def restarted(trial: Trial) -> None:
         InputError: they do not.
     """
     for one, plan in _steerable(trial):
-        which, last = _every_other(trial), advanced(plan, BEFORE)
+        which, last = every_other(trial), advanced(plan, BEFORE)
         with said("a plan, restart"):
             plan.restart(which.copy(), trial.starts.copy())
         tips = np.where(which[:, None], trial.starts, last.x[-1])
         _is_where(plan, tips, which[:, None] | last.stance[-1], "after restart of some starts")
         on, begun = advanced(plan, AFTER), advanced(trial.begin(), AFTER)
-        same(on, _beside(on, which, of_starts(begun, which)), "restart, and beginning,")
+        same(on, mixed(on, which, of_starts(begun, which)), "restart, and beginning,")
         later = of_starts(_later(one), ~which)
-        same(on, _beside(on, ~which, later), "starts alone, and beside some that restart,", BEFORE)
+        same(on, mixed(on, ~which, later), "starts alone, and beside some that restart,", BEFORE)
 
 
 def slowed(trial: Trial) -> None:
@@ -75,7 +75,7 @@ def slowed(trial: Trial) -> None:
         InputError: they do not.
     """
     for one, plan in _steerable(trial):
-        which, last, v = _every_other(trial), advanced(plan, BEFORE), trial.velocity
+        which, last, v = every_other(trial), advanced(plan, BEFORE), trial.velocity
         with said("a plan, slow_down"):
             plan.slow_down(which.copy())
         _is_where(plan, last.x[-1], last.stance[-1], "after slow_down")
@@ -90,20 +90,7 @@ def slowed(trial: Trial) -> None:
             )
         as_fast = ~which if trial.acceleration else np.ones_like(which)
         later = of_starts(_later(one), as_fast)
-        same(on, _beside(on, as_fast, later), "starts that go on as fast, and the same without slow_down,", BEFORE)
-
-
-def _every_other(trial: Trial) -> np.ndarray:
-    """Every other start, (start,)."""
-    return np.arange(len(trial.starts)) % 2 == 0
-
-
-def _beside(walk: PlannedWalk, which: np.ndarray, other: PlannedWalk) -> PlannedWalk:
-    """A walk in which some starts, (start,), walk as in another of these alone."""
-    mixed = copied(walk)
-    for name in PLANNED:
-        getattr(mixed, name)[:, which] = getattr(other, name)
-    return mixed
+        same(on, mixed(on, as_fast, later), "starts that go on as fast, and the same without slow_down,", BEFORE)
 
 
 def _later(trial: Trial) -> PlannedWalk:

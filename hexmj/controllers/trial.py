@@ -10,7 +10,7 @@ from hexmj.controllers.asking import advanced, begin, difference, said
 from hexmj.controllers.protocol import Controller, Plan
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, joined
+from hexmj.walks import PLANNED, PlannedWalk, copied, joined
 
 N_STARTS, STEPS = 8, 600
 """Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
@@ -59,6 +59,19 @@ class Trial:
     def of(self, which: Any) -> "Trial":
         """The same of some starts."""
         return replace(self, starts=self.starts[which], velocity=self.velocity[which])
+
+
+def every_other(trial: Trial) -> np.ndarray:
+    """Every other start, (start,)."""
+    return np.arange(len(trial.starts)) % 2 == 0
+
+
+def mixed(walk: PlannedWalk, which: np.ndarray, other: PlannedWalk) -> PlannedWalk:
+    """A walk in which some starts, (start,), walk as in another of these alone."""
+    walk = copied(walk)
+    for name in PLANNED:
+        getattr(walk, name)[:, which] = getattr(other, name)
+    return walk
 
 
 def same(one: PlannedWalk, other: PlannedWalk, what: str, before: int = 0) -> None:
