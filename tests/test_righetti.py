@@ -1,5 +1,7 @@
 """Righetti and Ijspeert's oscillators: the limit cycle, the tripod, and transitions that wait for the load."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import hexmj
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.controllers.rivals.righetti import Hopf, Righetti
 from hexmj.controllers.rivals.table import RIVALS
+from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Stride
@@ -60,3 +63,15 @@ def test_a_leg_at_the_end_of_its_stance_waits_while_it_carries_a_third_of_the_we
         now, some = rule.lifts(now, legs)
         lifted |= some
     assert (lifted == lifts).all()
+
+
+def test_a_step_at_which_the_oscillators_diverge_is_refused() -> None:
+    """Explicit steps hold at 0.2 time units up to V = 0.95; past that legs would be lifted at PEP_min alone."""
+    starts = hexmj.draw_starts(20, 1)
+    for dt, velocity, told in (
+        (0.2, 0.95, None),
+        (0.5, 0.3, None),
+        (0.5, 0.5, "dt = 0.5 and V_r = 0.5; expected a sho"),
+    ):
+        with pytest.raises(InputError, match=told) if told else nullcontext():
+            hexmj.first_loss(starts, RIVALS["righetti"], velocity, 200.0, stride=hexmj.Stride(dt=dt))

@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.errors import InputError
 
 TRIPOD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """(leg,) k_ij is the product of two legs' signs."""
@@ -74,7 +75,22 @@ class Righetti(Lifted):
         return Hopf(np.cos(angle), np.sin(angle))
 
     def lifts(self, state: Hopf, legs: Legs) -> tuple[Hopf, np.ndarray]:
-        """See `LiftingRule`."""
+        """See `LiftingRule`.
+
+        Raises:
+            InputError: a time step at which the oscillators diverge.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            after = self._step(state, legs)
+        if not (known := np.isfinite(after.y).all(axis=1)).all():
+            v = legs.v[np.argmin(known), 0]
+            raise InputError(
+                f"{self.name}: its oscillators diverge at dt = {legs.stride.dt:g} and V_r = {v:.3g}; expected a shorter"
+                " time step"
+            )
+        return after, (state.y >= 0) & (after.y < 0)
+
+    def _step(self, state: Hopf, legs: Legs) -> Hopf:
         x, y = state
         swing = np.pi * legs.stride.dt / (legs.stride.aep0 - legs.stride.pep0)  # omega_swing dt
         seconds = swing / np.pi * legs.v * legs.stance_part  # dt in a time in which a period lasts 1 s
@@ -84,11 +100,10 @@ class Righetti(Lifted):
         others = self.coupling * seconds * (TRIPOD * _sum(TRIPOD * y) - y)
         stop, hasten = self.feedback(state, legs.load)
         u = np.where(stop, -turn * x - others, np.where(hasten, -np.sign(y) * self.push * seconds, 0.0))  # Eq. 4
-        after = Hopf(
+        return Hopf(
             x + self.alpha * back * x - turn * y,  # Eq. 1
             y + self.beta * back * y + turn * x + others + u,  # Eq. 2
         )
-        return after, (y >= 0) & (after.y < 0)
 
     def feedback(self, state: Hopf, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(start, leg) whose transition is stopped, and whose is hastened, given the share of the weight on each."""
