@@ -21,7 +21,7 @@ from hexmj.studies.biology.figure import biology_figure
 from hexmj.studies.biology.ground_forces import GroundForces
 from hexmj.studies.biology.names import SEGMENTS, UNITS
 from hexmj.studies.biology.quantities import quantities
-from hexmj.studies.biology.strides import Strides, last_strides, onsets, strides_between
+from hexmj.studies.biology.strides import Strides, last_strides, onsets, rows_of_a_hop, strides_between
 from hexmj.studies.biology.study import MEASURED, Biology
 from hexmj.studies.biology.table import rows
 from hexmj.sweeps import conduct
@@ -117,17 +117,40 @@ def test_a_leg_that_is_lifted_in_the_first_row_begins_its_strides_with_the_next(
         if chunk.first >= (8 - MEASURED) * period / settled.stride.dt * settled.substeps
     ]
     standing = np.concatenate([chunk.standing[0, :, 0] for chunk in (first, *chunks)])
-    lifted = onsets(standing, settled.compiled.model.opt.timestep)
+    lifted = onsets(standing, rows_of_a_hop(settled))
     assert lifted[0] == 1
     ((_, strides),) = last_strides(settled, LDVS, velocity, 8 * period, MEASURED * period)
     assert len(strides.qpos) == lifted[-1] - lifted[1]
     assert np.isfinite(list(quantities(strides, settled.compiled).values())).any()
 
 
+@pytest.mark.parametrize("vp", [80.0, 500.0, 800.0])
+def test_swings_are_told_from_hops_however_fast_legs_are(vp):
+    """Swings of 24 ms at V_p = 800 mm/s are shorter than what is a hop at 80."""
+    settled, period = settle(draw_starts(2, 0)[:1], Conditions.of(vp=vp)), float(Stride().periods(24.0 / vp))
+    ((_, strides),) = last_strides(settled, LDVS, 24.0 / vp, 8 * period, 3 * period)
+    told = quantities(strides, settled.compiled)
+    assert told["period"] == pytest.approx(period / vp, rel=0.05)
+    assert [len(strides.lifted(leg)) for leg in range(6)] == [strides.count] * 6
+    assert math.isfinite(told["phase, ipsilateral"] + told["phase, contralateral"])
+
+
+def test_heights_are_those_above_the_ground_that_is_walked_on(walking):
+    """All legs are on the step long before the strides that count."""
+    on_step = settle(draw_starts(3, 0), Conditions.of(ground="step", ground_at=45.0, ground_height=3.0))
+    strides = dict(last_strides(on_step, LDVS, 0.3, 6 * PERIOD, 2 * PERIOD))
+    for one in strides.values():
+        told, flat = quantities(one, on_step.compiled), walking[1][0]
+        for segment in SEGMENTS:
+            name = f"height of the coxae, {segment}"
+            assert told[name] == pytest.approx(flat[name], abs=0.3)
+    assert strides
+
+
 def test_a_hop_is_no_swing():
     standing = np.ones(100, dtype=bool)
     standing[10:12] = standing[40:60] = standing[90:] = False
-    assert onsets(standing, 0.01).tolist() == [40, 90]
+    assert onsets(standing, 3.0).tolist() == [40, 90]
 
 
 def test_who_lifts_where_strides_begin_or_end_has_as_many_stances_as_there_are_strides(walking):

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.reading import joint_numbers, posed
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.legs import SIDE
@@ -121,14 +122,16 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
 
 
 def _posture(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
-    """Heights of the coxae over standing tips; the thorax lies from the hind coxae to the front ones."""
+    """Heights of the coxae over tips that stand below them, or beside a gap; the thorax lies from the hind coxae to the
+    front ones."""
     coxae = _coxae(compiled)
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
+    ground = ground_level(compiled.conditions.ground, compiled.body.lengths, places[..., :2])
     height = places[..., 2] - compiled.foot_radius
     rise = height.reshape(-1, 2, 3).mean(axis=1)[:, [0, 2]] @ [1.0, -1.0]
     pitch = np.degrees(np.arcsin(rise / np.linalg.norm((coxae[0] - coxae[2])[[0, 2]])))
     return {
-        "height of the coxae": height.mean(axis=0),
+        "height of the coxae": (height - np.maximum(ground, 0.0)).mean(axis=0),
         "pitch of the thorax": pitch.mean(),
         "pitch, range over the strides": np.ptp(_seen(pitch, FRAME / strides.step)),
         "height of the centre of mass, range over the strides": np.ptp(

@@ -13,8 +13,8 @@ from hexmj.physics.drive import Chunk, drive
 from hexmj.physics.settling import Settled
 from hexmj.studies.biology.ground_forces import GroundForces
 
-HOP = 0.03
-"""A foot that is off the ground for less does not swing [s]."""
+HOP = 0.12
+"""A foot that is off the ground for a smaller part of the time from PEP_0 to AEP_0 does not swing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,8 @@ class Strides:
     """Strides."""
     step: float
     """Physics step [s]."""
+    hop: float
+    """Rows off the ground beyond which a foot swings."""
     qpos: np.ndarray
     """(row, position) before each step."""
     velocity: np.ndarray
@@ -45,7 +47,7 @@ class Strides:
     def lifted(self, leg: int) -> np.ndarray:
         """Rows in which a leg begins to swing, of a walk that repeats itself."""
         rows = len(self.standing)
-        found = onsets(np.tile(self.standing[:, leg], 3), self.step)
+        found = onsets(np.tile(self.standing[:, leg], 3), self.hop)
         return found[(found >= rows) & (found < 2 * rows)] - rows
 
     def stances(self, leg: int) -> list[np.ndarray]:
@@ -78,10 +80,10 @@ def last_strides(
     first = (duration - measured) / settled.stride.dt * settled.substeps
     chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
     walked = chunks[-1].ids[~chunks[-1].fell] if chunks else ()
-    forces = GroundForces(settled.compiled)
+    forces, hop = GroundForces(settled.compiled), rows_of_a_hop(settled)
     for start in walked:
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
-        begun = onsets(standing, settled.compiled.model.opt.timestep)
+        begun = onsets(standing, hop)
         begun = begun[begun > 1]  # before the first row no velocity is known
         if len(begun) > 1:
             yield int(start), strides_between(settled, chunks, start, begun, forces)
@@ -116,6 +118,7 @@ def strides_between(
     return Strides(
         count=len(begun) - 1,
         step=h,
+        hop=rows_of_a_hop(settled),
         qpos=qpos[rows],
         velocity=moved[begun[0] - 1 : begun[-1] - 1, :3],
         turning=turning[begun[0] - 1 : begun[-1] - 1],
@@ -127,9 +130,15 @@ def strides_between(
     )
 
 
-def onsets(standing: np.ndarray, step: float) -> np.ndarray:
+def rows_of_a_hop(settled: Settled) -> float:
+    """Rows off the ground beyond which a foot swings."""
+    stride, step = settled.stride, settled.compiled.model.opt.timestep
+    return HOP * (stride.aep0 - stride.pep0) / settled.conditions.time.vp / step
+
+
+def onsets(standing: np.ndarray, hop: float) -> np.ndarray:
     """Rows in which a foot, (row,), leaves the ground for longer than it hops."""
     changes = np.flatnonzero(standing[1:] != standing[:-1]) + 1
     lifted = changes[~standing[changes]]
     landed = np.append(changes[standing[changes]], len(standing))
-    return lifted[landed[np.searchsorted(landed, lifted)] - lifted > HOP / step]
+    return lifted[landed[np.searchsorted(landed, lifted)] - lifted > hop]
