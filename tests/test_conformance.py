@@ -15,6 +15,7 @@ from hexmj.controllers import Sensed
 from hexmj.controllers.conformance import FIRST, check_controller, findings
 from hexmj.controllers.rivals.lifted import LiftedPlan
 from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.righetti import Righetti
 from hexmj.legs import CENTRED
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Change, Own
@@ -202,6 +203,12 @@ def put_back(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
     plan.see(np.where(rows, tips, plan.tips), plan.standing | rows)
 
 
+def begun_elsewhere(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
+    """At the tips, with what the rule would remember at those of its first beginning."""
+    LiftedPlan.restart(plan, which, plan.starts)
+    plan.see(np.where(which[:, None], tips, plan.tips), plan.standing)
+
+
 def with_the_first(plan: LiftedPlan, tips: np.ndarray, standing: np.ndarray) -> None:
     """All starts walk as fast as the first one after they were seen."""
     LiftedPlan.see(plan, tips, standing)
@@ -224,10 +231,10 @@ class NeverSlow(Metronome):
         return LiftedPlan(self, starts, velocity, stride, None)
 
 
-def steered(**changed: Any) -> Any:
+def steered(rule: type = Metronome, **changed: Any) -> Any:
     """A rival whose plans do something else where they are steered."""
     plan = type("SteeredPlan", (LiftedPlan,), changed)
-    return type("Steered", (Metronome,), {"_plan": lambda rule, *asked: plan(rule, *asked)})()
+    return type("Steered", (rule,), {"_plan": lambda rule, *asked: plan(rule, *asked)})()
 
 
 BROKEN: list[tuple[str, Any, str]] = [
@@ -242,6 +249,12 @@ BROKEN: list[tuple[str, Any, str]] = [
         steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips)),
         "tips of start 1, leg 0 is .* after restart of some starts; expected",
     ),
+    (
+        "restart",
+        steered(restart=lambda plan, which, _: LiftedPlan.restart(plan, which, plan.starts)),
+        "tips of start 0, leg 0 is .* after restart of some starts; expected",
+    ),
+    ("restart", steered(Righetti, restart=begun_elsewhere), "restart, and beginning, differ: x is"),
     ("restart", steered(restart=put_back), "restart, and beginning, differ: x is"),
     (
         "slow down",

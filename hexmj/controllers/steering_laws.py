@@ -49,18 +49,19 @@ def seen(trial: Trial) -> None:
 
 
 def restarted(trial: Trial) -> None:
-    """Starts that `restart` go on as they begin, to the last bit, and the others as if nothing were.
+    """Starts that `restart` at other tips go on as they begin there, to the last bit; the others as if nothing were.
 
     Raises:
         InputError: they do not.
     """
     for one, plan in _steerable(trial):
         which, last = every_other(trial), advanced(plan, BEFORE)
+        others = replace(trial, starts=trial.starts[::-1])
         with said("a plan, restart"):
-            plan.restart(which.copy(), trial.starts.copy())
-        tips = np.where(which[:, None], trial.starts, last.x[-1])
+            plan.restart(which.copy(), others.starts.copy())
+        tips = np.where(which[:, None], others.starts, last.x[-1])
         _is_where(plan, tips, which[:, None] | last.stance[-1], "after restart of some starts")
-        on, begun = advanced(plan, AFTER), advanced(trial.begin(), AFTER)
+        on, begun = advanced(plan, AFTER), advanced(others.begin(), AFTER)
         same(on, mixed(on, which, of_starts(begun, which)), "restart, and beginning,")
         later = of_starts(_later(one), ~which)
         same(on, mixed(on, ~which, later), "starts alone, and beside some that restart,", BEFORE)
