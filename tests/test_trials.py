@@ -1,9 +1,12 @@
 """What makes walking harder in the league's trials: a lost leg, poor senses, a load, a step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import hexmj
+from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
@@ -13,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.trials import DISTURBED, TRIALS, walking
+from hexmj.studies.league.trials import DISTURBED, GROUNDS, TRIALS, crossed, walking
 from hexmj.timing import Stride
 
 
@@ -26,6 +29,17 @@ def test_trials_are_what_they_say() -> None:
     assert found["step"].conditions.ground.ground_height == 3.0
     assert found["lost 2"].controller == LegLost(hexmj.LDVS, 1)
     assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
+
+
+def test_grounds_lie_as_the_body_is_large() -> None:
+    larger = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
+    for body, sizes in ((STICK_INSECT, (3.0, 45.0, 75.0)), (larger, (4.5, 67.5, 112.5))):
+        usual = Conditions(body=body)
+        for name in GROUNDS:
+            met = walking(name, Entrant(hexmj.LDVS), usual, Stride())
+            assert met and met.conditions.ground.ground == name
+            ground = met.conditions.ground
+            assert (ground.ground_height, ground.ground_at, crossed(usual)) == pytest.approx(sizes, rel=1e-12)
 
 
 @pytest.mark.parametrize("leg", [0, 4])

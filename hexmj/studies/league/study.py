@@ -16,7 +16,7 @@ from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.trials import CROSSED, DISTURBED, GROUNDS, LEGS_LOST, TRIALS, walking
+from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, TRIALS, crossed, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride, observation_time
@@ -162,7 +162,7 @@ class League:
             if case and entrant.steerable:
                 how = {"case": case, "conditions": self.conditions, "grid": GRID}
                 yield trial, physics.disturbed, 300, how
-            elif case or (trial in GROUNDS and way < CROSSED):
+            elif case or (trial in GROUNDS and way < crossed(self.conditions)):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
                 yield trial, physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}

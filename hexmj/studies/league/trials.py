@@ -1,7 +1,6 @@
 """What walks meet in the league, at one velocity: what disturbs them, and what a robot meets."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.leg_lost import LegLost
@@ -30,18 +29,14 @@ DISTURBED: dict[str, Case] = {
 }
 """Disturbances of walks whose plan is stable until then; each begins at a moment of its own."""
 
-MET: dict[str, dict[str, Any]] = {
-    "step": {"ground": "step", "ground_height": 3.0, "ground_at": 45.0},
-    "rough": {"ground": "rough", "ground_height": 3.0, "ground_at": 45.0},
-    "load": {"load": 1.0},
-}
-"""Conditions that are met; the ground begins where even slow walks come to it with all legs."""
-
 GROUNDS = ("step", "rough")
-"""Those of them that lie ahead."""
+"""What lies ahead, as near as the body allows: even slow walks come to it with all legs."""
 
-CROSSED = 75.0
-"""Way after which all legs have come to the ground of a trial [mm]."""
+HEIGHT = 0.3
+"""Of the ground, in standing heights of the body."""
+
+LOAD = 1.0
+"""What is carried, in weights of the body."""
 
 LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
 """Name of a trial -> index of the lost leg."""
@@ -49,14 +44,15 @@ LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
 READING: tuple[str, ...] = ("reads", "noise", "late")
 """Controllers that can read the legs do so, then inexactly, then late."""
 
-TRIALS = (*DISTURBED, *MET, *LEGS_LOST, *READING)
+TRIALS = (*DISTURBED, *GROUNDS, "load", *LEGS_LOST, *READING)
 """All of them, by name."""
 
 TOLD = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
-    " until then; step and rough ground of 3 mm; load: twice the weight; lost: one leg, from the front; reads: the legs"
-    " are read; noise, late: with errors of 10 % of the step range, 20 ms late, in whole steps; - where plans cannot be"
-    " steered or read no legs, a step is too long for what happens, or the walk ends before the ground"
+    f" until then; step and rough ground of {HEIGHT:g} standing heights; load: twice the weight; lost: one leg, from"
+    " the front; reads: the legs are read; noise, late: with errors of 10 % of the step range, 20 ms late, in whole"
+    " steps; - where plans cannot be steered or read no legs, a step is too long for what happens, or the walk ends"
+    " before the ground"
 )
 """What they are."""
 
@@ -71,6 +67,11 @@ class Walking:
     """In which it walks."""
 
 
+def crossed(conditions: Conditions) -> float:
+    """Way after which all legs of a body have come to the ground of a trial [mm]."""
+    return conditions.body.lengths.nearest_obstacle * 5.0 / 3.0
+
+
 def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride) -> Walking | None:
     """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs, or not so
     late, since its steps are longer.
@@ -82,8 +83,12 @@ def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride)
         stride: with the time step.
     """
     controller, reading = entrant.controller, entrant.reading if name in READING else None
-    if name in MET:
-        return Walking(controller, conditions.but(**MET[name]))
+    if name in GROUNDS:
+        body = conditions.body
+        near, high = body.lengths.nearest_obstacle, HEIGHT * body.standing_height
+        return Walking(controller, conditions.but(ground=name, ground_height=high, ground_at=near))
+    if name == "load":
+        return Walking(controller, conditions.but(load=LOAD))
     if name in LEGS_LOST:
         return Walking(LegLost(controller, LEGS_LOST[name]), conditions)
     late = DELAY * conditions.time.vp
