@@ -3,7 +3,7 @@
 import importlib
 import shutil
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -92,6 +92,25 @@ def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values
     with pytest.raises(InputError, match="the plan is made for another body that is called stick_insect"):
         hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(body=other))
     hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(load=1.0))
+
+
+@dataclass(frozen=True)
+class Odd:
+    """Answers something."""
+
+    rows: int
+    columns: int
+    value: float = 0.0
+
+    def __call__(self, felt: np.ndarray) -> np.ndarray:
+        return np.full((self.rows, self.columns), self.value)
+
+
+@pytest.mark.parametrize("odd", [Odd(18, 2), Odd(1, 36), Odd(2, 18, np.nan)])
+def test_a_policy_that_answers_something_else_is_refused(odd):
+    with pytest.raises(InputError, match=r"a policy answers .* expected finite numbers, .*\(2, 18\)"):
+        hexmj.walk(hexmj.draw_starts(2, 0), WithOffsets(odd), 0.5, 1.0)
+    assert hexmj.walk(hexmj.draw_starts(2, 0), WithOffsets(Odd(2, 18)), 0.5, 1.0)
 
 
 @pytest.mark.slow

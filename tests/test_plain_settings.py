@@ -69,6 +69,10 @@ class Way(Enum):
     FAST = "fast"
 
 
+class Of(Enum):
+    OBJECT = object()
+
+
 class Flags(IntFlag):
     ONE = 1
 
@@ -77,13 +81,16 @@ class Tone(StrEnum):
     LOW = "low"
 
 
-def test_a_member_of_an_enumeration_is_its_class_and_name() -> None:
+def test_a_member_of_an_enumeration_is_its_class_name_and_value() -> None:
     told = [
-        {"class": f"test_plain_settings.{name}", "member": member}
-        for name, member in (("Way", "FAST"), ("Tone", "LOW"))
+        {"class": f"test_plain_settings.{name}", "member": member, "value": value}
+        for name, member, value in (("Way", "FAST", "fast"), ("Tone", "LOW", "low"))
     ]
     assert plain([Way.FAST, Tone.LOW]) == told
     assert plain(Flags(4)) != plain(Flags(8))
+    assert plain(Of.OBJECT) == {"class": "test_plain_settings.Of", "member": "OBJECT"}
+    with pytest.raises(InputError, match="Way is not what its module has under that name; expected one of a module"):
+        plain(Enum("Way", {"FAST": "slow"}).FAST)  # pyright: ignore[reportAttributeAccessIssue]
     assert list(classes({"ways": [Way.FAST], "tone": Tone.LOW})) == [Way, Tone]
 
 

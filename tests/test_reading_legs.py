@@ -50,3 +50,19 @@ def test_feedback_goes_on_from_the_legs_as_a_plan_begins_with_them():
     reading, step = SensedPlan(plans[0]).advance(300), plans[1].advance(300)
     assert same(step, replace(reading, aep=step.aep))
     assert not same(step, LDVS.begin(starts, velocity, STRIDE).advance(300))
+
+
+def test_feedback_keeps_what_it_remembers_from_plans_that_go_on_in_what_they_see(monkeypatch):
+    """A plan may step on in the very arrays that it was told."""
+    starts, velocity = hexmj.draw_starts(5, 0), np.full(5, 0.5)
+    usual, plan = LDVS.begin(starts, velocity, STRIDE).advance(100), LDVS.begin(starts, velocity, STRIDE)
+    see = type(plan).see
+
+    def seen(plan, tips, standing):
+        see(plan, tips.copy(), standing.copy())
+        tips -= 1.0
+        standing[:] = False
+
+    monkeypatch.setattr(type(plan), "see", seen)
+    walked = SensedPlan(plan).advance(100)
+    assert same(usual, replace(walked, aep=usual.aep))

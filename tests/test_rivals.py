@@ -80,3 +80,18 @@ def test_a_rule_that_later_remembers_no_named_tuple_of_all_starts_is_refused(lat
     rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
     with pytest.raises(InputError, match=r"lifts gave .* expected a named tuple of arrays whose first axis is"):
         hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    "lifted",
+    [lambda up: up.astype(int), lambda up: up[:, :1], lambda up: up[0], lambda up: np.False_, lambda up: up.tolist()],
+)
+def test_a_rule_that_lifts_something_else_than_legs_is_refused(lifted) -> None:
+    own = {
+        "name": "rule",
+        "at_start": lambda self, legs: Age(legs.x),
+        "lifts": lambda self, state, legs: (state, lifted(legs.x < 0)),
+    }
+    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
+    with pytest.raises(InputError, match=r"lifts lifts .*; expected an array \(start, leg\), \(6, 6\), of True and F"):
+        hexmj.walk(hexmj.draw_starts(6, 0), rule, 0.5, 1.0)

@@ -110,7 +110,7 @@ class SensedPlan:
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
-        self._plan.see(self._tips, self._stance)
+        self._plan.see(self._tips.copy(), self._stance.copy())
         step = self._plan.advance(1)
         self.done = self._plan.done
         way = np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.stride.dt

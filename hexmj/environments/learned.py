@@ -13,9 +13,11 @@ import numpy as np
 
 from hexmj.bodies.description import Body
 from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.checks import numbers, short
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import check_made_for
 from hexmj.rotations import lean
@@ -120,7 +122,13 @@ class OffsetPlan:
     def _step(self) -> PlannedWalk:
         step, count = self._plan.advance(1), len(self.starts)
         seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
-        offset = np.clip(self._policy(seen), -1.0, 1.0).reshape(count, 6, 3)
+        actions = numbers("answer of a policy", self._policy(seen))
+        if actions.shape != (count, 18) or not np.isfinite(actions).all():
+            raise InputError(
+                f"a policy answers {short(actions)} of the shape {actions.shape}; expected finite numbers,"
+                f" (start, leg * axis), {(count, 18)}"
+            )
+        offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)
         offset = self.made_for.body.lengths.largest_tip_offset * offset
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
         self.done = self._plan.done

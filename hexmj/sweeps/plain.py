@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
-from enum import Enum
+from enum import Enum, EnumType
 from functools import cached_property
 from inspect import getattr_static
 from os.path import isfile
@@ -48,7 +48,10 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         InputError: it is none of the things that a setting can be.
     """
     if isinstance(value, Enum):
-        return {"class": label(type(value)), "member": value.name or plain(value.value, folders, exact)}
+        told: dict[str, Any] = {"class": label(type(value)), "member": value.name}
+        with suppress(InputError):  # of what is no setting the class tells, whose code is named, too
+            told["value"] = plain(value.value, folders, exact)
+        return told
     if (names := field_names(value)) is not None:
         _check_fields(value, names)
         of_class = [*folders, *_folders(type(value))]
@@ -84,7 +87,8 @@ def label(thing: Any) -> str:
     """
     if "<" in thing.__qualname__:
         raise InputError(f"{thing.__qualname__} stands inside a function; expected one of a module")
-    if hasattr(thing, "__dataclass_fields__") and not stands_there(thing):
+    named = hasattr(thing, "__dataclass_fields__") or isinstance(thing, EnumType)
+    if named and not stands_there(thing):
         raise InputError(f"{thing.__qualname__} is not what its module has under that name; expected one of a module")
     return f"{module_label(thing.__module__)}.{thing.__qualname__}"
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, short
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
@@ -146,6 +146,10 @@ class LiftedPlan:
         moved = Legs(x, stands, self._load(stands), v, self.stride)
         state, lifted = self._rule.lifts(self._state, moved)
         self._state = _checked("lifts", state, len(x))
+        if not (isinstance(lifted, np.ndarray) and lifted.dtype == bool and lifted.shape == x.shape):
+            raise InputError(
+                f"lifts lifts {short(lifted)}; expected an array (start, leg), {x.shape}, of True and False"
+            )
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
 
     def _load(self, stands: np.ndarray) -> np.ndarray:
