@@ -147,6 +147,13 @@ def test_heights_are_those_above_the_ground_that_is_walked_on(walking):
     assert strides
 
 
+def test_heights_over_a_gap_are_those_beside_it(walking):
+    strides, told = walking
+    gap = settle(draw_starts(1, 0), Conditions.of(ground="gap", ground_at=45.0, ground_length=1000.0)).compiled
+    assert strides[0].qpos[:, 0].max() > 45.0
+    assert quantities(strides[0], gap) == told[0]
+
+
 def test_a_hop_is_no_swing():
     standing = np.ones(100, dtype=bool)
     standing[10:12] = standing[40:60] = standing[90:] = False

@@ -145,6 +145,12 @@ class Part:
     c: int = 3
 
 @dataclass(frozen=True)
+class Heir(Inner):
+    h: float = 6.0
+
+    def _replace(self): ...
+
+@dataclass(frozen=True)
 class Fast:
     g: float = 3.0
 
@@ -176,6 +182,8 @@ class Odd:
     which: Named | Inner = Inner()
     usual: Inner | Part | Fast = Fast()
     part: Part = Part(deep=Deep(b=5.0))
+    heir: Inner = Heir(g=2.0, h=7.0)
+    other_kind: Fast | Part = Fast()
     file: Path | None = None
     files: tuple[Path, ...] = ()
 
@@ -224,6 +232,7 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     Path("odd.py").write_text(KINDS)
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
     told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
+    told |= {"heir": {"g": 3}, "other_kind": {"c": 4}}
     told |= {"usual": {"g": 4}, "part": {"c": 4, "deep": {"a": 7}}, "file": "gains.toml", "files": ["a", "b"]}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
@@ -234,6 +243,8 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     assert repr([odd.plain, odd.inner]) == "[Inner(g=2.0), {'g': 2}]"
     assert repr(odd.part) == "Part(deep=Deep(a=7.0, b=5.0), c=4)", "what is not told is as usual"
     assert repr(odd.usual) == "Fast(g=4.0)", "of the kind it is, where others fit too"
+    assert repr(odd.heir) == "Heir(g=3.0, h=7.0)"
+    assert repr(odd.other_kind) == "Part(deep=Deep(a=1.0, b=2.0), c=4)"
     assert (odd.file, odd.files) == (Path("gains.toml"), (Path("a"), Path("b")))
     assert plain(odd)["mode"]["member"] == "SLOW"
 

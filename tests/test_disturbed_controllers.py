@@ -9,6 +9,8 @@ import pytest
 from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsLegs, Stride, physical_walk
 from hexmj.controllers.asking import begin
 from hexmj.controllers.protocol import is_steerable
+from hexmj.controllers.rivals.table import RIVALS
+from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
 
@@ -165,3 +167,24 @@ class Stands(Lifts):
 def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
     with pytest.raises(InputError, match="of stands: of 6 of 6 starts no leg protracts within 100 periods"):
         disturbance_of(STABLE, "leg", Stands(), V, STRIDE)
+
+
+def test_a_start_that_is_halted_restarts_beside_tips_that_are_some(monkeypatch):
+    """What it hands on is the plan's own to change, and of starts that do not restart it is where they began."""
+    starts, given = draw_starts(6, 0), []
+    righetti: Any = RIVALS["righetti"]
+    plan_of = type(righetti.begin(starts, np.full(6, 0.5), Stride()))
+    restart = plan_of.restart
+
+    def kept(plan, which, tips):
+        given.append(tips.copy())
+        restart(plan, which, tips.copy())
+        tips[:], which[:] = np.nan, True
+
+    disturbed = Disturbed(righetti, Disturbance("halt", np.arange(6) * 50 + 20, np.zeros(6, dtype=int)))
+    usual = begin(disturbed, starts, 0.5, Stride()).advance(600)
+    monkeypatch.setattr(plan_of, "restart", kept)
+    walk = begin(disturbed, starts, 0.5, Stride()).advance(600)
+    assert np.array_equal(walk.x, usual.x)
+    assert len(given) == 6
+    assert np.array_equal(given[0][1:], starts[1:])

@@ -68,6 +68,13 @@ def test_a_walk_with_energy_from_nowhere_is_an_error_that_can_be_replayed(tmp_pa
     assert capsys.readouterr().out.startswith("step 1: ")
 
 
+def test_a_walk_that_explodes_before_its_push_is_an_error():
+    settled, push = thrown(up=1500.0), Push(np.array([0.0, 60.0 * 80.0, 0.0]), np.full(3, 15.0))
+    plan = begin(LDVS, settled.starts, 0.3, settled.stride)
+    with pytest.raises(SimulationError, match=r"start 1 diverged .* its root is"):
+        list(drive(settled, plan, 20.0, push=push))
+
+
 def test_energy_is_bounded_well_above_a_walk_and_below_an_explosion():
     fastest = np.sqrt(2 * GRAVITY * (MOST_ENERGY * LEG - 10.0))
     walked(thrown(up=0.95 * fastest))

@@ -1,6 +1,6 @@
 """A controller that reads its legs, on paper, where there is nothing to be read."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -9,6 +9,7 @@ import pytest
 import hexmj
 from hexmj.controllers.losses import first_losses, planned_losses
 from hexmj.controllers.reads_legs import SensedPlan
+from hexmj.environments.learned import WithOffsets
 from stepwise_ldvs import Own, same
 
 STRIDE = hexmj.Stride()
@@ -66,3 +67,31 @@ def test_feedback_keeps_what_it_remembers_from_plans_that_go_on_in_what_they_see
     monkeypatch.setattr(type(plan), "see", seen)
     walked = SensedPlan(plan).advance(100)
     assert same(usual, replace(walked, aep=usual.aep))
+
+
+def test_feedback_copies_steps_of_plans_that_fill_the_same_arrays_again(monkeypatch):
+    starts, velocity = hexmj.draw_starts(5, 0), np.full(5, 0.5)
+    usual, plan = LDVS.begin(starts, velocity, STRIDE).advance(100), LDVS.begin(starts, velocity, STRIDE)
+    own, advance = plan.advance(0), type(plan).advance
+
+    def refilled(plan, steps):
+        nonlocal own
+        walk = advance(plan, steps)
+        if len(own.time) != steps:
+            own = walk
+        for name in ("time", "x", "stance"):
+            getattr(own, name)[:] = getattr(walk, name)
+        return own
+
+    monkeypatch.setattr(type(plan), "advance", refilled)
+    for wrapped in (SensedPlan(plan).advance(100), WithOffsets(Still()).begin(starts, velocity, STRIDE).advance(100)):
+        assert np.array_equal(wrapped.stance, usual.stance)
+        assert np.array_equal(wrapped.time, usual.time)
+
+
+@dataclass(frozen=True)
+class Still:
+    """A policy that does nothing."""
+
+    def __call__(self, felt: np.ndarray) -> np.ndarray:
+        return np.zeros((len(felt), 18))

@@ -16,6 +16,7 @@ from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.study import League
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, TRIALS, crossed, walking
 from hexmj.timing import Stride
 
@@ -40,6 +41,14 @@ def test_grounds_lie_as_the_body_is_large() -> None:
             assert met and met.conditions.ground.ground == name
             ground = met.conditions.ground
             assert (ground.ground_height, ground.ground_at, crossed(usual)) == pytest.approx(sizes, rel=1e-12)
+
+
+def test_grounds_that_no_leg_of_a_larger_body_gets_to_are_no_trials() -> None:
+    larger = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
+    for body, expected in ((STICK_INSECT, True), (larger, False)):
+        league = League({"ldvs": Entrant(hexmj.LDVS)}, window=300.0, conditions=Conditions(body=body))
+        tried = [name for name, *_ in league._tried(Entrant(hexmj.LDVS))]
+        assert ("step" in tried, "load" in tried) == (expected, True), "90 mm are walked"
 
 
 @pytest.mark.parametrize("leg", [0, 4])

@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import typed, whole
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
+from hexmj.controllers.protocol import (
+    Controller,
+    Plan,
+    ReadingPlan,
+    Sensed,
+    SteerableController,
+    SteerablePlan,
+    check_controller_type,
+)
 from hexmj.errors import InputError, is_of_numbas_cache
 from hexmj.legs import LEGS
 from hexmj.process.threads import check_memory, thread_count
@@ -55,6 +63,29 @@ def begin(
     with said(f"{controller.name}, begin"):
         plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
     check_plan(plan, x, stride)
+    return plan
+
+
+def begin_at_speed(
+    controller: SteerableController,
+    starts: np.ndarray,
+    velocity: np.ndarray,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+) -> SteerablePlan:
+    """A plan of starts and velocities that were checked, which walks at its final velocity at once.
+
+    Raises:
+        InputError: a plan that makes no sense, or cannot be steered.
+    """
+    with said(f"{controller.name}, begin_at_speed"):
+        asked = starts.copy(), velocity.copy(), replace(stride), acceleration and replace(acceleration), threads
+        plan = controller.begin_at_speed(*asked)
+        steerable = isinstance(plan, SteerablePlan)
+    if not steerable:
+        raise InputError(f"begin_at_speed of {controller.name} gave {plan!r:.80}; expected a plan that can be steered")
+    check_plan(plan, starts, stride)
     return plan
 
 

@@ -19,6 +19,7 @@ from hexmj.controllers.protocol import (
     Controller,
     check_controller_type,
     claims_mirrored,
+    is_steerable,
     settings_of,
 )
 from hexmj.controllers.reading_law import told
@@ -209,8 +210,7 @@ def _fast_losses(trial: Trial) -> None:
 
 
 def _at_speed(trial: Trial) -> None:
-    controller: Any = trial.controller
-    if callable(getattr(type(controller), "begin_at_speed", None)):
+    if is_steerable(trial.controller):
         usual = replace(trial, acceleration=None).walk
         same(usual, replace(trial, at_speed=True).walk, "begin without an acceleration, and begin_at_speed,")
 

@@ -85,7 +85,7 @@ class ReadingPlan(Plan, Protocol):
 
 @runtime_checkable
 class SteerablePlan(Plan, Protocol):
-    """A plan that can go on from other legs than its own, and begin anew."""
+    """A plan that can go on from other legs than its own, and begin anew.  What it is given is its own to keep."""
 
     @property
     def tips(self) -> np.ndarray:
@@ -104,12 +104,13 @@ class SteerablePlan(Plan, Protocol):
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
         """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
 
-        They go on as a plan does that begins there, to the last bit.
+        They go on as a plan of `begin` does that begins there, to the last bit.
         """
         ...
 
     def slow_down(self, which: np.ndarray) -> None:
-        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
+        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are; without
+        one nothing changes."""
         ...
 
 
@@ -171,7 +172,8 @@ class SteerableController(Controller, Protocol):
         acceleration: Acceleration | None = None,
         threads: int | None = None,
     ) -> SteerablePlan:
-        """A plan that walks at its final velocity at once; an acceleration takes place only after `slow_down`."""
+        """A plan that walks at its final velocity at once; an acceleration takes place only after `slow_down` or
+        `restart`."""
         ...
 
 

@@ -27,7 +27,7 @@ from hexmj.controllers.protocol import (
 )
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, joined
+from hexmj.walks import PlannedWalk, copied, joined
 
 SAME = 1e-9
 """A tip moved on from where the plan saw it if it is no farther than this from there by one step's way [mm]."""
@@ -111,7 +111,7 @@ class SensedPlan:
 
     def _step(self) -> PlannedWalk:
         self._plan.see(self._tips.copy(), self._stance.copy())
-        step = self._plan.advance(1)
+        step = copied(self._plan.advance(1))
         self.done = self._plan.done
         way = np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.stride.dt
         goes_on = (step.stance[0] == self._stance) & (np.abs(step.x[0] - self._tips - way) < SAME)

@@ -33,12 +33,9 @@ def with_fields(usual: Any, values: dict[str, Any]) -> Any:
 
 def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
     """A record; what is not told is as in the usual one, if that is of this kind, else as its class has it."""
-    types, known = _types(kind), type(usual) is kind
-    told = {
-        name: _fitting(name, value, types.get(name), getattr(usual, name, None) if known else None)
-        for name, value in values.items()
-    }
-    change = (usual._replace if hasattr(usual, "_replace") else partial(replace, usual)) if known else kind
+    types, usual = _types(kind), usual if type(usual) is kind else None
+    told = {name: _fitting(name, value, types.get(name), getattr(usual, name, None)) for name, value in values.items()}
+    change = kind if usual is None else partial(replace, usual) if is_dataclass(kind) else usual._replace
     made = change(**told)
     for name, value in told.items():
         if _is_checked(of := types.get(name)) and not _fits(value, of):
@@ -58,9 +55,8 @@ def _types(kind: type) -> dict[str, Any]:
     types = {}
     if not is_dataclass(kind):
         with suppress(NameError, AttributeError, TypeError, SyntaxError):
-            return get_type_hints(kind)
-        return types
-    for one in fields(kind):
+            types = get_type_hints(kind)
+    for one in fields(kind) if is_dataclass(kind) else ():
         own = (base for base in kind.__mro__[::-1] if vars(base).get("__dataclass_fields__", {}).get(one.name) is one)
         base = next(own, kind)
         alone = type("", (), {"__annotations__": {one.name: one.type}, "__module__": base.__module__})
@@ -93,7 +89,7 @@ def _fitting(name: str, value: Any, kind: Any, usual: Any = None) -> Any:
         if kind in _PLAIN:
             raise
     choices = get_args(kind) if get_origin(kind) in _CHOICES else (kind,)
-    for one in sorted(choices, key=lambda one: one is not type(usual)):
+    for one in sorted(choices, key=lambda one: one not in type(usual).__mro__):
         with suppress(*[Exception] if len(choices) > 1 else ()):
             if (made := _as_one(name, value, one, usual)) is not None:
                 return made
@@ -110,6 +106,7 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
     elif isinstance(kind, type) and issubclass(kind, PurePath):
         return kind(value) if isinstance(value, str) else None
     elif _is_record(kind) and isinstance(value, dict):
+        kind = type(usual) if isinstance(usual, kind) else kind
         if value.keys() <= signature(kind).parameters.keys():
             return _made(kind, usual, value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):

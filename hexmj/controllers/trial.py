@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, begin, difference, said
-from hexmj.controllers.protocol import Controller, Plan
+from hexmj.controllers.asking import advanced, begin, begin_at_speed, difference
+from hexmj.controllers.protocol import Controller, Plan, SteerableController
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk, copied, joined
@@ -34,16 +34,14 @@ class Trial:
     acceleration: Acceleration | None
     """Eq. 11, if the walks accelerate."""
     at_speed: bool = False
-    """Whether they begin at their final velocity, and accelerate only where they are slowed down."""
+    """Whether they begin at their final velocity, and accelerate only where they are slowed down or restart."""
 
     def begin(self, threads: int | None = 1) -> Plan:
         """A new plan."""
+        asked = self.starts, self.velocity, self.stride, self.acceleration, threads
         if self.at_speed:
-            controller: Any = self.controller
-            with said("a controller, begin_at_speed"):
-                asked = self.starts.copy(), self.velocity.copy(), self.stride, self.acceleration, threads
-                return controller.begin_at_speed(*asked)
-        return begin(self.controller, self.starts, self.velocity, self.stride, self.acceleration, threads)
+            return begin_at_speed(cast(SteerableController, self.controller), *asked)
+        return begin(self.controller, *asked)
 
     @cached_property
     def walk(self) -> PlannedWalk:

@@ -22,7 +22,7 @@ from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import check_made_for
 from hexmj.rotations import lean
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import PlannedWalk, joined
+from hexmj.walks import PlannedWalk, copied, joined
 
 TILT, VELOCITY, TURNING = slice(0, 2), slice(2, 5), slice(5, 8)
 CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
@@ -120,7 +120,7 @@ class OffsetPlan:
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
-        step, count = self._plan.advance(1), len(self.starts)
+        step, count = copied(self._plan.advance(1)), len(self.starts)
         seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
         actions = numbers("answer of a policy", self._policy(seen))
         if actions.shape != (count, 18) or not np.isfinite(actions).all():

@@ -200,7 +200,7 @@ class OutcomesSoFar:
         self._walked[ids] = chunk.qpos[n, last, 0] - settled.qpos[ids, 0]
         depth = np.where(np.arange(chunk.depth.shape[1]) < until[:, None], chunk.depth, 0.0)
         self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
-        share = np.clip(until / m - np.arange(len(chunk.plan.time))[:, None], 0.0, 1.0)
+        share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
         for commanded in share * chunk.plan.velocity[:, ids]:  # step by step: the same bits, however chunks are cut
             self._commanded[ids] += commanded
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))

@@ -42,7 +42,7 @@ def explosion(
         qpos: before each substep, (n, substep, position).
         centre: of mass, likewise in the world, (n, substep, 3) [mm].
         valid: substeps up to the fall, (n,).
-        impulse: of a push, (n,) [g mm/s].
+        impulse: of all pushes so far, added up, (n,) [g mm/s].
         settled: what the walks began with.
     """
     most, tumbling = most_energy(settled, impulse), TUMBLING * settled.compiled.body.lengths.shortest_leg
@@ -90,7 +90,7 @@ def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: n
         ids: which starts have not fallen, (n,).
         qpos: at the end, (n, position).
         qvel: likewise, (n, velocity).
-        impulse: of a push, (n,) [g mm/s].
+        impulse: of all pushes so far, added up, (n,) [g mm/s].
         settled: what the walks began with.
 
     Raises:

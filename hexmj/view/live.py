@@ -11,7 +11,7 @@ import numpy as np
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Bound, Conditions
-from hexmj.controllers.asking import begin, said, tell
+from hexmj.controllers.asking import begin, begin_at_speed, said, tell
 from hexmj.controllers.protocol import (
     Controller,
     Plan,
@@ -20,7 +20,6 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     is_steerable,
 )
-from hexmj.errors import InputError
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
@@ -111,14 +110,9 @@ class Steered:
             if not isinstance(self._plan, SteerablePlan):
                 return False
             tips, standing = self._plan.tips, self._plan.standing
-        with said("a controller, begin_at_speed"):
-            plan = controller.begin_at_speed(self.starts, np.array([velocity]), self.stride)
-        if not hasattr(plan, "see"):
-            raise InputError(
-                f"begin_at_speed of {controller.name} gave {plan!r:.80}; expected a plan that can be steered"
-            )
+        plan = begin_at_speed(controller, self.starts, np.array([velocity]), self.stride)
         with said("a plan, see"):
-            plan.see(tips, standing)
+            plan.see(tips.copy(), standing.copy())
         self._plan = plan
         return True
 

@@ -126,12 +126,12 @@ def _posture(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     front ones."""
     coxae = _coxae(compiled)
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
-    ground = ground_level(compiled.conditions.ground, compiled.body.lengths, places[..., :2])
+    below = [ground_level(compiled.conditions.ground, compiled.body.lengths, places[:, leg, :2]) for leg in range(6)]
     height = places[..., 2] - compiled.foot_radius
     rise = height.reshape(-1, 2, 3).mean(axis=1)[:, [0, 2]] @ [1.0, -1.0]
     pitch = np.degrees(np.arcsin(rise / np.linalg.norm((coxae[0] - coxae[2])[[0, 2]])))
     return {
-        "height of the coxae": (height - np.maximum(ground, 0.0)).mean(axis=0),
+        "height of the coxae": (height - np.maximum(np.stack(below, axis=1), 0.0)).mean(axis=0),
         "pitch of the thorax": pitch.mean(),
         "pitch, range over the strides": np.ptp(_seen(pitch, FRAME / strides.step)),
         "height of the centre of mass, range over the strides": np.ptp(

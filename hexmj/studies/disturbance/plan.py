@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexmj.controllers.asking import begin_at_speed
 from hexmj.controllers.protocol import (
     ReadingPlan,
     Sensed,
@@ -60,7 +61,7 @@ class Disturbed:
         check_steerable(self.controller)
         if (count := len(self.disturbance.step)) != len(starts):
             raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
-        plan = self.controller.begin_at_speed(starts, velocity, stride, acceleration, threads)
+        plan = begin_at_speed(self.controller, starts, velocity, stride, acceleration, threads)
         return DisturbedReadingPlan(self, plan) if isinstance(plan, ReadingPlan) else DisturbedPlan(self, plan)
 
 
@@ -74,11 +75,10 @@ class DisturbedPlan:
         self.made_for, self._slows = getattr(plan, "made_for", None), controller.slows
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, Rest] = {}
-        shape = self.starts.shape
-        self._tips, self._standing = np.empty(shape), np.empty(shape, dtype=bool)
+        self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
         self._beside = np.tile(np.array(self.stride.geometry.y, dtype=float), (len(self.starts), 1))
         self._held = self._beside.copy()
-        self.resumed = np.full(shape[0], NEVER)
+        self.resumed = np.full(len(self.starts), NEVER)
         """(start,) steps before the plan goes on again, known as soon as the start has been disturbed."""
 
     def advance(self, steps: int) -> PlannedWalk:
@@ -139,9 +139,9 @@ class DisturbedPlan:
         if not which.any():
             return
         if self._stops:
-            self._plan.restart(which, self._tips)
+            self._plan.restart(which.copy(), self._tips.copy())
         if self._slows:
-            self._plan.slow_down(which)
+            self._plan.slow_down(which.copy())
         legs = which[:, None]
         self._plan.see(np.where(legs, self._tips, self._plan.tips), np.where(legs, self._standing, self._plan.standing))
 
