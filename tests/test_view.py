@@ -343,15 +343,16 @@ def test_who_hangs_up_is_no_error(view, caplog):
 
 def test_a_served_page_is_there_for_who_asks_for_its_head():
     with page_server("<html></html>", "127.0.0.1", 0) as server, ThreadPoolExecutor(1) as thread:
-        serving = thread.submit(server.serve_forever)
-        for path, status, size in (("/", 200, 13), ("/elsewhere", 404, 0)):
-            with socket.create_connection(("127.0.0.1", server.server_port)) as asked:
-                asked.sendall(f"HEAD {path} HTTP/1.0\r\n\r\n".encode())
-                answer = asked.makefile("rb").read().decode()
-            assert answer.startswith(f"HTTP/1.0 {status} ")
-            assert answer.endswith(f"Content-Length: {size}\r\n\r\n"), "and no body"
-        server.shutdown()
-        serving.result()
+        thread.submit(server.serve_forever)
+        try:
+            for path, status, size in (("/", 200, 13), ("/elsewhere", 404, 0)):
+                with socket.create_connection(("127.0.0.1", server.server_port)) as asked:
+                    asked.sendall(f"HEAD {path} HTTP/1.0\r\n\r\n".encode())
+                    answer = asked.makefile("rb").read().decode()
+                assert answer.startswith(f"HTTP/1.0 {status} ")
+                assert answer.endswith(f"Content-Length: {size}\r\n\r\n"), "and no body"
+        finally:
+            server.shutdown()
 
 
 @pytest.mark.slow
