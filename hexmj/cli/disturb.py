@@ -107,8 +107,9 @@ class Disturb(StudyCommand):
 
 def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
     """FLSS by one measure and what the strategies take off it, each under its heading."""
-    strategy = result.strategy.values
-    shown = [n for n, one in enumerate(strategy) if measure == "physical" or one != "grasp"]
+    strategy, kinds = result.strategy.values, [one.partition(" ")[0] for one in result.disturbance.values]
+    on_paper = [not {kind, one} & {*PHYSICAL} for kind, one in zip(kinds, strategy, strict=True)]
+    shown = [n for n, one in enumerate(on_paper) if one or measure == "physical"]
     answered, slow = [n for n in shown if strategy[n] != "none"], [n for n in shown if strategy[n] == "slow_down"]
     least = result[f"{measure}_reached"].min().item()
     parts: list[str | Table] = [

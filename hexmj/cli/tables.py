@@ -38,7 +38,7 @@ def report_line(report: dict[str, float]) -> str:
 
 def interval(one: "xr.Dataset", measure: str) -> str:
     flss, low, high = (one[measure + end].item() for end in ("", "_low", "_high"))
-    return f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
+    return "-" if flss != flss else f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
 
 
 def short(value: Any) -> str:
