@@ -111,6 +111,7 @@ def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     assert one.more_low < one.more < one.more_high
     figure = ablation_figure(result)
     assert len(figure.axes) == 4 and figure.get_supxlabel() == ""
+    assert "20 starts, 2 in physics, 20 for the limit" in figure.get_suptitle()
     check_what_is_written(result)
 
 

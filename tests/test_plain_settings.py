@@ -89,8 +89,8 @@ def test_a_member_of_an_enumeration_is_its_class_name_and_value() -> None:
     assert plain([Way.FAST, Tone.LOW]) == told
     assert plain(Flags(4)) != plain(Flags(8))
     assert plain(Of.OBJECT) == {"class": "test_plain_settings.Of", "member": "OBJECT"}
-    with pytest.raises(InputError, match="Way is not what its module has under that name; expected one of a module"):
-        plain(Enum("Way", {"FAST": "slow"}).FAST)  # pyright: ignore[reportAttributeAccessIssue]
+    other: Any = Enum("Way", {"FAST": "slow"})
+    assert plain(other.FAST) == told[0] | {"value": "slow"}
     assert list(classes({"ways": [Way.FAST], "tone": Tone.LOW})) == [Way, Tone]
 
 

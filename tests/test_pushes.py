@@ -100,7 +100,7 @@ def test_a_push_begins_when_told(vp):
         assert (ends[0][start, begins + 1] != ends[1][start, begins + 1]).any()
 
 
-@pytest.mark.parametrize("vp", [60.0, 80.0, 130.0])
+@pytest.mark.parametrize("vp", [80.0, 130.0])
 def test_a_push_depends_on_no_start_beside(vp):
     """To the last bit, however their pushes cut the chunks."""
     conditions, starts, times = Conditions.of(vp=vp), draw_starts(3, 4), np.array([12.0, 14.0, 16.3])

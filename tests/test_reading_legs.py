@@ -89,6 +89,15 @@ def test_feedback_copies_steps_of_plans_that_fill_the_same_arrays_again(monkeypa
         assert np.array_equal(wrapped.time, usual.time)
 
 
+def test_steps_of_feedback_are_whosever_asked_for_them():
+    starts, velocity = hexmj.draw_starts(5, 0), np.full(5, 0.5)
+    plan, other = (hexmj.ReadsLegs(LDVS).begin(starts, velocity, STRIDE) for _ in range(2))
+    for _ in range(50):
+        usual, step = other.advance(1), plan.advance(1)
+        assert np.array_equal(step.x, usual.x) and np.array_equal(step.stance, usual.stance)
+        step.x[:], step.stance[:] = 0.0, False
+
+
 @dataclass(frozen=True)
 class Still:
     """A policy that does nothing."""

@@ -84,7 +84,14 @@ def test_a_rule_that_later_remembers_no_named_tuple_of_all_starts_is_refused(lat
 
 @pytest.mark.parametrize(
     "lifted",
-    [lambda up: up.astype(int), lambda up: up[:, :1], lambda up: up[0], lambda up: np.False_, lambda up: up.tolist()],
+    [
+        lambda up: up.astype(int),
+        lambda up: up[:, :1],
+        lambda up: up[0],
+        lambda up: np.False_,
+        lambda up: up.tolist(),
+        np.ma.array,
+    ],
 )
 def test_a_rule_that_lifts_something_else_than_legs_is_refused(lifted) -> None:
     own = {
@@ -93,5 +100,29 @@ def test_a_rule_that_lifts_something_else_than_legs_is_refused(lifted) -> None:
         "lifts": lambda self, state, legs: (state, lifted(legs.x < 0)),
     }
     rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
-    with pytest.raises(InputError, match=r"lifts lifts .*; expected an array \(start, leg\), \(6, 6\), of True and F"):
+    with pytest.raises(
+        InputError, match=r"lifts gave .* as lifted legs; expected True and False, \(start, leg\), \(6, 6\)"
+    ):
         hexmj.walk(hexmj.draw_starts(6, 0), rule, 0.5, 1.0)
+
+
+def test_what_a_rule_makes_of_the_legs_it_is_told_of_is_its_own() -> None:
+    def lifts(spoils: bool):
+        def decided(self, state, legs):
+            far = legs.x < -8.0 * legs.v
+            if spoils:
+                legs.x[:], legs.stands[:], legs.v[:] = np.nan, False, 2.0
+            return state, far
+
+        return decided
+
+    starts, walks = hexmj.draw_starts(4, 0), []
+    for spoils in (False, True):
+        own = {"name": "rule", "at_start": lambda self, legs: Age(legs.x), "lifts": lifts(spoils)}
+        rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
+        plan = rule.begin(starts, np.full(4, 0.5), Stride())
+        plan._state.since[:] = 1.0
+        assert np.array_equal(plan.starts, starts)
+        walks.append(plan.advance(200))
+    for name in PLANNED:
+        assert np.array_equal(getattr(walks[0], name), getattr(walks[1], name), equal_nan=True)

@@ -98,7 +98,7 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
     if not isinstance(plan, Plan):
         raise InputError(f"begin gave {plan!r:.80}; expected a plan, with starts, stride, done and advance")
     if whole("a plan's done", plan.done, 0):
-        raise InputError(f"the plan is at step {plan.done}; expected one at time 0, as `begin` gives it")
+        raise InputError(f"the plan is at step {plan.done}; expected one at time 0")
     if plan.stride != stride:
         raise InputError(f"the plan's stride is {plan.stride}; expected {stride}")
     if not np.array_equal(plan.starts, starts):

@@ -31,7 +31,7 @@ def first_losses(plan: Plan, steps: np.ndarray, threads: int | None = None) -> n
         return planned_losses(plan, steps, threads)
     steps = np.broadcast_to(steps, len(plan.starts)).copy()
     with said("a plan, first_losses"):
-        lost = np.asarray(plan.first_losses(steps))
+        lost = np.asarray(plan.first_losses(steps.copy()))
     if lost.shape != steps.shape or lost.dtype.kind not in "iu" or not ((lost >= 0) & (lost <= steps)).all():
         raise InputError(
             f"first_losses of a plan gave {lost!r:.80}; expected the number of a step, from 0 on, for each start"

@@ -111,12 +111,12 @@ class SensedPlan:
 
     def _step(self) -> PlannedWalk:
         self._plan.see(self._tips.copy(), self._stance.copy())
-        step = copied(self._plan.advance(1))
+        step = self._plan.advance(1)
         self.done = self._plan.done
         way = np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.stride.dt
         goes_on = (step.stance[0] == self._stance) & (np.abs(step.x[0] - self._tips - way) < SAME)
         self._tips = self._targets = np.where(goes_on, self._targets + way, step.x[0])
-        self._stance = step.stance[0]
+        self._stance = step.stance[0].copy()
         put_back = self._targets < self._ordered  # such a tip is not on its way to the AEP
         aep, self._ordered = np.where(put_back, np.nan, step.aep[0]), self._targets
-        return replace(step, x=self._targets[None], aep=aep[None])
+        return copied(replace(step, x=self._targets[None], aep=aep[None]))

@@ -123,9 +123,9 @@ class OffsetPlan:
         step, count = copied(self._plan.advance(1)), len(self.starts)
         seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
         actions = numbers("answer of a policy", self._policy(seen))
-        if actions.shape != (count, 18) or not np.isfinite(actions).all():
+        if actions.shape != (count, 18) or np.isnan(actions).any():
             raise InputError(
-                f"a policy answers {short(actions)} of the shape {actions.shape}; expected finite numbers,"
+                f"a policy answers {short(actions)} of the shape {actions.shape}; expected numbers,"
                 f" (start, leg * axis), {(count, 18)}"
             )
         offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)

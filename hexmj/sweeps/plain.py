@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
-from enum import Enum, EnumType
+from enum import Enum
 from functools import cached_property
 from inspect import getattr_static
 from os.path import isfile
@@ -87,8 +87,7 @@ def label(thing: Any) -> str:
     """
     if "<" in thing.__qualname__:
         raise InputError(f"{thing.__qualname__} stands inside a function; expected one of a module")
-    named = hasattr(thing, "__dataclass_fields__") or isinstance(thing, EnumType)
-    if named and not stands_there(thing):
+    if hasattr(thing, "__dataclass_fields__") and not stands_there(thing):
         raise InputError(f"{thing.__qualname__} is not what its module has under that name; expected one of a module")
     return f"{module_label(thing.__module__)}.{thing.__qualname__}"
 

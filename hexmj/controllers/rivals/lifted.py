@@ -38,6 +38,10 @@ class Legs:
         """(start, leg) how far the tips are behind AEP_0, in ranges AEP_0 - PEP_0: 1 at PEP_0."""
         return (self.stride.aep0 - self.x) / (self.stride.aep0 - self.stride.pep0)
 
+    def copied(self) -> "Legs":
+        """The same, in arrays of which a rule may make what it likes."""
+        return replace(self, x=self.x.copy(), stands=self.stands.copy(), v=self.v.copy())
+
     @property
     def stance_part(self) -> np.ndarray:
         """(start, 1) part of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
@@ -69,7 +73,8 @@ class LiftingRule(Protocol):
         ...
 
     def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
-        """The state after a step in which the tips came to where they are, and which legs are lifted, (start, leg)."""
+        """The state after a step in which the tips came to where they are, and which legs are lifted, (start, leg) of
+        bool."""
         ...
 
 
@@ -91,7 +96,7 @@ class LiftedPlan:
         self._final = checked_velocities(velocity, len(self.starts), acceleration)
         self._age = np.full(len(self.starts), age)
         self._legs = self._at_rest(self.starts)
-        self._state: Any = _checked("at_start", rule.at_start(self._legs), len(self.starts))
+        self._state: Any = _checked("at_start", rule.at_start(self._legs.copied()), len(self.starts))
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next `steps` steps."""
@@ -125,7 +130,7 @@ class LiftedPlan:
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        fresh = _checked("at_start", self._rule.at_start(rest), len(tips))
+        fresh = _checked("at_start", self._rule.at_start(rest.copied()), len(tips))
         self._state = type(self._state)(*(_chosen(which, a, b) for a, b in zip(fresh, self._state, strict=True)))
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
@@ -144,11 +149,11 @@ class LiftedPlan:
         x = legs.x + np.where(legs.stands, -v * dt, dt)
         stands = legs.stands | (x > self.stride.aep0 - dt / 2)
         moved = Legs(x, stands, self._load(stands), v, self.stride)
-        state, lifted = self._rule.lifts(self._state, moved)
+        state, lifted = self._rule.lifts(self._state, moved.copied())
         self._state = _checked("lifts", state, len(x))
-        if not (isinstance(lifted, np.ndarray) and lifted.dtype == bool and lifted.shape == x.shape):
+        if not (type(lifted) is np.ndarray and lifted.dtype == bool and lifted.shape == x.shape):
             raise InputError(
-                f"lifts lifts {short(lifted)}; expected an array (start, leg), {x.shape}, of True and False"
+                f"lifts gave {short(lifted)} as lifted legs; expected True and False, (start, leg), {x.shape}"
             )
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
 

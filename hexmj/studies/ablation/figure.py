@@ -46,7 +46,8 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
         for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
-    counts = f"{result.attrs['n_starts']} starts, {result.attrs['n_physical']} in physics, {REGIMES} for the limit"
+    starts = result.attrs["n_starts"]
+    counts = f"{starts} starts, {result.attrs['n_physical']} in physics, {min(starts, REGIMES)} for the limit"
     heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
     head(figure, heading, f"{counts}; {caption(result)}")
     if used:
