@@ -1,9 +1,16 @@
-"""What commands print: nothing is shown as a number that is none, or that nobody can know."""
+"""What commands print and draw: no number that is none or nobody can know, none of more starts than counted."""
+
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
+from hexmj import LDVS, load
 from hexmj.cli.tables import interval
+from hexmj.studies.disturbance.figure import disturbed_figure
+from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.sweeps import conduct
 
 
 def test_what_nobody_reached_has_no_frequency() -> None:
@@ -19,3 +26,16 @@ def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:
     planned, walked = text.split("physical FLSS", 1)
     assert "undisturbed" in planned and "push" not in planned
     assert walked.count("push 40 ") == 4
+    result = load(tmp_path / "out" / "disturb.nc")
+    assert "of them" not in disturbed_figure(result).get_suptitle()
+    result.physical_reached[:] = 1
+    assert disturbed_figure(result).get_suptitle().endswith("; frequencies of at least 1 of them")
+
+
+def test_a_map_tells_how_many_starts_stand_at_every_value() -> None:
+    """Of twelve starts one falls at rest where the centre of mass lies 15 mm ahead."""
+    study = StabilityMap(LDVS, "centre_of_mass", (0.0, 15.0), (0.3,), n_starts=12, window=20.0)
+    result = conduct(study, threads=1)
+    for draw in (map_figure, mechanisms_figure):
+        assert draw(result).get_suptitle().endswith("; 11 of them stand on six feet at every value")
+        assert "of them" not in draw(conduct(replace(study, values=(0.0,)), threads=1)).get_suptitle()

@@ -68,8 +68,13 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
         panels[row, 0].set_ylabel(f"FLSS, {ROWS[measure]}")
     entries = [Line2D([], [], markersize=4, label=one.replace("_", " "), **STYLES[one]) for one in used]
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
+    told, least = caption(result), min(int(one[f"{measure}_reached"].min()) for measure in measures)
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
-    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption(result))
+    head(
+        figure,
+        "FLSS after a disturbance in mid-walk, with 95 % intervals",
+        told if least == result.attrs["starts"] else f"{told}; frequencies of at least {least} of them",
+    )
     return figure
 
 

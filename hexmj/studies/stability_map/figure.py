@@ -71,7 +71,7 @@ def map_figure(result: "xr.Dataset") -> "Picture":
         axes.set_title(title, fontsize=11)
         axes.set_xticks(range(columns), [f"{v:g}" for v in result.velocity.values])
         axes.set_xlabel("velocity $V_r / V_p$")
-    head(figure, "What falls in physics, and what dynamics saves", caption(result))
+    head(figure, "What falls in physics, and what dynamics saves", _told(result))
     return figure
 
 
@@ -99,7 +99,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Picture":
     panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
-    head(figure, "What happened to every start", caption(result))
+    head(figure, "What happened to every start", _told(result))
     return figure
 
 
@@ -108,6 +108,12 @@ def _drawn(result: "xr.Dataset") -> "xr.Dataset":
     counted = result["count"].sel(mechanism_name=list(MECHANISM_COLOURS)).sum("mechanism_name")
     check_starts(result, counted.max().item())
     return result.transpose("value", "velocity", "start", ...)
+
+
+def _told(result: "xr.Dataset") -> str:
+    """Who walked, and how many of the starts count."""
+    count, drawn = result.sizes["start"], result.attrs["starts"]
+    return caption(result) + (f"; {count} of them stand on six feet at every value" if count < drawn else "")
 
 
 def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:
