@@ -74,7 +74,7 @@ def begin_at_speed(
     acceleration: Acceleration | None = None,
     threads: int | None = None,
 ) -> SteerablePlan:
-    """A plan of starts and velocities that were checked, which walks at its final velocity at once.
+    """A plan of checked starts, (start, leg) [mm], and final V_r, (start,), which walks at that velocity at once.
 
     Raises:
         InputError: a plan that makes no sense, or cannot be steered.

@@ -1,4 +1,4 @@
-"""Laws of plans that can be steered: what `see`, `restart` and `slow_down` ask is what they do."""
+"""Laws of plans that can be steered: what `see`, `restart` and `slow_down` of `protocol.SteerablePlan` ask they do."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -131,7 +131,7 @@ def strides_between(
 
 
 def rows_of_a_hop(settled: Settled) -> float:
-    """Rows off the ground beyond which a foot swings."""
+    """Physics steps off the ground beyond which a foot swings, see `HOP`."""
     stride, step = settled.stride, settled.compiled.model.opt.timestep
     return HOP * (stride.aep0 - stride.pep0) / settled.conditions.time.vp / step
 
