@@ -75,7 +75,7 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     assert hexmj.load_controller("robot").name == "taller"
     assert "robot" in named.known_names()
     (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
-    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "taller", "height": 4.0}
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}
 
 
 def test_a_field_may_have_a_type_for_type_checkers_alone(mine, tmp_path):
@@ -93,17 +93,19 @@ def test_a_field_may_have_a_type_for_type_checkers_alone(mine, tmp_path):
     text = mine.read_text().replace("height: float = 0.0", "height: float = 0.0\n    table: NDArray | None = None")
     mine.write_text(f"from __future__ import annotations\n{only}{text}")
     (tmp_path / "tall.toml").write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\n')
-    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0, "table": None}
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0, "table": None}
 
 
 def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
     path = tmp_path / "tall.toml"
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4.0\n')
-    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0}
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}, "another one than still"
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\n')
     assert repr(settings_of(hexmj.load_controller("tall.toml"))["height"]) == "4.0", "the same setting"
     path.write_text('controller = "mine_of_a_user.py:Still"\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 0.0}
+    path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\nname = "mine"\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "mine", "height": 4.0}
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = "4.0"\n')
     with pytest.raises(hexmj.InputError, match=r"\[fields\]: height = '4.0'; expected a number"):
         hexmj.load_controller("tall.toml")

@@ -172,13 +172,13 @@ class Controlled:
         )
 
     def preset_of(self, name: str) -> str:
-        """The preset whose weights a controller has: its own name, or that of which parts are left out."""
+        """The preset whose weights a controller has, or of which parts are left out."""
         from hexmj.controllers.cruse1998 import PRESETS
         from hexmj.controllers.named import PART
 
-        found: Any = LOADED.get(name, (None, None))[0]
-        usual = PRESETS.get(getattr(found, "name", name))
-        return found.name if usual and usual.weights == getattr(found, "weights", None) else PART.sub("", name)
+        weights = getattr(LOADED.get(name, (None, None))[0], "weights", None)
+        same = (preset for preset, usual in PRESETS.items() if usual.weights == weights)
+        return next(same, PART.sub("", name)) if weights is not None else name
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
@@ -37,7 +38,8 @@ def load_controller(name: str) -> Controller:
         name: a preset or a rival, also without one of its mechanisms or rules (``ldvs-without-3``), or with mechanism 2
             or 4 (``ldvs-with-2``); ``module:object`` or ``file.py:object``, a controller or a class of controllers,
             which is made with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of
-            the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
+            the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`. With
+            other weights or fields it has the name of the file.
 
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
@@ -95,15 +97,16 @@ def _varied(name: str, how: str, which: int) -> Controller:
 
 
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
-    """The controller that a file names, with these fields."""
+    """The controller that a file names, with these fields; named like the file, unless it tells a name."""
     varied = VARIED.fullmatch(named)
     if ":" not in named and (varied["name"] if varied else named) not in known_names():
         raise InputError(
             f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
         )
-    found = load_controller(named)
+    found: Any = load_controller(named)
+    has_name = any(one.name == "name" and one.init and one.type in (str, "str") for one in fields(found))
     try:
-        return with_fields(found, values)
+        return with_fields(found, {"name": literal(path.stem)} | values if values and has_name else values)
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 

@@ -111,7 +111,8 @@ class _Presets(Mapping[str, Cruse1998]):
         return _PAPER[name] if name in _PAPER else _own()[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter([*_PAPER, *_own()])
+        yield from _PAPER
+        yield from _own()
 
     def __len__(self) -> int:
         return len(_PAPER) + len(_own())
