@@ -38,8 +38,8 @@ def load_controller(name: str) -> Controller:
         name: a preset or a rival, also without one of its mechanisms or rules (``ldvs-without-3``), or with mechanism 2
             or 4 (``ldvs-with-2``); ``module:object`` or ``file.py:object``, a controller or a class of controllers,
             which is made with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of
-            the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`. With
-            other weights or fields it has the name of the file.
+            the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
+            With other weights or fields it has the name of the file.
 
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
