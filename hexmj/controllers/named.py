@@ -3,7 +3,6 @@
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import entry_points
 from os.path import isfile
@@ -103,10 +102,9 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         raise InputError(
             f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
         )
-    found: Any = load_controller(named)
-    has_name = any(one.name == "name" and one.init and one.type in (str, "str") for one in fields(found))
+    found = load_controller(named)
     try:
-        return with_fields(found, {"name": literal(path.stem)} | values if values and has_name else values)
+        return with_fields(found, values, literal(path.stem)) if values else found
     except Exception as error:  # whatever the user's class raises
         raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
 

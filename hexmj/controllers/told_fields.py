@@ -21,14 +21,15 @@ _PLAIN = bool, int, float, str
 _CHOICES, _ROWS = (Union, UnionType), (tuple, Sequence)
 
 
-def with_fields(usual: Any, values: dict[str, Any]) -> Any:
-    """A frozen dataclass with other values of some fields.
+def with_fields(usual: Any, values: dict[str, Any], name: str) -> Any:
+    """A frozen dataclass with other values of some fields, and of this name, if it can have one and they tell none.
 
     Raises:
         InputError: a value of another type.
         Exception: whatever its class raises, and of fields that are not there.
     """
-    return _made(type(usual), usual, values)
+    named = any(one.name == "name" and one.init and one.type in (str, "str") for one in fields(usual))
+    return _made(type(usual), usual, {"name": name} | values if named else values)
 
 
 def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
