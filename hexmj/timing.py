@@ -47,7 +47,7 @@ class Stride:
 
     def __post_init__(self) -> None:
         check_types(self)
-        if not all(abs(v) <= FAR for v in (self.aep0, self.pep0, self.pep_min, self.dt)):
+        if not all(abs(v) <= FAR for v in (self.aep0, self.pep0, self.pep_min)):
             raise InputError(f"{self}; expected aep0, pep0 and pep_min between -{FAR:g} and {FAR:g} mm")
         if not self.pep_min <= self.pep0 < self.aep0:
             raise InputError(

@@ -181,6 +181,10 @@ def test_a_controller_may_read_the_legs(few):
 def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
     figure = terrain_figure(few)
     assert [axes.get_xlabel() for axes in figure.axes] == ["height of the step [mm]"]
+    assert (few.reached == 4).all() and few.attrs["starts"] == 6
+    assert figure.get_suptitle().endswith("; frequencies of at least 4 of them")
+    all_of_them = terrain_figure(few.assign(reached=few.reached + 2))
+    assert "of them" not in all_of_them.get_suptitle()
 
 
 def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):

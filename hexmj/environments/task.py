@@ -14,7 +14,8 @@ Observations, all float64 and cut off at their bounds (`observation_bounds`):
 - angular_velocity: of the root, in its own frame [rad/s]
 - clearance: height of the trunk's lowest point, (1,) [mm]
 - tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `Numerics.contact_gap`
+- contact: (leg,) 1 where the ground carried the foot within the last `Numerics.contact_gap`, as the last physics step
+  began
 - margin: measured stability margin, (1,) [mm], from the feet in contact and the insect's own centre of mass;
   `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
 - command: velocity to walk at, (1,) [mm/s]

@@ -65,6 +65,12 @@ def caption(result: "xr.Dataset") -> str:
     )
 
 
+def caption_of_at_least(least: int, result: "xr.Dataset") -> str:
+    """The caption, and of how many of its starts the frequencies are where some do not count."""
+    told = caption(result)
+    return told if least == result.attrs["starts"] else f"{told}; frequencies of at least {least} of them"
+
+
 def _shown(result: "xr.Dataset", told: Mapping[str, Any]) -> dict[str, Any]:
     """Name -> settings of the controllers along a result's axis of them, or of all without such an axis."""
     axis = next((name for name in NAMED if name in result.coords), None)

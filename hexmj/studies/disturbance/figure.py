@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.measures.captions import caption
+from hexmj.measures.captions import caption_of_at_least
 from hexmj.measures.figures import velocity_ticks
 from hexmj.measures.parts import check_starts
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
@@ -68,13 +68,10 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
         panels[row, 0].set_ylabel(f"FLSS, {ROWS[measure]}")
     entries = [Line2D([], [], markersize=4, label=one.replace("_", " "), **STYLES[one]) for one in used]
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
-    told, least = caption(result), min(int(one[f"{measure}_reached"].min()) for measure in measures)
+    least = min(int(one[f"{measure}_reached"].min()) for measure in measures)
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
-    head(
-        figure,
-        "FLSS after a disturbance in mid-walk, with 95 % intervals",
-        told if least == result.attrs["starts"] else f"{told}; frequencies of at least {least} of them",
-    )
+    told = caption_of_at_least(least, result)
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", told)
     return figure
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.measures.captions import caption
+from hexmj.measures.captions import caption_of_at_least
 from hexmj.measures.parts import check_starts
 from hexmj.studies.drawing import frequency_curve, tidy
 
@@ -53,7 +53,8 @@ def terrain_figure(result: "xr.Dataset") -> "Picture":
         axes.set_xlabel(SIZES[kind])
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=min(5, len(labels)))
-    head(figure, "Falls once the obstacle has been reached, with 95 % intervals", caption(result))
+    told = caption_of_at_least(int(result.reached.min()), result)
+    head(figure, "Falls once the obstacle has been reached, with 95 % intervals", told)
     return figure
 
 
