@@ -1,15 +1,15 @@
 """`hexmj ablate`."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import STEADY, Accelerating, Controlled, Walks, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.options import AS_THEY_ARE, STEADY, Accelerating, Controlled, Walks, hiding
+from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
 from hexmj.storage.attributes import settings
@@ -38,13 +38,9 @@ class Ablate(StudyCommand):
     """Of these, number of starts that walk in physics; 100 unless given, at most all."""
     out: Path = Path("results/ablate")
     """Folder for figure, NetCDF, manifest and finished walks."""
-    walks: OmitArgPrefixes[Walks] = field(
-        default_factory=lambda: hiding(Walks(seed=FRESH), ["window"], "Windows are those of the measures.")
-    )
+    walks: OmitArgPrefixes[Walks] = hiding(Walks(seed=FRESH), ["window"], "Windows are those of the measures.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    controlled: OmitArgPrefixes[Controlled] = field(
-        default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
-    )
+    controlled: OmitArgPrefixes[Controlled] = AS_THEY_ARE
     outputs = Outputs("walking without parts", "ablation.nc", {"ablation.png": ablation_figure})
 
     def study(self) -> study.Ablation:
@@ -61,10 +57,6 @@ class Ablate(StudyCommand):
             conditions=self.conditions,
             stride=self.walks.stride,
         )
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """All frequencies and differences."""
-        return lists_of(result)
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """A table for each measure, and the conditions."""

@@ -1,7 +1,7 @@
 """`hexmj biology`."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,11 +32,9 @@ class Biology(StudyCommand):
     periods: int = biology.Biology.periods
     """Periods of a single leg that each start walks; the last three are measured."""
     out: Path = Path("results/biology")
-    walks: OmitArgPrefixes[Walks] = field(
-        default_factory=lambda: hiding(Walks(), ["window"], "All walk so many periods.")
-    )
+    walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "All walk so many periods.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["grasp"]))
+    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), ["grasp"])
     outputs = Outputs("walking beside the animal", "biology.nc", {"biology.png": biology_figure}, others=(TABLE,))
 
     def study(self) -> biology.Biology:

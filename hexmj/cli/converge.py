@@ -1,7 +1,7 @@
 """`hexmj converge`."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,7 +54,7 @@ class Converge(StudyCommand):
     starts: int = StaticLimit.n_starts
     """Number of random starts, the same for every V_p and mass."""
     out: Path = Path("results/converge")
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(FINE, VARIED))
+    conditions: OmitArgPrefixes[Conditions] = hiding(FINE, VARIED)
     outputs = Outputs("walking slower and slower", "converge.nc", {"converge.png": static_limit_figure})
 
     def study(self) -> StaticLimit:

@@ -1,7 +1,7 @@
 """`hexmj disturb`."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +53,7 @@ class Disturb(StudyCommand):
     """Leave physics out, and with it pushes and grasping."""
     out: Path = Path("results/disturb")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), ["grasp"]))
+    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), ["grasp"])
     outputs = Outputs("disturbing walks", "disturb.nc", {"disturb.png": disturbed_figure})
 
     def study(self) -> DisturbedWalks:

@@ -2,15 +2,15 @@
 
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding, loaded
+from hexmj.cli.options import AS_THEY_ARE, CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding, loaded
 from hexmj.cli.recorded import recorded
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
@@ -64,12 +64,10 @@ class League(StudyCommand):
     """Leave the film out."""
     out: Path = Path("results/league")
     """Folder for tables, figure, film, NetCDF, manifest and finished walks."""
-    walks: OmitArgPrefixes[Walks] = field(default_factory=lambda: Walks(seed=study.FRESH))
+    walks: OmitArgPrefixes[Walks] = Walks(seed=study.FRESH)
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    controlled: OmitArgPrefixes[Controlled] = field(
-        default_factory=lambda: hiding(Controlled(), ["order", "reading", "feedback"])
-    )
-    conditions: OmitArgPrefixes[Conditions] = field(default_factory=lambda: hiding(Conditions(), OF_TRIALS))
+    controlled: OmitArgPrefixes[Controlled] = AS_THEY_ARE
+    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), OF_TRIALS)
     outputs = Outputs("walking the league", "league.nc", FIGURES, others=(TABLE, FILM))
 
     @property
@@ -99,10 +97,6 @@ class League(StudyCommand):
             conditions=self.conditions,
             stride=self.walks.stride,
         )
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """All frequencies, costs and ranks."""
-        return lists_of(result)
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """All tables, and the conditions."""

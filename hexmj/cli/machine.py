@@ -67,7 +67,8 @@ def examine() -> Iterator[Finding]:
         except LeftOut as told:
             yield Finding(name, True, str(told), note=True)
         except Exception as error:  # whatever the library, driver or operating system raises
-            yield Finding(name, False, _short(str(error) or type(error).__name__), remedy)
+            told = textwrap.shorten(str(error) or type(error).__name__, 200, placeholder=" [...]")
+            yield Finding(name, False, told, remedy)
 
 
 def versions() -> str:
@@ -179,7 +180,3 @@ def _quota() -> list[str]:
         return QUOTA.read_text().split()
     except OSError:  # no container, or one that tells it elsewhere
         return ["max", "0"]
-
-
-def _short(text: str) -> str:
-    return textwrap.shorten(text, 200, placeholder=" [...]")

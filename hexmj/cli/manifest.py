@@ -15,7 +15,7 @@ import numpy as np
 from hexmj.cli import words
 from hexmj.cli.options import check_loaded
 from hexmj.errors import InputError
-from hexmj.storage.files import WRITTEN, digest, digest_of, read_text
+from hexmj.storage.files import DIGEST, WRITTEN, digest_of, read_text
 from hexmj.storage.literal import literal
 from hexmj.storage.results import json_text, save_text
 from hexmj.sweeps.code import code
@@ -88,7 +88,7 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         code={name: one for name, one in made.sources.items() if name.partition("@")[2] not in own.values()},
         own=own,
         processor=_processor(),
-        files={file.relative_to(path.parent).as_posix(): _written(file) for file in written},
+        files={file.relative_to(path.parent).as_posix(): WRITTEN[file.absolute()][:DIGEST] for file in written},
     )
     before = _before(path)
     if before and before.command != told.command:
@@ -200,11 +200,6 @@ def _processor() -> list[str]:
     extensions: Any = np.show_config(mode="dicts")
     extensions = extensions.get("SIMD Extensions", {})
     return [platform.machine(), *extensions.get("baseline", ()), *extensions.get("found", ())]
-
-
-def _written(path: Path) -> str:
-    """Of a file as this process wrote it."""
-    return WRITTEN[path.absolute()][: len(digest(b""))]
 
 
 def _fits(value: Any, kind: Any) -> bool:

@@ -340,3 +340,6 @@ def hiding(usual: Options, names: Collection[str], about: str = "") -> Options:
 
 STEADY = hiding(Accelerating(), ["acceleration", "initial_velocity"])
 """Of commands whose walks do not accelerate."""
+
+AS_THEY_ARE = hiding(Controlled(), ["order", "reading", "feedback"])
+"""Of commands in which all controllers walk as they are."""

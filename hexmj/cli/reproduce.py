@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
@@ -43,15 +44,8 @@ class Reproduce:
         results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with self.sweepers.executor() as executor, progress_bar("reproducing") as progress, as_shipped():
-            rows, files = reproduce(
-                self.out,
-                protocol,
-                self.only or (),
-                self.beside,
-                executor=executor,
-                progress=progress,
-                threads=self.sweepers.threads_each,
-            )
+            how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
+            rows, files = reproduce(self.out, protocol, self.only or (), self.beside, **how)
         settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": self.beside}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))
         if self.json:

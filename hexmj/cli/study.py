@@ -54,7 +54,7 @@ class StudyCommand(WalkingCommand):
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """What is printed as JSON: everything but the single starts."""
-        return lists_of(result.drop_dims("start"))
+        return lists_of(result.drop_dims("start", errors="ignore"))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """What is printed otherwise: tables and lines."""

@@ -41,10 +41,6 @@ def interval(one: "xr.Dataset", measure: str) -> str:
     return "-" if flss != flss else f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
 
 
-def short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
 def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path: Path) -> Path:
     """Draw some data and write the figure; no date stands in it."""
     from hexmj.pictures import as_shipped

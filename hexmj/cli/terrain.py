@@ -1,7 +1,7 @@
 """`hexmj terrain`."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,13 +51,9 @@ class Terrain(StudyCommand):
     starts: int = terrain.Terrain.n_starts
     """Number of random starts, the same for every obstacle."""
     out: Path = Path("results/terrain")
-    walks: OmitArgPrefixes[Walks] = field(
-        default_factory=lambda: hiding(Walks(), ["window"], "Each start walks a distance instead of a time.")
-    )
+    walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "Each start walks a distance instead of a time.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = field(
-        default_factory=lambda: hiding(replace(FARTHER, ground=_Ground()), VARIED)
-    )
+    conditions: OmitArgPrefixes[Conditions] = hiding(replace(FARTHER, ground=_Ground()), VARIED)
     outputs = Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
 
     def study(self) -> terrain.Terrain:

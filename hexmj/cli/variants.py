@@ -1,14 +1,14 @@
 """`hexmj variants`."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
 from hexmj.cli.options import CONTROLLER, Controlled, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError, check_distinct
@@ -40,12 +40,8 @@ class Variants(StudyCommand):
     """Number of random starts, the same for every set, variant and velocity; 2000 unless given, 50 if physical."""
     out: Path = Path("results/variants")
     """Folder for figure, NetCDF, manifest and finished walks."""
-    controlled: OmitArgPrefixes[Controlled] = field(
-        default_factory=lambda: hiding(
-            Controlled(),
-            ["feedback"],
-            "Order and reading are varied from what is given here; a variant has no feedback.",
-        )
+    controlled: OmitArgPrefixes[Controlled] = hiding(
+        Controlled(), ["feedback"], "Order and reading are varied from what is given here; a variant has no feedback."
     )
     outputs = Outputs("walking every variant", "variants.nc", {"variants.png": variants_figure})
 
@@ -76,10 +72,6 @@ class Variants(StudyCommand):
         if not isinstance(found, Cruse1998):
             raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
         return found
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """All frequencies."""
-        return lists_of(result.drop_vars("lost"))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """A table for each velocity, what it comes to, and the conditions."""

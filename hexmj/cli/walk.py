@@ -11,7 +11,7 @@ from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
-from hexmj.cli.tables import print_json, save_figure, short, show
+from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.conditions import FootPath, TimeScale
 from hexmj.storage.results import results_folder
 
@@ -55,10 +55,7 @@ class Walk(WalkingCommand):
         told = {"velocity": self.velocity, "start": self.start, "physical": self.physical}
         told |= settings({self.model: controller}, n_starts=self.start + 1, **self.walked)
         told |= {"conditions": self.conditions.settings()}
-        files = [
-            save_recording(walked, out / "recording.nc"),
-            save_figure(walk_figure, walked, out / figure),
-        ]
+        files = [save_recording(walked, out / "recording.nc"), save_figure(walk_figure, walked, out / figure)]
         files.append(save_manifest(self, told, files, out / MANIFEST))
         summary = walk_summary(walked)
         if self.json:
@@ -73,4 +70,4 @@ def _told(key: str, value: Any) -> str:
     """A number of a walk; a time in words."""
     if key in TIMES:
         return f"at {value:.4g} time units" if math.isfinite(value) else "none within the walk"
-    return short(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -72,7 +72,7 @@ class FeltInsects(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute that all insects share."""
-        return [getattr(self._insects, attr_name)] * len(self._chosen(indices))
+        return [getattr(self._insects, attr_name)] * len([*self._get_indices(indices)])
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: all that an insect is made with is settled.
@@ -92,20 +92,17 @@ class FeltInsects(VecEnv):
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No insect is wrapped by itself."""
-        return [False] * len(self._chosen(indices))
+        return [False] * len([*self._get_indices(indices)])
 
     def _seen(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
     def _all(self, indices: int | Sequence[int] | None) -> int:
-        if {*self._chosen(indices)} != {*range(self.num_envs)}:
+        if {*self._get_indices(indices)} != {*range(self.num_envs)}:
             raise InputError(
                 f"indices = {indices!r:.80}; expected all {self.num_envs} insects, which are one environment"
             )
         return self.num_envs
-
-    def _chosen(self, indices: int | Sequence[int] | None) -> list[int]:
-        return list(self._get_indices(indices))
 
 
 class HeldInsects(VecEnvWrapper):

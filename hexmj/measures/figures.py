@@ -49,11 +49,8 @@ def comparison_figure(result: "xr.Dataset") -> "Picture":
     for axes, name in zip(panels.ravel(), names, strict=False):
         one = result.sel(controller=name)
         for measure, colour in MEASURE_COLOURS.items():
-            low, middle, high = (one[measure + end].values for end in ("_low", "", "_high"))
-            _with_intervals(
-                axes, one.velocity + shifts[measure], low, middle, high,
-                color=colour, label=measure, **MEASURE_STYLES[measure],
-            )  # fmt: skip
+            style = {"color": colour, "label": measure, "markersize": 4.5} | MEASURE_STYLES[measure]
+            frequency_curve(axes, one.velocity + shifts[measure], one, measure, **style)
         axes.set_title(in_figure(name), fontsize=10)
         flss_axes(axes, result.velocity.values)
     for n, axes in enumerate(panels.ravel()):
@@ -77,8 +74,9 @@ def flss_figure(table: "xr.Dataset") -> "Picture":
     if ("fall" in table) != (kind == "physical") or (kind == "physical" and table.fall.isnull().any()):
         raise InputError("a result of kinematic and of physical FLSS; expected one of them")
     axes = figure.subplots()
-    style = {"color": MEASURE_COLOURS[kind]} | MEASURE_STYLES[kind]
-    _with_intervals(axes, table.velocity, table.low, table.flss, table.high, **style)
+    style = {"color": MEASURE_COLOURS[kind], "markersize": 4.5} | MEASURE_STYLES[kind]
+    named = table.rename(low="flss_low", high="flss_high")
+    frequency_curve(axes, table.velocity, named, "flss", **style)
     flss_axes(axes, table.velocity.values)
     head(figure, f"{kind} FLSS with 95 % intervals", caption(table))
     return figure
@@ -95,11 +93,17 @@ def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
     axes.set(xlabel="velocity $V_r / V_p$", xlim=(max(0.0, velocities.min() - 0.1), min(1.0, velocities.max() + 0.1)))
     axes.set(ylabel="FLSS", ylim=(-0.02, 1.02))
     velocity_ticks(axes, velocities)
+    tidy(axes)
+
+
+def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", one: "xr.Dataset", name: str, **style: Any) -> None:
+    """One of a result's frequencies with its intervals, in the style of `Axes.errorbar`."""
+    low, middle, high = (one[name + end].values for end in ("_low", "", "_high"))
+    dots: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
+    axes.errorbar(x, middle, [middle - low, high - middle], **dots | style)
+
+
+def tidy(axes: "Axes") -> None:
+    """A grid, and no frame above and on the right."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
-
-
-def _with_intervals(axes: "Axes", x: Any, low: Any, middle: Any, high: Any, **style: Any) -> None:
-    """A curve through frequencies with the intervals around them."""
-    dots: dict[str, Any] = {"markersize": 4.5, "capsize": 2.5, "linewidth": 1.6}
-    axes.errorbar(x, middle, [middle - low, high - middle], **dots | style)

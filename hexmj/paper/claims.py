@@ -323,10 +323,7 @@ CLAIMS = (
 )  # fmt: skip
 
 IN_PHYSICS = {
-    "positions, superior levels": (
-        "hexmj disturb",
-        "the answers above in MuJoCo, and against pushes",
-    ),
+    "positions, superior levels": ("hexmj disturb", "the answers above in MuJoCo, and against pushes"),
     "grasping": (
         "hexmj disturb --strategies grasp",
         "'the balance might be kept by grasping the surface': nothing bought after a halt, harm against pushes",

@@ -38,10 +38,7 @@ BARS: dict[str, Any] = {"marker": "_", "markersize": 7, "markeredgewidth": 1.5}
 IDEALS: dict[str, Any] = {"color": IDEAL, "marker": "x", "linestyle": "none", "markersize": 6.5, "markeredgewidth": 1.5}
 
 CURVES: dict[int, dict[str, tuple[str, dict[str, Any]]]] = {
-    2: {
-        "uncoordinated": ("no coordination", CIRCLES),
-        "ideal": ("HWS, optimised for each $V$", BARS | {"color": HWS}),
-    },
+    2: {"uncoordinated": ("no coordination", CIRCLES), "ideal": ("HWS, optimised for each $V$", BARS | {"color": HWS})},
     3: {
         "uncoordinated": ("no coordination", CIRCLES),
         "hws": ("HWS", {"color": HWS, "marker": "+", "markersize": 9, "markeredgewidth": 1.5}),

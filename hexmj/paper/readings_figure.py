@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.measures.figures import tidy
 from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, choice_in
-from hexmj.studies.drawing import tidy
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,12 +19,7 @@ from hexmj.walks import Walk
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
 
-HAPPENED = {
-    "lost on paper": "planned_loss",
-    "lost as measured": "measured_loss",
-    "fell": "fall",
-    "toppled": "topple",
-}
+HAPPENED = {"lost on paper": "planned_loss", "lost as measured": "measured_loss", "fell": "fall", "toppled": "topple"}
 """What can happen to a start -> the time at which it did."""
 
 TOPPLED = 0.1

@@ -140,10 +140,7 @@ class Settling:
 
 
 def settle(
-    starts: ArrayLike,
-    conditions: Conditions | None = None,
-    stride: Stride | None = None,
-    threads: int | None = None,
+    starts: ArrayLike, conditions: Conditions | None = None, stride: Stride | None = None, threads: int | None = None
 ) -> Settled:
     """Put the insect on its six feet at every start and let it come to rest.
 

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from hexmj.measures.figures import tidy
 from hexmj.storage.literal import in_figure
 
 if TYPE_CHECKING:
@@ -35,8 +36,7 @@ def convergence_figure(history: "xr.Dataset") -> "Picture":
     of = "cost" if cost != FREQUENCY else cost
     axes.set(xlabel="evaluations of the cost function", ylabel=f"{of} on the starts of the stage", ylim=(-0.02, 1.02))
     axes.set_title(in_figure(history.attrs["title"]), fontsize=9)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.9", linewidth=0.8)
+    tidy(axes)
     title = "lines: least so far, dots: candidates" + (f"\ncost: {cost}" if cost != FREQUENCY else "")
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=title, title_fontsize=8)
     return figure

@@ -131,10 +131,6 @@ def _of_json(path: Path) -> dict[str, np.ndarray]:
         raise InputError(f"{path} cannot be read as JSON: {error}") from None
 
 
-def _of_toml(path: Path) -> dict[str, np.ndarray]:
-    return _gathered(read_toml(path))
-
-
 def _gathered(table: Any) -> dict[str, np.ndarray]:
     """Values of nested dictionaries and lists by the keys that lead to them, and how they are nested as one text."""
     found: dict[str, list[Any]] = {}
@@ -162,5 +158,5 @@ def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:
         yield keys, math.nan if value is None else value  # what JSON has for numbers that are not finite
 
 
-_READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": _of_toml}
+_READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": lambda path: _gathered(read_toml(path))}
 """End of a file's name -> what reads it."""

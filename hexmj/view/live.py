@@ -12,14 +12,7 @@ from hexmj.bodies.description import ROOT_QPOS
 from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.asking import begin, begin_at_speed, said, tell
-from hexmj.controllers.protocol import (
-    Controller,
-    Plan,
-    ReadingPlan,
-    Sensed,
-    SteerablePlan,
-    is_steerable,
-)
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, SteerablePlan, is_steerable
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk

@@ -35,7 +35,8 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
         for row, column in np.ndindex(shown.shape):
             text, sure = written(one.isel(controller=row, velocity=column))
             used |= {*text} & {*NOTES}
-            colour = "white" if abs(np.nan_to_num(shown[row, column])) > 0.6 else "0.1" if sure else "0.5"
+            depth = abs(np.nan_to_num(shown[row, column]))  # of the colour behind it
+            colour = "white" if depth > 0.6 else "0.1" if sure or depth > 0.2 else "0.5"
             style = {"ha": "center", "va": "center", "fontsize": 8, "color": colour}
             panel.text(column, row, text, **style, fontweight="bold" if sure else "normal")
         panel.set_title(f"{measure}\n{title}", fontsize=9)

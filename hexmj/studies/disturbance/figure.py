@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption_of_at_least
-from hexmj.measures.figures import velocity_ticks
+from hexmj.measures.figures import frequency_curve, tidy, velocity_ticks
 from hexmj.measures.parts import check_starts
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
-from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,6 +1,7 @@
 """What the league's cells come to: frequencies with their intervals, differences to one entrant, ranks."""
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         [[data.get((name, f"{kind} {one}")) for one in v] for name in names] for kind in ("paper", "physics", "regime")
     )
     happened = {
-        "kinematic": _each(on_paper, lambda one: one.lost),
+        "kinematic": _each(on_paper, LOST),
         "measured": _each(walked, lambda one: came(one.measured_loss)),
         "physical": _each(walked, lambda one: came(one.fall)),
     }
@@ -61,11 +62,11 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         table |= frequencies(measure, happened[measure], OVER_VELOCITY)
         table |= differences(f"{measure}_above", values, values[names.index(reference or names[0])], OVER_VELOCITY)
     for asked in ("range", "accelerated"):
-        table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], _lost)[0], OVER_VELOCITY[:1])
+        table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], LOST)[0], OVER_VELOCITY[:1])
     over_trials = "entrant", "trial"
     tried, lamed = ([[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "paper, "))
     table |= frequencies("fell", _each(tried, _fell), over_trials)
-    table |= frequencies("lost", _each(lamed, _lost), over_trials)
+    table |= frequencies("lost", _each(lamed, LOST), over_trials)
     best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
     table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
@@ -76,8 +77,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     return xr.Dataset(table, axes, {"reference": reference})
 
 
-def _lost(one: "xr.Dataset") -> "xr.DataArray":
-    return one.lost
+LOST = attrgetter("lost")
 
 
 def _fell(one: "xr.Dataset") -> "xr.DataArray":

@@ -12,12 +12,7 @@ from hexmj.stability import loss_time, walk_margin
 if TYPE_CHECKING:
     import xarray as xr
 
-LOSSES = {
-    "kinematic": "planned_loss",
-    "measured": "measured_loss",
-    "grounded": "grounded_loss",
-    "physical": "fall",
-}
+LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
 """Measure of FLSS -> the outcome whose frequency it is: `compare.MEASURES`, and `grounded`, which is the measured one
 with all the feet at the ground, see `measures.support`."""
 

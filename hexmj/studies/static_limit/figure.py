@@ -3,9 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from hexmj.measures.captions import caption
-from hexmj.measures.figures import MEASURE_COLOURS
+from hexmj.measures.figures import MEASURE_COLOURS, frequency_curve, tidy
 from hexmj.measures.parts import check_starts
-from hexmj.studies.drawing import frequency_curve, tidy
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 from hexmj.measures.captions import caption
+from hexmj.measures.figures import tidy
 from hexmj.measures.parts import check_starts
 from hexmj.storage.literal import in_figure
-from hexmj.studies.drawing import tidy
 from hexmj.studies.variants.study import notes
 
 if TYPE_CHECKING:
