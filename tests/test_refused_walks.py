@@ -9,10 +9,10 @@ import xarray as xr
 import hexmj
 from hexmj.conditions import Conditions
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
+from hexmj.studies.frequencies import came, frequencies
 from hexmj.studies.league import physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.figure import league_figure, walks_figure
-from hexmj.studies.league.frequencies import came, frequencies
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import league_markdown
 from hexmj.timing import Stride

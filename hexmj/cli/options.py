@@ -177,8 +177,8 @@ class Controlled:
         from hexmj.controllers.named import PART
 
         weights = getattr(LOADED.get(name, (None, None))[0], "weights", None)
-        same = (preset for preset, usual in PRESETS.items() if usual.weights == weights)
-        return next(same, PART.sub("", name)) if weights is not None else name
+        same = (preset for preset, usual in PRESETS.items() if weights and usual.weights == weights)
+        return next(same, PART.sub("", name))
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

@@ -15,9 +15,9 @@ from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.storage.attributes import attributes
+from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league import paper
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_counts
 from hexmj.studies.short_names import short_names
 from hexmj.sweeps import Cell

@@ -21,8 +21,8 @@ from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import Case
 from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
+from hexmj.studies.frequencies import came
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.frequencies import came
 from hexmj.timing import Stride, observation_time, steps_within
 
 if TYPE_CHECKING:

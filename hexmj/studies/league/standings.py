@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.gaits import circular_mean
-from hexmj.studies.league.frequencies import came, differences, frequencies, padded
+from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
 

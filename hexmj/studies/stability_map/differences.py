@@ -6,8 +6,8 @@ import numpy as np
 
 from hexmj.bodies.loading import gravity
 from hexmj.conditions import Conditions
-from hexmj.intervals import paired_difference, wilson_intervals
 from hexmj.measures.compare import BESIDE, MEASURES
+from hexmj.studies.frequencies import differences, frequency
 from hexmj.studies.stability_map.mechanisms import MECHANISMS
 
 if TYPE_CHECKING:
@@ -25,24 +25,17 @@ def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
         data: over (value, velocity, start).
         reference: value of the condition from which `change` is counted.
     """
-    cells, size = ("value", "velocity"), data.sizes["start"]
+    cells = ("value", "velocity")
     happened = {
         measure: np.isfinite(data[outcome].transpose(*cells, "start").values) for measure, outcome in FLSS.items()
     }
     new: dict[str, Any] = {}
-
-    def put(name: str, middle: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-        for end, numbers in (("", middle), ("_low", low), ("_high", high)):
-            new[name + end] = (cells, numbers, {"units": "1"})
-
     for measure, lost in happened.items():
-        put(measure, lost.mean(axis=-1), *wilson_intervals(lost.sum(axis=-1), size))
+        new |= frequency(measure, lost, cells)
     fell, static = happened["physical"], happened["static"]
-    lost, saved = static.sum(axis=-1), (static & ~fell).sum(axis=-1)
-    put("saved", np.where(lost > 0, saved / np.maximum(lost, 1), np.nan), *wilson_intervals(saved, lost))
-    put("dynamics", *paired_difference(fell, static))
+    new |= frequency("saved", np.where(static, ~fell, np.nan), cells)
     row = data.value.values.tolist().index(reference)
-    put("change", *paired_difference(fell, np.broadcast_to(fell[row], fell.shape)))
+    new |= differences("dynamics", fell, static, cells) | differences("change", fell, fell[row], cells)
     names = data.mechanism.transpose(*cells, "start").values
     count = np.stack([(names == number).sum(axis=-1) for number in range(len(MECHANISMS))], axis=-1)
     new["count"] = ((*cells, "mechanism_name"), count, {"units": "1", "long_name": "number of starts"})

@@ -27,13 +27,17 @@ def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:
 
 
 def frequencies(name: str, happened: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
-    """The frequency `name` over the starts, (..., start), its 95 % Wilson interval `_low`, `_high`, and how many
-    `_starts`; NaN where there are none."""
+    """As `frequency`, and how many `_starts` it is of."""
+    starts = np.isfinite(happened).sum(axis=-1)
+    return frequency(name, happened, dims) | {f"{name}_starts": (dims, starts, {"units": "1"})}
+
+
+def frequency(name: str, happened: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
+    """The frequency `name` over the starts, (..., start), and its 95 % Wilson interval `_low`, `_high`; NaN where there
+    are none."""
     starts, count = np.isfinite(happened).sum(axis=-1), np.nansum(happened, axis=-1)
     with np.errstate(invalid="ignore"):
-        columns = {"": count / starts}
-    columns |= dict(zip(("_low", "_high"), wilson_intervals(count, starts), strict=True)) | {"_starts": starts}
-    return {name + end: (dims, column, {"units": "1"}) for end, column in columns.items()}
+        return columns(name, dims, count / starts, *wilson_intervals(count, starts))
 
 
 def differences(name: str, happened: np.ndarray, other: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
@@ -45,5 +49,10 @@ def differences(name: str, happened: np.ndarray, other: np.ndarray, dims: tuple[
         other: what broadcasts to it.
         dims: of the frequency.
     """
-    ends = zip(("", "_low", "_high"), paired_difference(happened, np.broadcast_to(other, happened.shape)), strict=True)
-    return {f"{name}{end}": (dims, values, {"units": "1"}) for end, values in ends}
+    return columns(name, dims, *paired_difference(happened, np.broadcast_to(other, happened.shape)))
+
+
+def columns(name: str, dims: tuple[str, ...], *values: np.ndarray) -> dict[str, Any]:
+    """A number `name`, and the ends of its interval `_low`, `_high`, as variables over `dims`."""
+    ends = zip(("", "_low", "_high"), values, strict=True)
+    return {f"{name}{end}": (dims, one, {"units": "1"}) for end, one in ends}
