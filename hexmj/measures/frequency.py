@@ -58,3 +58,10 @@ def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, d
     }
     told = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
     return xr.Dataset(told).assign(velocity_axis(velocities, duration))
+
+
+def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str] = {}) -> "xr.Dataset":
+    """A table of columns over start; those whose unit is not told are numbers."""
+    import xarray as xr
+
+    return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})

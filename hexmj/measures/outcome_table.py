@@ -1,12 +1,10 @@
 """How every start goes, as a table: the cell of all sweeps that need nothing else of a physical walk."""
 
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hexmj.conditions import Conditions
+from hexmj.measures.frequency import over_start
 from hexmj.measures.physical import physical_outcomes
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import Settled, settle
@@ -49,10 +47,3 @@ def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Pro
         acceleration=walks.acceleration, threads=threads, progress=progress,
     )  # fmt: skip
     return over_start(vars(outcomes), UNITS)
-
-
-def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> "xr.Dataset":
-    """A table of columns over start; those whose unit is not told are numbers."""
-    import xarray as xr
-
-    return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hexmj.controllers.cruse1998 import READINGS
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, effects, gained, ranking, title
-from hexmj.paper.table import line
+from hexmj.storage.markdown import markdown_table
 from hexmj.timing import WINDOWS
 
 if TYPE_CHECKING:
@@ -38,12 +38,12 @@ def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str
     sections = {
         "# Readings of the 1998 paper": [
             _judged_on(scores, readings[0]),
-            *_table(HEADS, readings_rows(scores, ranked[: scores.sizes["best"]])),
+            *markdown_table(HEADS, readings_rows(scores, ranked[: scores.sizes["best"]])),
         ],
         "## As printed, and the named readings": _named_ones(scores, readings),
         **({change: _changes(scores, readings)} if all_combined else {}),
         "## A closer look at the best": [*_aside(scores), "", *_ideal_sets(scores)],
-        "## Every reading": _table(HEADS, readings_rows(scores, ranked)),
+        "## Every reading": markdown_table(HEADS, readings_rows(scores, ranked)),
     }  # fmt: skip
     return "\n\n".join(f"{head}\n\n" + "\n".join(lines) for head, lines in sections.items()) + "\n"
 
@@ -61,7 +61,7 @@ def _judged_on(scores: "xr.Dataset", one: Protocol) -> str:
 def _named_ones(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
     """All that have a name, and what each gains and loses against the printed one."""
     places = _named(readings)
-    lines = [*_table(HEADS, readings_rows(scores, places)), ""]
+    lines = [*markdown_table(HEADS, readings_rows(scores, places)), ""]
     for name, window in product([title(readings[i]) for i in places[1:]], WINDOWS):
         more, less = (", ".join(keys) or "none" for keys in gained(scores, name, window))
         lines.append(f"- {name}, window {window}: gains {more}; loses {less}")
@@ -74,7 +74,7 @@ def _changes(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
         (choice, *(f"{changed.sel(choice=choice, window=window).item():.1f}" for window in WINDOWS))
         for choice in changed.choice.values
     ]
-    return _table(("choice", *WINDOWS), rows)
+    return markdown_table(("choice", *WINDOWS), rows)
 
 
 def _aside(scores: "xr.Dataset") -> list[str]:
@@ -89,7 +89,7 @@ def _aside(scores: "xr.Dataset") -> list[str]:
         "Held-out claims that agree with the choices of which only acceleration or the measure knows: refined"
         " constants, in the better window."
     )
-    return [told, "", *_table(("reading", "none of them", *scores.aside.values), rows)]
+    return [told, "", *markdown_table(("reading", "none of them", *scores.aside.values), rows)]
 
 
 def _ideal_sets(scores: "xr.Dataset") -> list[str]:
@@ -105,7 +105,7 @@ def _ideal_sets(scores: "xr.Dataset") -> list[str]:
     ]
     heads = ("reading", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
     told = "FLSS of ideal sets that a short search found under each, window walk, refined constants."
-    return [told, "", *_table(heads, rows)]
+    return [told, "", *markdown_table(heads, rows)]
 
 
 def _held_out(scores: "xr.Dataset") -> list[str]:
@@ -126,7 +126,3 @@ def _constants(one: "xr.Dataset") -> str:
     geometry = "centred" if one.centred.item() else "fig1"
     lengths = (one[name].item() for name in ("aep0", "pep0", "pep_min"))
     return ", ".join([*(f"{length:g}" for length in lengths), geometry])
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    return [line(heads), line(["---"] * len(heads)), *(line(row) for row in rows)]

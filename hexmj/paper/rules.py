@@ -61,7 +61,8 @@ class Band:
         if points is None:
             return None
         if self.averaged:
-            points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", _mean(points))]
+            of_each_start = np.mean([point.values for point in points], axis=0)
+            points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", of_each_start)]
         estimates = [(point.estimate, _where(point)) for point in points]
         strain = [max(value - self.most, self.least - value) for (value, _, _), _ in estimates]
         agrees = all(low <= self.most and high >= self.least for (_, low, high), _ in estimates)
@@ -167,11 +168,6 @@ def _difference(one: Point, other: Point) -> Estimate:
     """Change of the mean and its 95 % interval, as of independent samples."""
     (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
     return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))
-
-
-def _mean(points: Sequence[Point]) -> np.ndarray:
-    """Of each start over the velocities, (start,)."""
-    return np.mean([point.values for point in points], axis=0)
 
 
 def _range(velocities: tuple[float, float]) -> str:

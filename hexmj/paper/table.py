@@ -9,6 +9,7 @@ from hexmj.paper.found_sets import SEARCHED
 from hexmj.paper.protocol import FULL, QUICK
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
+from hexmj.storage.markdown import markdown_table
 from hexmj.timing import WINDOWS
 
 NOT_SEARCHED = "not yet searched"
@@ -108,10 +109,10 @@ def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:
     lines = [*head, "", *(f"- {one}" for one in told), ""]
     beside = summary_beside(rows)
     lines += [*(f"- {one}" for one in beside), ""] if beside else []
-    lines += [line(heads(rows)), line(["---"] * len(heads(rows)))]
-    lines += [line([cell.replace("differs:", "**differs**:") for cell in row.cells]) for row in rows]
-    lines += ["", "## Rules and commands", "", line(("the paper", "agrees if", "command")), line(["---"] * 3)]
-    lines += [line((row.claim.words, row.claim.rule.words, f"`{_command(row, settings)}`")) for row in rows]
+    cells = [[cell.replace("differs:", "**differs**:") for cell in row.cells] for row in rows]
+    rules = [(row.claim.words, row.claim.rule.words, f"`{_command(row, settings)}`") for row in rows]
+    lines += [*markdown_table(heads(rows), cells), "", "## Rules and commands", ""]
+    lines += markdown_table(("the paper", "agrees if", "command"), rules)
     lines += ["", "## Judged in physics", "", "What a plan knows nothing of; docs/experiments.md has the answers.", ""]
     lines += [f"- {name} (Section 6): {told}; `{command}`" for name, (command, told) in IN_PHYSICS.items()]
     return "\n".join(lines) + "\n"
@@ -163,8 +164,3 @@ def _number(answer: Answer) -> str:
         return f"no value at {answer.where}"
     interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
     return f"{answer.value:.4f}{interval} at {answer.where}"
-
-
-def line(cells: Sequence[str]) -> str:
-    """A row of a table in Markdown."""
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

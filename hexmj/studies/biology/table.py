@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from hexmj.measures.parts import check_axes, what_parts_may_lack
+from hexmj.storage.markdown import markdown_table
 from hexmj.studies.biology.animals import SOURCES
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def biology_markdown(result: "xr.Dataset") -> str:
     """
     check_axes(result)
     with what_parts_may_lack(result, "the table of insects cannot be made"):
-        lines = [_line(HEADS), _line(["---"] * len(HEADS)), *map(_line, rows(result)), ""]
+        lines = [*markdown_table(HEADS, rows(result)), ""]
         named = {*result.source.values}
     return (
         "\n".join([*lines, *(f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text)]) + "\n"
@@ -48,7 +49,3 @@ def _range(low: float, high: float) -> str:
     if math.isinf(low) or math.isinf(high):
         return f"above {low:.3g}" if math.isinf(high) else f"below {high:.3g}"
     return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
-
-
-def _line(cells: "tuple[str, ...] | list[str]") -> str:
-    return f"| {' | '.join(cells)} |"

@@ -6,6 +6,7 @@ import numpy as np
 
 from hexmj.controllers.leg_lost import LegLost
 from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, limit_gait
+from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
 from hexmj.starts import draw_starts
 from hexmj.studies.league.entrant import Entrant
@@ -77,21 +78,17 @@ def regimes(
         there is none, the `duty_factor` and the phases `ipsilateral` and `contralateral`, circular means over legs and
         pairs.
     """
-    import xarray as xr
-
     how = {"seed": seed, "stride": stride, "periods": periods, "threads": threads}
     gait = limit_gait(entrant.controller, velocity, n_starts=n_starts, **how)
     columns = {
-        "reached": (gait.reached, "time unit"),
-        "stable": (gait.stable.astype(np.int8), "1"),
-        "duty_factor": (gait.duty_factor.mean(axis=1), "1"),
-        "ipsilateral": (circular_mean(gait.phase[:, IPSILATERAL], axis=1), "1"),
-        "contralateral": (circular_mean(gait.phase[:, CONTRALATERAL], axis=1), "1"),
+        "reached": gait.reached,
+        "stable": gait.stable.astype(np.int8),
+        "duty_factor": gait.duty_factor.mean(axis=1),
+        "ipsilateral": circular_mean(gait.phase[:, IPSILATERAL], axis=1),
+        "contralateral": circular_mean(gait.phase[:, CONTRALATERAL], axis=1),
     }
-    return xr.Dataset({name: ("start", values, {"units": units}) for name, (values, units) in columns.items()})
+    return over_start(columns, {"reached": "time unit"})
 
 
 def _lost(time: np.ndarray) -> "xr.Dataset":
-    import xarray as xr
-
-    return xr.Dataset({"lost": ("start", np.isfinite(time).astype(np.int8), {"units": "1"})})
+    return over_start({"lost": np.isfinite(time).astype(np.int8)})

@@ -11,8 +11,9 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.asking import begin, check_repeats
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
+from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.outcome_table import UNITS, over_start
+from hexmj.measures.outcome_table import UNITS
 from hexmj.physics.drive import drive
 from hexmj.physics.effort import EffortSoFar
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
@@ -144,6 +145,6 @@ def disturbed(
     try:
         times = unless_refused(lambda which: found.times(*asked, which)[[*DISTURBED]], n_starts, DISTURBED)
     except TooFewStable:
-        return over_start({"fell": np.full(n_starts, np.nan)}, {})
+        return over_start({"fell": np.full(n_starts, np.nan)})
     fell = came(times.fall).where(~(times.fall <= times.time))
-    return over_start({"fell": fell.values}, {})
+    return over_start({"fell": fell.values})

@@ -8,6 +8,7 @@ import numpy as np
 from hexmj.measures.captions import rules
 from hexmj.measures.parts import check_axes, check_whole, what_parts_may_lack
 from hexmj.storage.attributes import settings
+from hexmj.storage.markdown import markdown_table
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:
@@ -49,11 +50,7 @@ def tables(result: "xr.Dataset") -> list[Table]:
 
 def league_markdown(result: "xr.Dataset") -> str:
     """All tables as Markdown."""
-    parts = []
-    for table in tables(result):
-        lines = [table.head, ["---"] * len(table.head), *table.rows]
-        cells = ([text.replace("|", "\\|") for text in line] for line in lines)
-        parts += [f"### {table.title}", "\n".join(f"| {' | '.join(line)} |" for line in cells)]
+    parts = [f"### {one.title}\n\n" + "\n".join(markdown_table(one.head, one.rows)) for one in tables(result)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
-from hexmj.measures.outcome_table import UNITS, over_start
+from hexmj.measures.frequency import over_start
+from hexmj.measures.outcome_table import UNITS
 from hexmj.measures.physical import PhysicalWalk, walk_of_settings
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import settle

@@ -13,6 +13,7 @@ from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import GEOMETRIES
+from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw, draw_starts
@@ -167,8 +168,6 @@ def losses(
 
     Arguments are as of `WalkSettings`; without conditions the network walks on paper.
     """
-    import xarray as xr
-
     if conditions:
         from hexmj.measures.outcome_table import settled_starts
         from hexmj.measures.physical import physical_outcomes
@@ -180,4 +179,4 @@ def losses(
         starts = draw_starts(n_starts, seed, stride)
         how = {"stride": stride, "acceleration": acceleration, "threads": threads}
         time = first_loss(starts, network, velocity, duration, **how)
-    return xr.Dataset({"lost": ("start", np.isfinite(time).astype(np.int8), {"units": "1"})})
+    return over_start({"lost": np.isfinite(time).astype(np.int8)})
