@@ -51,6 +51,16 @@ def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -
     walks_figure(result)
 
 
+@pytest.mark.parametrize("which", [{"velocities": (0.3, 0.9)}, {"tried_at": 0.9}, {"accelerating": True}])
+def test_a_plan_that_cannot_walk_fast_is_refused_before_the_work(which) -> None:
+    """With this time step it walks at V = 0.3; the league would end at it once all slower walks are done."""
+    slow = {"velocities": (0.3,), "n_starts": 9, "n_physical": 2, "n_tried": 1, "accelerating": False}
+    entrants = {"righetti": Entrant(hexmj.load_controller("righetti"))}
+    assert League(entrants, **slow, stride=Stride(dt=0.4)).cells()
+    with pytest.raises(hexmj.InputError, match=r"oscillators diverge at dt = 0.4 and V_r = 0.9"):
+        League(entrants, **slow | which, stride=Stride(dt=0.4)).cells()
+
+
 @pytest.mark.parametrize("error", [SimulationError, OutOfReach, StillThrown])
 def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[Exception]) -> None:
     def walked(which: np.ndarray, refused: tuple[int, ...] = ()) -> xr.Dataset:
