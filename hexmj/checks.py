@@ -150,7 +150,7 @@ def _fitted(value: Any, wanted: Any) -> Any:
             if len(kinds) == len(value):
                 return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))
     elif wanted in (int, float):
-        if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool):
+        if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool | np.timedelta64):
             with suppress(OverflowError):  # a whole number beyond all floats stays what it is
                 number: Any = value
                 return wanted(number) + 0  # and -0.0 is 0.0

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from hexmj.checks import typed
 from hexmj.errors import InputError
 from hexmj.measures.parts import check_axes, check_window, what_parts_may_lack
 
@@ -59,7 +60,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
             f" hexmj.load reads, of {', '.join(FIGURES)}"
         )
-    chosen = next(iter(figures)) if which is None else which
+    chosen = next(iter(figures)) if typed("which", which, str | None) is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
     module, _, name = figures[chosen].partition(":")

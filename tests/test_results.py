@@ -222,6 +222,8 @@ def test_what_belongs_to_no_figure_is_refused_in_a_sentence(tmp_path: Path):
         hexmj.plot(xr.Dataset({"x": 1.0}))
     with pytest.raises(InputError, match="which = 'fate'; valid names: flss"):
         hexmj.plot(flss(), "fate")
+    with pytest.raises(InputError, match=r"which = \['flss'\]; expected a text"):
+        hexmj.plot(flss(), ["flss"])  # pyright: ignore[reportArgumentType]
     (tmp_path / "text.nc").write_text("no NetCDF")
     with pytest.raises(InputError, match=r"text\.nc is damaged, or no result"):
         hexmj.load(tmp_path / "text.nc")

@@ -9,7 +9,7 @@ import hexmj
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
-from hexmj.controllers.leg_lost import HELD, RAISED, LegLost
+from hexmj.controllers.leg_lost import RISE, LegLost
 from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
@@ -19,6 +19,8 @@ from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.study import League
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, TRIALS, crossed, walking
 from hexmj.timing import Stride
+
+LARGER = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
 
 
 def test_trials_are_what_they_say() -> None:
@@ -33,8 +35,7 @@ def test_trials_are_what_they_say() -> None:
 
 
 def test_grounds_lie_as_the_body_is_large() -> None:
-    larger = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
-    for body, sizes in ((STICK_INSECT, (3.0, 45.0, 75.0)), (larger, (4.5, 67.5, 112.5))):
+    for body, sizes in ((STICK_INSECT, (3.0, 45.0, 75.0)), (LARGER, (4.5, 67.5, 112.5))):
         usual = Conditions(body=body)
         for name in GROUNDS:
             met = walking(name, Entrant(hexmj.LDVS), usual, Stride())
@@ -44,8 +45,7 @@ def test_grounds_lie_as_the_body_is_large() -> None:
 
 
 def test_grounds_that_no_leg_of_a_larger_body_gets_to_are_no_trials() -> None:
-    larger = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
-    for body, expected in ((STICK_INSECT, True), (larger, False)):
+    for body, expected in ((STICK_INSECT, True), (LARGER, False)):
         league = League({"ldvs": Entrant(hexmj.LDVS)}, window=300.0, conditions=Conditions(body=body))
         tried = [name for name, *_ in league._tried(Entrant(hexmj.LDVS))]
         assert ("step" in tried, "load" in tried) == (expected, True), "90 mm are walked"
@@ -61,19 +61,22 @@ def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
     assert np.array_equal(planned.stance[..., others], whole.stance[..., others])
     assert np.array_equal(planned.x, whole.x)
     walked = physical_walk(starts, lame, 0.3, 30.0)
-    step = 20.0  # mm from PEP_0 to AEP_0
-    held = walked.measured.time > 2 * RAISED * step
-    upright = np.isfinite(walked.height[held][..., leg])
-    assert not walked.measured.stance[held][..., leg].any()
-    assert (walked.height[held][..., leg][upright] > HELD * step / 3).mean() > 0.9
+    raised = walked.measured.time > 2 * lame.held / RISE
+    upright = np.isfinite(walked.height[raised][..., leg])
+    assert not walked.measured.stance[raised][..., leg].any()
+    assert (walked.height[raised][..., leg][upright] > lame.held / 3).mean() > 0.9
 
 
-def test_a_lost_leg_is_held_as_high_as_the_steps_are_long() -> None:
+def test_a_lost_leg_is_held_as_high_as_the_body_asks_for_however_short_the_steps() -> None:
     high = []
-    for stride in (Stride(), Stride(aep0=5.0, pep0=-5.0, pep_min=-10.0)):
-        plan = LegLost(hexmj.LDVS, 0).begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
+    for body, stride in ((STICK_INSECT, Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)), (LARGER, Stride())):
+        trial = walking("lost 1", Entrant(hexmj.LDVS), Conditions(body=body), stride)
+        assert trial is not None
+        plan = trial.controller.begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
         high.append(np.nanmax(plan.advance(300).height[..., 0]))
-    assert high == [12.0, 6.0]
+    assert high == [12.0, 18.0]
+    with pytest.raises(InputError, match=r"held = 0.0; expected a height above 0 mm"):
+        LegLost(hexmj.LDVS, 0, 0.0)
 
 
 def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:

@@ -91,6 +91,7 @@ PROBLEM = anything.Problem(hexmj.NetworkForm("hws"), 0.3, 0.3)
 MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
 
 BAD: list[tuple[Callable[[], Any], str]] = [
+    (lambda: anything.Stride(dt=np.timedelta64(1)), "dt = np.timedelta64(1); expected a number"),
     (lambda: walk(stride=3), "stride = 3; expected a Stride"),
     (lambda: walk(stride={}), "stride = {}; expected a Stride"),
     (lambda: walk(stride=0), "stride = 0; expected a Stride"),

@@ -1,19 +1,18 @@
 """A controller that has lost a leg and does not know: the leg is held up, whatever it is told, and never stands."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj.checks import whole
+from hexmj.checks import check_types, whole
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
+from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
-HELD = 0.6
-"""Height at which the lost leg is held, in steps from PEP_0 to AEP_0."""
-
-RAISED = 0.2
-"""Time in which it is raised there as the walk begins, in times of a swing over such a step."""
+RISE = 3.0
+"""How fast the lost leg is raised as the walk begins [mm / time unit], three times as fast as tips swing ahead."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +23,15 @@ class LegLost:
     """Plans for six."""
     leg: int
     """Index of the lost leg."""
+    held: float = 12.0
+    """Height at which it is held [mm]; nothing on paper depends on it."""
 
     def __post_init__(self) -> None:
         check_controller_type(self.controller)
         whole("leg", self.leg, 0, 5)
+        check_types(self)
+        if not 0 < self.held < math.inf:
+            raise InputError(f"held = {self.held}; expected a height above 0 mm")
 
     @property
     def name(self) -> str:
@@ -44,16 +48,17 @@ class LegLost:
     ) -> "LamePlan":
         """See `protocol.Controller.begin`."""
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        return LameReadingPlan(plan, self.leg) if isinstance(plan, ReadingPlan) else LamePlan(plan, self.leg)
+        kind = LameReadingPlan if isinstance(plan, ReadingPlan) else LamePlan
+        return kind(plan, self.leg, self.held)
 
 
 class LamePlan:
     """A `protocol.Plan` of which one leg is held up."""
 
-    def __init__(self, plan: Plan, leg: int) -> None:
+    def __init__(self, plan: Plan, leg: int, held: float) -> None:
         """Around a plan at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
-        self._plan, self._leg, self.made_for = plan, leg, getattr(plan, "made_for", None)
+        self._plan, self._leg, self._held, self.made_for = plan, leg, held, getattr(plan, "made_for", None)
 
     def advance(self, steps: int) -> PlannedWalk:
         """The next steps; the lost leg is moved to and fro in the air."""
@@ -61,8 +66,7 @@ class LamePlan:
         self.done = self._plan.done
         stance, height = walk.stance.copy(), walk.height.copy()
         stance[..., self._leg] = False
-        step = self.stride.aep0 - self.stride.pep0
-        height[..., self._leg] = HELD * step * np.minimum(walk.time / (RAISED * step), 1.0)[:, None]
+        height[..., self._leg] = self._held * np.minimum(walk.time / (self._held / RISE), 1.0)[:, None]
         return replace(walk, stance=stance, height=height)
 
 

@@ -35,6 +35,10 @@ GROUNDS = ("step", "rough")
 HEIGHT = 0.3
 """Of the ground, in standing heights of the body."""
 
+HELD = 1.2
+"""Height at which a lost leg is held, in standing heights of the body: out of the way of the ground, however short the
+steps."""
+
 LOAD = 1.0
 """What is carried, in weights of the body."""
 
@@ -90,7 +94,7 @@ def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride)
     if name == "load":
         return Walking(controller, conditions.but(load=LOAD))
     if name in LEGS_LOST:
-        return Walking(LegLost(controller, LEGS_LOST[name]), conditions)
+        return Walking(LegLost(controller, LEGS_LOST[name], HELD * conditions.body.standing_height), conditions)
     late = DELAY * conditions.time.vp
     if reading is None or (name == "late" and not round(late / stride.dt)):
         return None
