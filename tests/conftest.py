@@ -21,8 +21,8 @@ def a_program_of_its_own():
 @pytest.fixture
 def run(monkeypatch, capsys):
     """Run the command in this process: its exit code, standard output and standard error."""
+    from hexmj.cli.loaded import LOADED
     from hexmj.cli.main import main
-    from hexmj.cli.options import LOADED
 
     def call(*words: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["hexmj", *map(str, words)])

@@ -109,7 +109,7 @@ def test_but_nothing_that_is_being_written(tmp_path: Path) -> None:
 
 ORPHANS = """
 import os, signal, time
-from hexmj.cli.options import Sweepers
+from hexmj.cli.sweepers import Sweepers
 
 if __name__ == "__main__":
     with Sweepers(processes=2).executor() as pool:

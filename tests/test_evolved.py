@@ -11,7 +11,7 @@ from hexmj.cli.main import options_of
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.gaits import gait
-from hexmj.search.problems import Sample
+from hexmj.search.samples import Sample
 from hexmj.storage.files import read_toml
 from hexmj.timing import Stride
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.cli import options
+from hexmj.cli import loaded
+from hexmj.cli.options import Controlled
 from hexmj.controllers import Sensed, Step, stepwise
 from hexmj.controllers.conformance import check_controller
 from hexmj.gaits import CYCLES, limit_gait
@@ -23,7 +24,7 @@ from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
-from hexmj.search.problems import Sample
+from hexmj.search.samples import Sample
 from hexmj.studies.league.entrants import entrants
 from hexmj.walks import PlannedWalk
 
@@ -323,14 +324,14 @@ def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome(tmp_path):
 
 def test_a_command_uses_a_controller_as_it_was_loaded_whatever_becomes_of_its_file(tmp_path, monkeypatch):
     """So a recording is of the controller that was compared, and no half saved file ends a run."""
-    monkeypatch.setattr(options, "LOADED", {})
+    monkeypatch.setattr(loaded, "LOADED", {})
     (mine := tmp_path / "mine.py").write_text((EXAMPLES / "tripod.py").read_text())
     name = f"{mine}:Tripod"
-    controlled = options.Controlled()
+    controlled = Controlled()
     first = controlled.controller(name)
     mine.write_text("def half(")
     assert controlled.controllers([name])[first.name] is first
-    assert entrants((name,), options.loaded)["tripod"].controller is first
+    assert entrants((name,), loaded.loaded)["tripod"].controller is first
 
 
 def test_a_file_that_a_controller_names_may_not_change_while_a_command_is_at_work(tmp_path, monkeypatch, run):
@@ -351,7 +352,7 @@ def test_a_file_that_a_controller_names_may_not_change_while_a_command_is_at_wor
     monkeypatch.setattr(result, edited)
     code, _, said = run(*command)
     assert code == 2 and "gains of" in said and "has changed while it was in use; start again" in said
-    options.loaded("mine.py:Tripod")
+    loaded.loaded("mine.py:Tripod")
     Path("gains.txt").write_text("3")
     with pytest.raises(hexmj.InputError, match=r"a file that mine\.py:Tripod names has changed while the command was"):
-        options.check_loaded()
+        loaded.check_loaded()

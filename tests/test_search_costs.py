@@ -12,7 +12,7 @@ from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.controllers import Step, stepwise
 from hexmj.search.convergence import convergence_figure
 from hexmj.search.network_forms import FORMS
-from hexmj.search.problems import Sample
+from hexmj.search.samples import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
 

@@ -14,7 +14,7 @@ from hexmj.controllers import Step, stepwise
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.search.network_forms import FORMS
-from hexmj.search.problems import Sample
+from hexmj.search.samples import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
 

@@ -12,7 +12,7 @@ from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Pr
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import Reading
 from hexmj.legs import CENTRED
-from hexmj.search.problems import Sample
+from hexmj.search.samples import Sample
 from hexmj.studies.variants.figure import STYLES, variants_figure
 from hexmj.studies.variants.study import Variants, notes
 from hexmj.sweeps import Cell, conduct

@@ -26,13 +26,13 @@ from hexmj.measures.physical import physical_outcomes
 from hexmj.paper.protocol import FULL
 from hexmj.paper.reproduce import measure
 from hexmj.physics.settling import settle
-from hexmj.search import problems, stages
+from hexmj.search import samples, stages
 from hexmj.walks import one_start, part_of
 
 anything: Any = hexmj
 LDVS, STRIDE = anything.LDVS, hexmj.Stride()
 search: Any = stages.search
-Sample: Any = problems.Sample
+Sample: Any = samples.Sample
 STARTS = np.zeros((2, 6))
 FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
 STANDS = np.ones((2, 6), dtype=bool)

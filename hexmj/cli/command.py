@@ -7,7 +7,8 @@ from typing import Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import numbers
-from hexmj.cli.options import Accelerating, Controlled, Walks, changed
+from hexmj.cli.options import Accelerating, Controlled, Walks
+from hexmj.cli.registry import changed
 from hexmj.conditions import Conditions, Numerics, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError

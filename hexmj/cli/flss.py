@@ -8,7 +8,8 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import ControllerName, Figures, Sweepers
+from hexmj.cli.options import ControllerName, Figures
+from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import physical_report, print_json, report_line, save_figure, show, table
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import AS_THEY_ARE, CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding, loaded
+from hexmj.cli.loaded import loaded
+from hexmj.cli.options import AS_THEY_ARE, CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit

@@ -153,7 +153,7 @@ def options_of(words: list[str]) -> Any:
     how: Any = {"config": (FlagCreatePairsOff,)}
     listed = words in (["--help"], ["-h"])
     if not listed:
-        from hexmj.cli.options import registry
+        from hexmj.cli.registry import registry
 
         how["registry"] = registry
     if words and words[0] in COMMANDS:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.cli import words
-from hexmj.cli.options import check_loaded
+from hexmj.cli.loaded import check_loaded
 from hexmj.errors import InputError
 from hexmj.storage.files import DIGEST, WRITTEN, digest_of, read_text
 from hexmj.storage.literal import literal

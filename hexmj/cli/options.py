@@ -3,30 +3,16 @@
 Each command is a frozen dataclass made of these parts, and offers just the options that it obeys.
 """
 
-import os
-import threading
-from collections.abc import Collection, Iterator, Sequence
-from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import asdict, dataclass, field, fields, is_dataclass, make_dataclass, replace
-from typing import Annotated, Any, Literal, TypeVar, cast, get_type_hints
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
-from tyro.constructors import (
-    ConstructorRegistry,
-    PrimitiveConstructorSpec,
-    PrimitiveTypeInfo,
-    StructConstructorSpec,
-    StructFieldSpec,
-    StructTypeInfo,
-)
 
-from hexmj.conditions import OBEYED, Conditions, Ground
+from hexmj.cli.loaded import LOADED, loaded
+from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
-from hexmj.legs import GEOMETRIES, Geometry
-from hexmj.process.signals import STOPS, of_stop, stops_wait, unheard_by_children
-from hexmj.sweeps.plain import plain
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -36,40 +22,7 @@ CONTROLLER = (
 )
 """How controllers are named."""
 
-MOST_PROCESSES = 1000
-"""More than any machine has cores."""
-
-LOADED: dict[str, tuple[Controller, Any]] = {}
-"""Controllers as the command has loaded them, and their settings then: a file that is edited while it runs is not run
-again."""
-
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
-
-
-def loaded(name: str) -> Controller:
-    """A controller by its name as the command has loaded it first; names and errors as of `load_controller`."""
-    from hexmj.controllers.named import load_controller
-
-    if name not in LOADED:
-        LOADED[name] = (found := load_controller(name)), _settings(found)
-    return LOADED[name][0]
-
-
-def _settings(controller: Controller) -> Any:
-    """A controller's settings as plain data; none where they are no such."""
-    with suppress(InputError):
-        return plain(controller)
-
-
-def check_loaded() -> None:
-    """Refuse that a file has changed, while the command was at work, which a field of a controller names.
-
-    Raises:
-        InputError: it has, or settings are none any more.
-    """
-    for name, (controller, settings) in LOADED.items():
-        if settings is not None and plain(controller) != settings:
-            raise InputError(f"a file that {name} names has changed while the command was at work; start it again")
 
 
 @dataclass(frozen=True)
@@ -206,117 +159,6 @@ class Workers:
 
     threads: int | None = None
     """Threads; one per core unless given.  No result depends on it."""
-
-
-@dataclass(frozen=True)
-class Sweepers:
-    """What works on cells, which are kept as they finish."""
-
-    threads: int | None = None
-    """Threads of each process; unless given, processes share the cores.  No result depends on it."""
-    processes: int = 1
-    """Processes that compute cells side by side.  No result depends on it."""
-    scheduler: str | None = None
-    """Address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers compute the cells instead; they must see
-    the results' folder.  No result depends on it."""
-
-    @property
-    def threads_each(self) -> int | None:
-        """Threads of each process; None where a single one takes all cores."""
-        from hexmj.process.threads import thread_count
-
-        if self.threads is not None:
-            return thread_count(self.threads)
-        return max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
-
-    @contextmanager
-    def executor(self) -> Iterator[Executor | None]:
-        """The processes, a cluster's workers, or None where this process does the work.
-
-        Raises:
-            InputError: no process, or too many, or a scheduler as well or that cannot be reached.
-        """
-        if not 1 <= self.processes <= MOST_PROCESSES:
-            raise InputError(f"--processes = {self.processes}; expected at least 1 and at most {MOST_PROCESSES}")
-        if self.processes == 1:
-            from hexmj.sweeps.cluster import workers_of
-
-            with nullcontext() if self.scheduler is None else workers_of(self.scheduler) as executor:
-                yield executor
-            return
-        if self.scheduler is not None:
-            raise InputError(f"--scheduler and --processes = {self.processes}; expected one of them")
-        from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import active_children, get_context
-
-        from hexmj.sweeps.workers import end_with_parent
-
-        with ExitStack() as ended:
-            with stops_wait(), unheard_by_children(*STOPS):  # else semaphores might be left behind
-                pool = ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent)
-                executor = ended.enter_context(pool)
-            try:
-                with unheard_by_children(*STOPS):
-                    for _ in range(self.processes):
-                        executor.submit(os.getpid)  # begins one
-                yield executor
-            except BaseException as error:
-                if of_stop(error):  # nobody waits for cells that are stopped
-                    threading.excepthook = lambda _: None  # the pool's own thread minds that they were cancelled
-                    for worker in active_children():
-                        worker.terminate()
-                raise
-            with stops_wait():  # nothing is left to do but to leave
-                executor.shutdown()
-
-
-def changed(given: Any, usual: Any) -> Iterator[str]:
-    """Names of the options, of their parts too, that are not as usual; both are of one dataclass."""
-    for name in (one.name for one in fields(given)):
-        value, other = getattr(given, name), getattr(usual, name)
-        if value != other:
-            yield from changed(value, other) if is_dataclass(value) and not isinstance(value, Geometry) else [name]
-
-
-registry = ConstructorRegistry()
-"""How types of this package are read."""
-
-
-@registry.primitive_rule
-def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometry] | None:
-    """On the command line a geometry is given by its name."""
-    if info.type is not Geometry:
-        return None
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="{" + ",".join(GEOMETRIES) + "}",
-        instance_from_str=lambda words: GEOMETRIES[words[0]],
-        is_instance=lambda value: isinstance(value, Geometry),
-        str_from_instance=lambda value: [name for name, g in GEOMETRIES.items() if g == value],
-        choices=tuple(GEOMETRIES),
-    )
-
-
-@registry.struct_rule
-def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
-    """On the command line conditions are given one by one, and hold for the stick insect."""
-    if info.type is not Conditions:
-        return None
-    usual = info.default if isinstance(info.default, Conditions) else Conditions()
-    hints = get_type_hints(Conditions, include_extras=True)
-    parts = [one.name for one in fields(Conditions) if one.name != "body"]
-
-    def conditions(**given: Any) -> Conditions:
-        if type(ground := given["ground"]) is Ground:
-            vain = [name for name in changed(ground, Ground()) if name not in ("ground", *OBEYED[ground.ground])]
-            if vain:
-                name = vain[0].replace("_", "-")
-                raise InputError(f"--{name} with --ground {ground.ground}; expected it with a ground that has it")
-        return Conditions.of(**{name: value for part in given.values() for name, value in asdict(part).items()})
-
-    return StructConstructorSpec(
-        conditions, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
-    )
 
 
 Options = TypeVar("Options")

@@ -7,8 +7,8 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Sweepers
 from hexmj.cli.study import lists_of
+from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar

@@ -12,8 +12,9 @@ from tyro.conf import OmitArgPrefixes, Positional
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import ControllerName, Workers, changed
+from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.recorded import walk_summary, walked_start
+from hexmj.cli.registry import changed
 from hexmj.cli.tables import print_json, show
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError

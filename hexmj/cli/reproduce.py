@@ -7,7 +7,7 @@ from typing import Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Sweepers
+from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar

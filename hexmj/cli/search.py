@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
+from hexmj.cli.loaded import loaded
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Controlled, Figures, Workers, loaded
+from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, print_json, save_figure, show, table
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
@@ -82,7 +83,7 @@ class Search(WalkingCommand):
 
     def run(self) -> None:
         """Search, judge what was found on fresh starts, write and print."""
-        from hexmj.search.problems import Sample
+        from hexmj.search.samples import Sample
         from hexmj.search.stages import search
         from hexmj.sweeps.plain import plain
 

@@ -9,7 +9,8 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.options import Figures, Sweepers
+from hexmj.cli.options import Figures
+from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.process.progress import progress_bar
 from hexmj.storage.attributes import settings

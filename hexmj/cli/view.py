@@ -5,7 +5,8 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes, Positional
 
-from hexmj.cli.options import Controlled, ControllerName, changed
+from hexmj.cli.options import Controlled, ControllerName
+from hexmj.cli.registry import changed
 from hexmj.cli.tables import show
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError

@@ -18,7 +18,8 @@ from hexmj.process.progress import Progress, shown
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
-from hexmj.search.problems import REFUSED, Problem, Sample
+from hexmj.search.problems import Problem
+from hexmj.search.samples import REFUSED, Sample
 from hexmj.starts import check_draw
 from hexmj.storage.locks import locked
 from hexmj.sweeps import Cell, KeptValues

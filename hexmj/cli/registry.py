@@ -1,0 +1,66 @@
+"""How types of this package are read from the command line, and which options are not as usual."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, fields, is_dataclass
+from typing import Any, get_type_hints
+
+from tyro.constructors import (
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    StructConstructorSpec,
+    StructFieldSpec,
+    StructTypeInfo,
+)
+
+from hexmj.conditions import OBEYED, Conditions, Ground
+from hexmj.errors import InputError
+from hexmj.legs import GEOMETRIES, Geometry
+
+registry = ConstructorRegistry()
+"""How types of this package are read."""
+
+
+@registry.primitive_rule
+def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometry] | None:
+    """On the command line a geometry is given by its name."""
+    if info.type is not Geometry:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="{" + ",".join(GEOMETRIES) + "}",
+        instance_from_str=lambda words: GEOMETRIES[words[0]],
+        is_instance=lambda value: isinstance(value, Geometry),
+        str_from_instance=lambda value: [name for name, g in GEOMETRIES.items() if g == value],
+        choices=tuple(GEOMETRIES),
+    )
+
+
+@registry.struct_rule
+def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
+    """On the command line conditions are given one by one, and hold for the stick insect."""
+    if info.type is not Conditions:
+        return None
+    usual = info.default if isinstance(info.default, Conditions) else Conditions()
+    hints = get_type_hints(Conditions, include_extras=True)
+    parts = [one.name for one in fields(Conditions) if one.name != "body"]
+
+    def conditions(**given: Any) -> Conditions:
+        if type(ground := given["ground"]) is Ground:
+            vain = [name for name in changed(ground, Ground()) if name not in ("ground", *OBEYED[ground.ground])]
+            if vain:
+                name = vain[0].replace("_", "-")
+                raise InputError(f"--{name} with --ground {ground.ground}; expected it with a ground that has it")
+        return Conditions.of(**{name: value for part in given.values() for name, value in asdict(part).items()})
+
+    return StructConstructorSpec(
+        conditions, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
+    )
+
+
+def changed(given: Any, usual: Any) -> Iterator[str]:
+    """Names of the options, of their parts too, that are not as usual; both are of one dataclass."""
+    for name in (one.name for one in fields(given)):
+        value, other = getattr(given, name), getattr(usual, name)
+        if value != other:
+            yield from changed(value, other) if is_dataclass(value) and not isinstance(value, Geometry) else [name]

@@ -1,0 +1,197 @@
+"""The starts on which candidates of a search are judged, and what each of them costs."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.checks import check_types, numbers
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError, OutOfReach
+from hexmj.intervals import wilson_intervals
+from hexmj.measures.kinematic import first_loss
+from hexmj.process.progress import Progress, part_of
+from hexmj.process.threads import thread_count
+from hexmj.search.network_forms import NetworkForm
+from hexmj.search.problems import Problem
+from hexmj.starts import check_draw, draw_starts
+from hexmj.timing import observation_time, steps_within
+from hexmj.variants import varied
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.physics.settling import Settled
+
+REFUSED = 1.0
+"""Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Starts of a problem: common random numbers, the same for every candidate that is judged on them.
+
+    They are the first starts of a seed, as `kinematic.flss` and `flss_over_range` draw them.
+    """
+
+    problem: Problem
+    n_starts: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        check_draw(self.n_starts, self.seed)
+
+    @cached_property
+    def variants(self) -> "dict[str, Sample]":
+        """The same starts of each of the problem's variants, by their names."""
+        several = self.problem.over != "usual"
+        return {name: replace(self, problem=one) if several else self for name, one in self.problem.variants.items()}
+
+    @cached_property
+    def starts(self) -> np.ndarray:
+        """(start, leg) tips at time 0 [mm]."""
+        return draw_starts(self.n_starts, self.seed, self.problem.stride)
+
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """(start,) V_r of each start, a fraction of V_p."""
+        return np.random.default_rng([self.seed, 1]).uniform(self.problem.low, self.problem.high, self.n_starts)
+
+    @cached_property
+    def _at_rest(self) -> "list[Settled]":
+        """The starts at rest in MuJoCo, once they have settled."""
+        return []
+
+    def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
+        """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else.
+
+        Raises:
+            InputError: no such vectors.
+        """
+        vectors = numbers("vectors", vectors)
+        if vectors.shape[1:] != (len(self.problem.form.names),):
+            raise InputError(f"vectors of the shape {vectors.shape}; expected (candidate, parameter)")
+        return self._together([one._costs(vectors, threads) for one in self.variants.values()])
+
+    def _together(self, values: Any) -> np.ndarray:
+        """Of all variants, (variant, ...), what is minimised, (...)."""
+        return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
+
+    def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
+        """G of each candidate, (candidate,), of this one variant."""
+
+        def cost(vector: np.ndarray, threads: int | None) -> float:
+            try:
+                candidate = self.problem.controller(vector)
+            except (InputError, ValueError):
+                return REFUSED
+            except Exception as error:
+                raise InputError(
+                    f"{self.problem.form!r:.80} makes no controller of {vector}: {error!r:.200}"
+                ) from error
+            try:
+                return self._cost(candidate, threads)
+            except OutOfReach:
+                return REFUSED
+            except InputError as error:
+                pairs = zip(self.problem.form.names, vector, strict=True)
+                at = ", ".join(f"{name} = {value:g}" for name, value in pairs)
+                raise InputError(f"with {at}: {error}") from None
+
+        # A user's plans may share a module's arrays, and hold the interpreter's lock anyway.
+        if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
+            return np.array([cost(vector, threads) for vector in vectors])
+        with ThreadPoolExecutor(thread_count(threads)) as pool:
+            return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
+
+    def _cost(self, candidate: Controller, threads: int | None) -> float:
+        """FLSS; where ties are broken, with one start more that counts for the part of the time lost on average."""
+        times, (ends,) = self._times(candidate, [self.problem.window], threads)
+        lost = (times <= ends).sum().item()
+        if self.problem.ties == "equal":
+            return lost / self.n_starts
+        return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
+
+    def lost(self, cost: float) -> int | None:
+        """How many of the starts were lost, or fell, at a cost; unknown of a mean over variants."""
+        if self.problem.over == "mean":
+            return None
+        if self.problem.ties == "equal":
+            return round(cost * self.n_starts)
+        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
+
+    def check_reach(self, vector: np.ndarray, threads: int | None = None) -> None:
+        """Refuse a candidate, (parameter,), whose tips no leg reaches in physics.
+
+        Raises:
+            OutOfReach: it is one.
+        """
+        for one in self.variants.values():
+            if one.problem.conditions:
+                one._times(one.problem.controller(vector), [one.problem.window], threads)
+
+    def verdict(
+        self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
+    ) -> "xr.Dataset":
+        """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
+
+        The interval of a mean over variants is too wide rather than too narrow: as if all lost stability together.
+        """
+        import xarray as xr
+
+        windows, told = self.problem.windows, part_of(progress, 1.0 / len(controllers) / len(self.variants))
+
+        def losses(variant: str, controller: Controller) -> np.ndarray:
+            """Number of starts that lose stability, or fall, within each window, (window,)."""
+            times, ends = self.variants[variant]._times(varied(controller, variant), windows, threads)
+            if told:
+                told(1.0)
+            return (times <= ends).sum(axis=1)
+
+        lost = self._together([[losses(name, one) for one in controllers.values()] for name in self.variants])
+        low, high = wilson_intervals(np.rint(lost), self.n_starts)
+        over, unit = ("controller", "window"), {"units": "1"}
+        return xr.Dataset(
+            {
+                "flss": (over, lost / self.n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
+                "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
+                "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
+            },
+            coords={"controller": list(controllers), "window": [str(window) for window in windows]},
+        )
+
+    def _times(
+        self, controller: Controller, windows: list[str | float], threads: int | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """When each start loses stability, or falls, (start,), and the ends of its windows, (window, start), both
+        [time units]; an end is a millionth of a step late, so that what happens in its step is within."""
+        p, dt = self.problem, self.problem.stride.dt
+        times = [observation_time(window, self.velocity, p.stride, p.acceleration) for window in windows]
+        ends = np.array([steps_within(time, p.stride) for time in times]) * dt
+        longest = ends.max(axis=0)
+        if p.conditions:
+            lost = self._falls(controller, float(longest.max()), p.conditions, threads)
+        else:
+            lost = first_loss(
+                self.starts, controller, self.velocity, longest,
+                stride=p.stride, acceleration=p.acceleration, threads=threads,
+            )  # fmt: skip
+        return lost, ends + 1e-6 * dt
+
+    def _falls(self, controller: Controller, time: float, conditions: Conditions, threads: int | None) -> np.ndarray:
+        """When each start falls in a physical walk, (start,) [time units]; the starts settle once for all walks."""
+        from hexmj.measures.physical import physical_outcomes
+        from hexmj.physics.settling import settle
+
+        p = self.problem
+        if not self._at_rest:
+            self._at_rest.append(settle(self.starts, conditions, p.stride, threads))
+        walked = physical_outcomes(
+            self._at_rest[0], controller, self.velocity, time, acceleration=p.acceleration, threads=threads
+        )
+        return walked.fall
