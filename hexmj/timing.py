@@ -82,6 +82,19 @@ class Acceleration:
         return (velocity - self.start) / self.rate
 
 
+def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
+    """Refuse velocities V_r that an acceleration steps over.
+
+    Raises:
+        InputError: V_r and a step of it are 1 or more together.
+    """
+    if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
+        raise InputError(
+            f"V = {velocity.max():g} is reached in steps of {acceleration.rate * stride.dt:g};"
+            " expected V and a step together below 1"
+        )
+
+
 def observation_time(
     window: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:

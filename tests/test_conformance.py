@@ -182,6 +182,13 @@ def moved_by_swings(plan, starts, *_):
     plan.advance, plan.sense = advance, sense
 
 
+def slowed_by_anyone(plan, *_):
+    """All say that they go slower once any start tilts."""
+    inner, tilts = plan.advance, []
+    plan.advance = lambda steps: replace(walk := inner(steps), velocity=walk.velocity * (0.5 if any(tilts) else 1.0))
+    plan.sense = lambda sensed: tilts.append((sensed.tilt > 0.05).any())
+
+
 def ids_written_on(plan, *_):
     def sense(sensed: Sensed) -> None:
         sensed.ids[:] = 0
@@ -376,6 +383,11 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("sense", spoilt(moved_by("tilt", their_mean)), "a start it is told of, beside others and alone, differ: x is"),
     ("sense", spoilt(moved_by("tilt", right_rows_while_all_walk)), "beside others and alone, differ: x is .* in step "),
     ("sense", spoilt(moved_by_swings), "starts it is told nothing of differ: x is"),
+    (
+        "sense",
+        spoilt(slowed_by_anyone),
+        "starts it is told nothing of differ: velocity is 0.01 and 0.02",
+    ),
     ("sense", spoilt(ids_written_on), "sense changes what it is told, ids"),
     ("sense", spoilt(written_on), "sense changes what it is told, tips"),
     ("steps", steps_changed(x=lambda walk: np.zeros((2, 2))), "x of a step has the shape"),

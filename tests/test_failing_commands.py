@@ -80,3 +80,12 @@ def test_an_answer_that_can_go_nowhere_is_a_sentence(run, monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
     code, _, error = run("flss", "--starts", 5, "--window", 10, "--json")
     assert (code, error) == (2, "hexmj: standard output is closed; expected it open, for the answer\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"), [(["flss", "--help"], 0), (["walk", "--velo", "2"], 2), (["--help"], 0)]
+)
+def test_help_that_can_go_nowhere_is_no_traceback(run, monkeypatch, words, expected):
+    monkeypatch.setattr("sys.stdout", None)
+    code, _, error = run(*words)
+    assert code == expected and "Traceback" not in error

@@ -144,14 +144,15 @@ def test_what_differs_is_named_even_where_all_numbers_are_equal(run, flss):
     assert "processor (AVX1024 then, not now), settings (seed)" in told
 
 
-def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("toml", ["fields.toml", "fields.conf"])
+def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch, toml):
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(MINE)
-    Path("fields.toml").write_text('controller = "mine.py:Drags"\n[fields]\nname = "other"\n')
-    words = ["flss", "--model", "fields.toml", "--velocities", 0.5, "--starts", 20, "--window", 30, "--physical"]
+    Path(toml).write_text('controller = "mine.py:Drags"\n[fields]\nname = "other"\n')
+    words = ["flss", "--model", toml, "--velocities", 0.5, "--starts", 20, "--window", 30, "--physical"]
     code, _, error = run(*words, "--out", "out")
     assert code == 0, error
-    assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"mine.py", "fields.toml"}
+    assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"mine.py", toml}
     assert run("rerun", "out")[0] == 0
     Path("mine.py").write_text(MINE.replace("1.0 *", "0.5 *"))
     code, text, _ = run("rerun", "out")

@@ -31,7 +31,8 @@ from hexmj.process import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
 from hexmj.view import desktop
-from hexmj.view.browser import BrowserView, footfall
+from hexmj.view.browser import BrowserView
+from hexmj.view.charts import footfall
 from hexmj.view.live import LiveWalk
 from hexmj.view.served import page_server
 from hexmj.view.session import LiveSession

@@ -102,7 +102,8 @@ def main() -> None:
     try:
         try:
             settle()
-            options = options_of(words := checked(sys.argv[1:]))
+            with nullcontext() if sys.stdout else redirect_stdout(StringIO()):  # tyro asks it how wide it is
+                options = options_of(words := checked(sys.argv[1:]))
             with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
         except BaseException as error:

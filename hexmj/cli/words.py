@@ -14,6 +14,9 @@ from hexmj.storage.literal import literal
 INDIFFERENT = {"--out": 1, "--threads": 1, "--processes": 1, "--scheduler": 1, "--range-of": 1, "--json": 0}
 """Options on which no number depends -> how many words follow them."""
 
+NO_TOML = (".py", ".nc")
+"""How files end that are no controller's TOML, which may have any name."""
+
 SHELLS = ("bash", "zsh", "fish")
 """Shells that can be told how the command goes on."""
 
@@ -92,7 +95,7 @@ def named(words: Sequence[str]) -> Iterator[str]:
     for word in words:
         name = word.partition("=")[2] if word.startswith("--") else word
         yield name
-        if name.endswith(".toml") and isfile(name):
+        if isfile(name) and not name.endswith(NO_TOML):
             with suppress(InputError):
                 yield str(read_toml(Path(name)).get("controller", ""))
 

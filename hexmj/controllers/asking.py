@@ -26,7 +26,7 @@ from hexmj.errors import InputError, is_of_numbas_cache
 from hexmj.legs import LEGS
 from hexmj.process.threads import check_memory, thread_count
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Acceleration, Stride, check_reached
 from hexmj.walks import PLANNED, PlannedWalk, copied
 
 KEPT = 400
@@ -55,11 +55,7 @@ def begin(
     thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
-    if acceleration and not (v + acceleration.rate * stride.dt < 1.0).all():
-        raise InputError(
-            f"V = {v.max():g} is reached in steps of {acceleration.rate * stride.dt:g};"
-            " expected V and a step together below 1"
-        )
+    check_reached(v, stride, acceleration)
     with said(f"{controller.name}, begin"):
         plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
     check_plan(plan, x, stride)
@@ -191,7 +187,7 @@ def check_same(one: PlannedWalk, other: PlannedWalk, whose: str, before: int = 0
 
 def difference(one: PlannedWalk, other: PlannedWalk, before: int = 0) -> str:
     """The first number that differs between two walks of the same starts, and where; nothing if they are the same."""
-    for name in PLANNED:
+    for name in (*PLANNED, "velocity"):
         a, b = getattr(one, name), getattr(other, name)
         if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
             at = tuple(bad[0])

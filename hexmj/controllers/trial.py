@@ -67,7 +67,7 @@ def every_other(trial: Trial) -> np.ndarray:
 def mixed(walk: PlannedWalk, which: np.ndarray, other: PlannedWalk) -> PlannedWalk:
     """A walk in which some starts, (start,), walk as in another of these alone."""
     walk = copied(walk)
-    for name in PLANNED:
+    for name in (*PLANNED, "velocity"):
         getattr(walk, name)[:, which] = getattr(other, name)
     return walk
 

@@ -14,7 +14,8 @@ from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.drive import Push, drive
-from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
+from hexmj.physics.measured import feet_on_ground, measured_walk
+from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
 from hexmj.process.progress import Progress, shown
 from hexmj.stability import loss_time

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.starts import checked_list
-from hexmj.timing import Acceleration, Stride, observation_time, steps_within
+from hexmj.timing import Acceleration, Stride, check_reached, observation_time, steps_within
 
 
 def several(velocities: Sequence[float] | float) -> Sequence[float]:
@@ -22,9 +22,10 @@ def observed(
     """The velocities of a table and their observation times [time units], both (velocity,), if they make sense.
 
     Raises:
-        InputError: a velocity that is none or comes twice, or a time without steps.
+        InputError: a velocity that is none, comes twice or is not reached, or a time without steps.
     """
     v = checked_list(several(velocities), acceleration)
+    check_reached(v, stride, acceleration)
     duration = observation_time(window, v, stride, acceleration)
     steps_within(duration, stride)
     return v, duration

@@ -2,7 +2,6 @@
 
 import io
 import logging
-import socket
 from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -15,18 +14,15 @@ import numpy as np
 
 from hexmj.bodies.loading import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
-from hexmj.diagrams import spans
-from hexmj.errors import InputError, without_extra
+from hexmj.errors import without_extra
 from hexmj.legs import LEGS
 from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.replay.page.shapes import body_shape, ground_shape
 from hexmj.replay.take import support_on_ground
-from hexmj.storage.literal import literal
+from hexmj.view.charts import CHARTED, footfall, readout
 from hexmj.view.live import LiveWalk, Moment
+from hexmj.view.port import check_port
 from hexmj.view.session import IMPULSE, LiveSession, ticks
-
-CHARTED = 2.0
-"""Time that the charts show [s]."""
 
 CHARTS = 6
 """A chart is drawn with every so many pictures."""
@@ -39,37 +35,12 @@ RANGES = {
 
 SWITCHES = ("p2", "p4_i")
 
-MOST_PORT = 65535
-
 MEASURED, PLANNED = "#c8740a", "#1b6ca8"
 
 
 def is_of_walking(record: logging.LogRecord) -> bool:
     """Whether a complaint of the server is more than that somebody hung up, or asked for what is no page."""
     return record.msg != "opening handshake failed"
-
-
-def check_port(host: str, port: int) -> None:
-    """Refuse an address that cannot be listened at.
-
-    Raises:
-        InputError: it is taken, or none of this machine's.
-    """
-    if not 0 <= port <= MOST_PORT:
-        raise InputError(f"--port {port}; expected 1 to {MOST_PORT}, or 0 for any that is free")
-    try:
-        socket.getaddrinfo(host, None)
-        socket.create_server((host, 0)).close()
-    except (OSError, UnicodeError) as error:
-        unknown = isinstance(error, socket.gaierror | UnicodeError)
-        raise InputError(
-            f"--host {literal(host)}: {'no such name' if unknown else error.strerror}; expected an address of this"
-            " machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
-        ) from None
-    try:
-        socket.create_server((host, port)).close()
-    except OSError as error:
-        raise InputError(f"--port {port} at {host}: {error.strerror}; expected a free port, or 0 for any") from None
 
 
 class BrowserView:
@@ -278,40 +249,3 @@ class BrowserView:
         margins = (np.array([getattr(one, name) for one in seen]) for name in ("margin", "planned_margin"))
         self._margins.data = (seconds, *(np.where(np.isfinite(one), one, np.nan) for one in margins))
         self._footfall.content = footfall(seconds, ~np.array([one.stance for one in seen]))
-
-
-def footfall(seconds: np.ndarray, off: np.ndarray) -> str:
-    """A footfall diagram as SVG: bars while a foot is off the ground, (time, leg)."""
-    end = float(seconds[-1])
-    bars = [
-        f'<rect x="{100 * (1 + (begin - end) / CHARTED):.2f}" y="{10 * leg + 2}" height="7"'
-        f' width="{100 * lasts / CHARTED:.2f}"/>'
-        for leg in range(6)
-        for begin, lasts in spans(seconds, off[:, leg])
-    ]
-    names = "".join(f'<div style="height:{100 / 6}%">{name}</div>' for name in LEGS)
-    return (
-        '<div style="text-align:center">feet off the ground, the same time</div><div style="display:flex;height:9em;'
-        f'margin:0 1.2em .6em .6em"><div style="width:2.2em">{names}</div><svg viewBox="0 0 100 60" width="100%"'
-        f' height="100%" preserveAspectRatio="none" fill="currentColor">{"".join(bars)}</svg></div>'
-    )
-
-
-def readout(session: LiveSession, moment: Moment) -> str:
-    """What is said of a moment, in Markdown."""
-    walk = session.walk
-    margin = f"margin {moment.margin:+.1f} mm" if np.isfinite(moment.margin) else "no foot stands"
-    state = (
-        f"fell on {walk.fell_on}"
-        if walk.fell_on
-        else "within the polygon"
-        if moment.margin > 0
-        else "outside the polygon"
-    )
-    sign = "\N{HEAVY CHECK MARK}" if moment.margin > 0 and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
-    lines = [
-        f"**{margin}** {sign} {state}",
-        f"V = {moment.velocity:.2f}, {moment.seconds:.2f} s, start {session.start};"
-        f" {session.factor:.2f} times real time",
-    ]
-    return "\n\n".join(lines + ([f"_{session.told}_"] if session.told else []))

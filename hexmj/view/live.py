@@ -14,8 +14,8 @@ from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.asking import begin, begin_at_speed, said, tell
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, SteerablePlan, is_steerable
 from hexmj.physics.chunks import Chunk, Insects
+from hexmj.physics.measured import measured_walk
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
-from hexmj.physics.outcomes import measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.settling import settle
 from hexmj.rotations import rotated

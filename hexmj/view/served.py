@@ -2,7 +2,7 @@
 
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
-from hexmj.view.browser import check_port
+from hexmj.view.port import check_port
 
 
 def page_server(text: str, host: str, port: int) -> ThreadingHTTPServer:

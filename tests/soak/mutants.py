@@ -109,6 +109,7 @@ GROUPS = {
     ),
     "measurement": (
         Module("physics/outcomes.py", (MEASURING, "tests/test_physical_laws.py", "tests/test_physics.py"), MEASURES),
+        Module("physics/measured.py", (MEASURING, "tests/test_physical_laws.py", "tests/test_physics.py"), MEASURES),
         Module("physics/sensing.py", (MEASURING, "tests/test_closed_loop.py", "tests/test_physics.py"), FELT),
     ),
 }

@@ -13,7 +13,9 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
+from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.starts import draw_starts
 from hexmj.storage.attributes import attributes
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league import paper
@@ -140,6 +142,8 @@ class Ablation:
             walked = told | own | {"n_starts": self.n_physical}
             return Cell(f"{name}-physical-V-{velocity:g}", physics.walks, walked, 20 * time)
 
+        for one in self.controllers.values():
+            check_fastest(one, draw_starts(FEW, self.seed, self.stride), self.velocities, self.stride)
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         return [cell(name, measure, *one) for name in self.controllers for measure in MEASURES for one in at]
 

@@ -63,7 +63,7 @@ def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
         one = values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS])
         places = np.arange(len(SEGMENTS)) + (n - 1) * 0.27
         label = name.removesuffix(" impulse").removesuffix(" torque")
-        axes.bar(places, one.mean("start"), 0.25, yerr=one.std("start"), color=colour, capsize=2, label=label)
+        axes.bar(places, one.mean("start"), 0.25, yerr=one.std("start", ddof=1), color=colour, capsize=2, label=label)
     axes.set_xticks(range(len(SEGMENTS)), [f"{segment} legs" for segment in SEGMENTS])
     axes.axhline(0.0, color="0.4", linewidth=0.8)
     axes.legend(frameon=False, fontsize=9, loc="upper left")
@@ -78,10 +78,10 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
             ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
             axes.fill_between(ends, row.low, row.high, color=INSECTS, alpha=0.5, linewidth=0)
     dots = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5, "color": OURS}
-    mean, deviation = values.mean("start"), values.std("start")
+    mean, deviation = values.mean("start"), values.std("start", ddof=1)
     if name in PHASES:
         beside = values.copy(data=np.apply_along_axis(unrolled, values.get_axis_num("start"), values.values))
-        mean, deviation = beside.mean("start") % 1.0, beside.std("start")
+        mean, deviation = beside.mean("start") % 1.0, beside.std("start", ddof=1)
     axes.errorbar(values.speed, mean, deviation, label="ours", **dots)
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
     axes.set_xlim(20.0, 40.0)

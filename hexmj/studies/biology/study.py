@@ -53,6 +53,7 @@ class Biology(SameStarts):
             own = {"walks": walks, "measured": MEASURED * period}
             return Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity)
 
+        self.check_fastest(np.divide(SPEEDS, self.conditions.time.vp))
         return [cell(speed) for speed in SPEEDS]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

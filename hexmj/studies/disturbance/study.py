@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed
-from hexmj.starts import checked_list
+from hexmj.starts import checked_list, draw_starts
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
-from hexmj.timing import Acceleration
+from hexmj.timing import Acceleration, check_reached
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,6 +62,7 @@ class DisturbedWalks(SameStarts):
             raise InputError(
                 f"velocities = {v.tolist()}; expected above 0 and at least V_r(0), {low:g}, if it slows down"
             )
+        check_reached(v, self.stride, self.recovery if slows else None)
         if self.physical and "push" in self.disturbances:
             steps_pushed(self.conditions.time, self.stride)
         self.conditions.but(grasp=self.adhesion)
@@ -78,6 +80,7 @@ class DisturbedWalks(SameStarts):
 
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""
+        from hexmj.physics.settling import settle
         from hexmj.studies.disturbance.stable_walks import StableWalks
 
         def walks(velocity: float) -> StableWalks:
@@ -94,6 +97,10 @@ class DisturbedWalks(SameStarts):
             name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
             return Cell(name, walks.times, settings, work=window)
 
+        starts = draw_starts(FEW, self.seed, self.stride)
+        check_fastest(self.controller, starts, self.velocities, self.stride)
+        if self.physical and "grasp" in self.strategies:
+            settle(starts[:1], self.conditions.but(grasp=self.adhesion), self.stride, threads=1)
         at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
         return [cell(one, case, time) for one, time in at for case in self.cases]
 

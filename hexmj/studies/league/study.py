@@ -8,10 +8,10 @@ import numpy as np
 
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import advanced, begin
 from hexmj.errors import InputError
-from hexmj.gaits import CYCLES, PART
+from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
+from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
@@ -20,7 +20,7 @@ from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, TRIALS, crossed, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain import plain
-from hexmj.timing import Acceleration, Stride, observation_time, steps_within
+from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,9 +36,6 @@ PAPER = 0.05
 
 FRESH = 17
 """A seed on which no set of ours was searched."""
-
-FEW = 8
-"""Starts that walk on paper before anything else."""
 
 PERIODS = 40
 """Cycles until a limit regime is looked at."""
@@ -114,19 +111,11 @@ class League:
                 end.
         """
         for entrant in self.entrants.values():
-            self._check_fastest(entrant)
+            given = () if entrant.ideal else (FINAL if self.accelerating else RANGE[1],)
+            fastest = max(*self.observed[0].tolist(), self.tried_at, *given)
+            starts = entrant.starts(FEW, self.seed, fastest, self.stride)
+            check_fastest(entrant.controller, starts, fastest, self.stride)
         return [*self.named_cells().values()]
-
-    def _check_fastest(self, entrant: Entrant) -> None:
-        """Walk with a few starts where a time step is longest for what oscillates with V."""
-        velocity = max(*self.observed[0], self.tried_at)
-        if not entrant.ideal:
-            velocity = max(velocity, FINAL if self.accelerating else RANGE[1])
-        starts = entrant.starts(FEW, self.seed, velocity, self.stride)
-        plan = begin(entrant.controller, starts, velocity, self.stride, threads=1)
-        steps = int(steps_within(observation_time(self.window, velocity, self.stride), self.stride))
-        while plan.done < steps:
-            advanced(plan, min(PART, steps - plan.done))
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """All that the table, the figures and the ranks are made of; see `standings.standings`."""

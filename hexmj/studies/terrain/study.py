@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, check_distinct
-from hexmj.starts import checked_list
+from hexmj.starts import checked_list, draw_starts
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Stride
@@ -104,6 +104,7 @@ class Terrain(SameStarts):
     def cells(self) -> list[Cell]:
         """A cell for each obstacle, grasp and velocity; see `sweeps.Study`."""
         from hexmj.measures.outcome_table import outcome_table
+        from hexmj.physics.settling import settle
 
         before = self.obstacles
 
@@ -112,6 +113,9 @@ class Terrain(SameStarts):
             walks = self.walks(velocity, self.distance / velocity, conditions)
             return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
 
+        self.check_fastest(self.velocities)
+        for grasp in self.grasps:
+            settle(draw_starts(1, self.seed, self.stride), self.conditions.but(grasp=grasp), self.stride, threads=1)
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

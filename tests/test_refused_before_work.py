@@ -1,0 +1,27 @@
+"""What a later cell would refuse is refused before the first one, and nothing is kept."""
+
+import pytest
+
+DIVERGES = "oscillators diverge at dt = "
+STEPPED_OVER = "expected V and a step together below 1"
+PRESSES = "expected at most about 10: it presses feet"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("flss --model righetti --velocities 0.02 0.9 --dt 0.5", DIVERGES),
+        ("compare --models ldvs righetti --velocities 0.5 --dt 1", DIVERGES),
+        ("terrain --model righetti --velocities 0.1 0.9 --dt 0.5", DIVERGES),
+        ("disturb --model righetti --velocities 0.1 0.9 --dt 0.5 --disturbances halt", DIVERGES),
+        ("flss --velocities 0.3 0.95 --acceleration 0.6", STEPPED_OVER),
+        ("disturb --velocities 0.3 --recovery 10 --disturbances halt", STEPPED_OVER),
+        ("disturb --velocities 0.3 --strategies reorganise grasp --adhesion 12", PRESSES),
+        ("terrain --grasps 0 50", PRESSES),
+        ("search --form hws --velocity 0.5 --physical --grasp 50", PRESSES),
+    ],
+)
+def test_what_ends_the_work_is_said_before_it(run, tmp_path, words: str, said: str) -> None:
+    code, _, error = run(*words.split(), "--starts", 3, "--out", tmp_path / "out")
+    assert code == 2 and said in error
+    assert not [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
