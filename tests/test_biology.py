@@ -301,7 +301,6 @@ def test_phases_around_zero_have_their_mean_there():
         drawn = biology_figure(turned).axes[2].lines[0]
         assert_allclose(np.asarray(drawn.get_ydata(), dtype=float), 0.9555)
     drawn: Any = biology_figure(result).axes[2].collections[-2]
-    assert_allclose(
-        np.ptp(drawn.get_segments()[0][:, 1]), 2 * 0.333 / np.sqrt(2), rtol=1e-6
-    )  # over two starts less one
+    length = np.ptp(drawn.get_segments()[0][:, 1])
+    assert_allclose(length, 2 * 0.333 / np.sqrt(2), rtol=1e-6)  # divided by one start less
     assert "window 6 periods" in biology_figure(result).get_suptitle()
