@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import hexmj.process.beginning  # first of all
 import hexmj.registering
-import hexmj.user_code.as_run  # from now on
-import hexmj.user_code.reads  # noqa: F401
+import hexmj.user_code.opened_files  # from now on
+import hexmj.user_code.sources_as_run  # noqa: F401
 
 if TYPE_CHECKING:
     from hexmj import controllers as controllers

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from hexmj.user_code import reads
+from hexmj.user_code import opened_files
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, and so would what tests start
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -14,7 +14,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, a
 @pytest.fixture(autouse=True)
 def a_program_of_its_own():
     """What tests before this one have opened is nothing to it."""
-    for known in (reads._OPENED, reads._AT_FIRST, reads.WRITTEN):
+    for known in (opened_files._OPENED, opened_files._AT_FIRST, opened_files.WRITTEN):
         known.clear()
 
 

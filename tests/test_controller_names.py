@@ -14,7 +14,7 @@ import hexmj
 from hexmj.controllers import named
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.protocol import settings_of
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from stepwise_ldvs import Own
 
 LDVS = hexmj.LDVS

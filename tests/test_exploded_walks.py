@@ -17,9 +17,9 @@ from hexmj.physics import divergence
 from hexmj.physics.backend import Diverged
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.drive import Chunk, Push, drive
+from hexmj.physics.explosions import MOST_ENERGY, explosion
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
-from hexmj.physics.watch import MOST_ENERGY, explosion
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import every_case
 

@@ -10,7 +10,7 @@ import pytest
 from hexmj import rotations, stability
 from hexmj.bodies import newton
 from hexmj.controllers.cruse1998 import kernel
-from hexmj.environments import passes
+from hexmj.environments import compiled_passes
 from hexmj.jitted import _made_of
 from hexmj.physics import outcomes
 
@@ -58,7 +58,7 @@ def test_a_function_may_call_itself(tmp_path):
 
 def test_what_the_package_compiles_is_told_the_same_in_any_process():
     """No address of an object is in it, with which nothing that is kept would ever be found again."""
-    modules = kernel, stability, rotations, newton, passes, outcomes
+    modules = kernel, stability, rotations, newton, compiled_passes, outcomes
     compiled = [one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")]
     assert len(compiled) > 30
     assert not any(" at 0x" in _made_of(one) for one in compiled)

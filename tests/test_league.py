@@ -17,11 +17,11 @@ from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants import entrants
 from hexmj.studies.league.figure import FEWER, NOTHING, league_figure, walks_figure
-from hexmj.studies.league.paper import losses
+from hexmj.studies.league.on_paper import losses
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
 from hexmj.sweeps import run
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Stride
 from standing_still import Still
 

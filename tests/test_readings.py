@@ -30,7 +30,7 @@ from hexmj.paper.readings import (
     refined_as,
     title,
 )
-from hexmj.paper.readings_table import readings_markdown
+from hexmj.paper.readings_page import readings_markdown
 from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, refined
 from hexmj.starts import draw_starts
 from hexmj.sweeps import run

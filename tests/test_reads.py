@@ -14,7 +14,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.sweeps import Cell, KeptValues, run
-from hexmj.user_code import reads
+from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
 
 READER = """
@@ -119,7 +119,7 @@ def test_what_a_field_names_counts(
     named = f"one/{file}"
     assert [computed(gain, named), computed(gain, named)] == 2 * [(1.0, 1)]
     write_all("7.0")
-    monkeypatch.setattr(reads, "_AT_FIRST", {})  # as of another program
+    monkeypatch.setattr(opened_files, "_AT_FIRST", {})  # as of another program
     sys.modules.pop(importable("reader.py").__name__)
     assert [computed(gain, named), computed(gain, named)] == 2 * [(7.0, 2)]
     assert len(list(Path("kept").glob("*.nc"))) == 2
@@ -172,7 +172,7 @@ def test_a_file_that_is_missing_counts_too(
         assert computed("tried('new')") == (0.0, 1)
     assert [computed("tried('new')", "new"), computed("tried('new')", "new")] == 2 * [(0.0, 2)]
     Path("new").write_text("5.0")
-    monkeypatch.setattr(reads, "_AT_FIRST", {})  # as of another program
+    monkeypatch.setattr(opened_files, "_AT_FIRST", {})  # as of another program
     assert computed("tried('new')", "new") == (5.0, 3)
 
 

@@ -11,7 +11,7 @@ from hexmj.controllers.asking import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
-from hexmj.studies.league import physics
+from hexmj.studies.league import in_physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.walks import PLANNED, part_of
 from stepwise_ldvs import Own, plan_of
@@ -143,7 +143,7 @@ class Restless:
     [
         lambda starts: hexmj.physical_walk(starts, Restless(), 0.5, 2.0),
         lambda starts: hexmj.compare(Restless(), [0.5], n_starts=2, window=2.0),
-        lambda starts: physics.walks(
+        lambda starts: in_physics.walks(
             Entrant(Restless()),
             Restless(),
             0.5,

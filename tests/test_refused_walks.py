@@ -10,7 +10,7 @@ import hexmj
 from hexmj.conditions import Conditions
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.studies.frequencies import came, frequencies
-from hexmj.studies.league import physics
+from hexmj.studies.league import in_physics
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.figure import league_figure, walks_figure
 from hexmj.studies.league.study import League
@@ -29,10 +29,10 @@ class Walked(TypedDict):
 
 def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
     entrant, how = Entrant(Stretched()), Walked(seed=0, conditions=Conditions(), stride=Stride())
-    found = physics.walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
+    found = in_physics.walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
     refused = hexmj.draw_starts(6, 0)[:, 0] > 0
     assert refused.any() and not refused.all()
-    still = physics.walks(Entrant(Still()), Still(), 0.5, 10.0, n_starts=6, **how)
+    still = in_physics.walks(Entrant(Still()), Still(), 0.5, 10.0, n_starts=6, **how)
     for name, values in found.items():
         assert np.isnan(values.values[refused]).all()
         assert np.array_equal(values.values[~refused], still[name].values[~refused], equal_nan=True)
@@ -69,13 +69,13 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
         return xr.Dataset({"fall": ("start", np.sqrt(which), {"units": "mm"})})
 
     def found(*refused: int) -> xr.DataArray:
-        return physics.unless_refused(lambda which: walked(which, refused), 4, {"fall": "mm"}).fall
+        return in_physics.unless_refused(lambda which: walked(which, refused), 4, {"fall": "mm"}).fall
 
     whole = found()
     assert found(2).identical(whole.where([True, True, False, True]))
     assert np.isnan(found(0, 1, 2, 3)).all()
     with pytest.raises(ZeroDivisionError):
-        physics.unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
+        in_physics.unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
 
 
 def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
@@ -90,4 +90,4 @@ def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
 def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
     entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions.of(settling_time=3.0), stride=Stride())
     with pytest.raises(SimulationError, match="start 0 did not settle in 3 ms"):
-        physics.walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)
+        in_physics.walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)

@@ -18,8 +18,8 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm
-from hexmj.environments.alone import Alone
 from hexmj.environments.dm import InsectPhysics
+from hexmj.environments.single_body import Alone
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import fine_steps
 from hexmj.physics.backend import Diverged, Engine, Rolled

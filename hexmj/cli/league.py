@@ -124,7 +124,7 @@ class League(StudyCommand):
             InputError, SimulationError, RenderingError: there is no video, and why.
         """
         from hexmj.replay.film.video import missing, render
-        from hexmj.studies.league.physics import REFUSALS
+        from hexmj.studies.league.in_physics import REFUSALS
 
         if sentence := missing():
             raise RenderingError(sentence)

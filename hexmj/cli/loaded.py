@@ -5,7 +5,7 @@ from typing import Any
 
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 
 LOADED: dict[str, tuple[Controller, Any]] = {}
 """Controllers as the command has loaded them, and their settings then: a file that is edited while it runs is not run

@@ -43,7 +43,7 @@ class Readings:
         from hexmj.controllers.cruse1998.readings import named_reading
         from hexmj.paper.readings import combinations, compare_readings, ranking
         from hexmj.paper.readings_figure import readings_figure
-        from hexmj.paper.readings_table import HEADS, readings_markdown, readings_rows
+        from hexmj.paper.readings_page import HEADS, readings_markdown, readings_rows
         from hexmj.paper.scores import IDEAL, SCORING
 
         if self.only == ():

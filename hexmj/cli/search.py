@@ -85,7 +85,7 @@ class Search(WalkingCommand):
         """Search, judge what was found on fresh starts, write and print."""
         from hexmj.search.samples import Sample
         from hexmj.search.stages import search
-        from hexmj.sweeps.plain import plain
+        from hexmj.sweeps.plain_settings import plain
 
         if (controlled := self._as_begun) != self.controlled:
             replace(self, controlled=controlled).run()

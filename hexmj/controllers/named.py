@@ -14,7 +14,7 @@ from hexmj.checks import typed
 from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.controllers.told_fields import with_fields
+from hexmj.controllers.toml_fields import with_fields
 from hexmj.errors import InputError
 from hexmj.storage.files import read_toml
 from hexmj.storage.literal import literal

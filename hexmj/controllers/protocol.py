@@ -14,7 +14,7 @@ import numpy as np
 
 from hexmj.checks import printable
 from hexmj.errors import InputError
-from hexmj.sweeps.plain import field_names, plain
+from hexmj.sweeps.plain_settings import field_names, plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 

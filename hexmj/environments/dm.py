@@ -29,8 +29,8 @@ from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
-from hexmj.environments.alone import Alone
-from hexmj.environments.passes import beyond, worth
+from hexmj.environments.compiled_passes import beyond, worth
+from hexmj.environments.single_body import Alone
 from hexmj.environments.task import (
     Actions,
     Task,

@@ -20,8 +20,8 @@ except ModuleNotFoundError:
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
 from hexmj.checks import typed
-from hexmj.environments.alone import Alone
 from hexmj.environments.frames import Frames
+from hexmj.environments.single_body import Alone
 from hexmj.environments.task import Task, action_names, checked_actions, drawn, observation_bounds, task_of
 from hexmj.environments.walkers import Walkers
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.environments.passes import observe
+from hexmj.environments.compiled_passes import observe
 from hexmj.environments.task import Task, observation_bounds
 
 

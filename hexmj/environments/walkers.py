@@ -14,9 +14,9 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.controllers.asking import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
-from hexmj.environments.alone import Alone
+from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
 from hexmj.environments.observing import Observer, Places, Planned
-from hexmj.environments.passes import ROUNDING, judge, keep, order, scaled
+from hexmj.environments.single_body import Alone
 from hexmj.environments.task import Task, action_bounds, action_names, at_the_end
 from hexmj.errors import InputError
 from hexmj.physics.backend import Diverged, MujocoBatch

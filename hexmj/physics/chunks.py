@@ -15,12 +15,12 @@ from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
+from hexmj.physics.explosions import check_landed, explosion
 from hexmj.physics.fine_steps import FineSteps, Shown
 from hexmj.physics.orders import Orders
 from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
-from hexmj.physics.watch import check_landed, explosion
 from hexmj.walks import PlannedWalk, joined
 
 SHOWN = ("qpos", "sensors", "standing", "targets", "force", "depth")

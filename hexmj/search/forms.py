@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 
 
 @runtime_checkable

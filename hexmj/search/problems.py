@@ -14,7 +14,7 @@ from hexmj.search.domain import Domain
 from hexmj.search.forms import Form
 from hexmj.search.network_forms import NetworkForm
 from hexmj.starts import checked_velocities
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 from hexmj.variants import variants, varied
 

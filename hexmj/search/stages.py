@@ -23,7 +23,7 @@ from hexmj.search.samples import REFUSED, Sample
 from hexmj.starts import check_draw, draw_starts
 from hexmj.storage.locks import locked
 from hexmj.sweeps import Cell, KeptValues
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,8 +14,8 @@ from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.sweeps.code import code, needed_files
-from hexmj.sweeps.plain import classes, label, named_files, plain, stands_there
-from hexmj.user_code.reads import changed, untold, written
+from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
+from hexmj.user_code.opened_files import changed, untold, written
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""

@@ -23,15 +23,15 @@ from typing import NamedTuple
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.storage.mjcf import content, parts
-from hexmj.sweeps.plain import PACKAGE, module_label
-from hexmj.user_code import as_run
+from hexmj.sweeps.plain_settings import PACKAGE, module_label
+from hexmj.user_code import sources_as_run
+from hexmj.user_code.opened_files import WRITTEN
 from hexmj.user_code.parsing import files_named, parsed
-from hexmj.user_code.reads import WRITTEN
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
     *("hexmj.field_docs", "hexmj.process.progress", "hexmj.storage.files", "hexmj.storage.netcdf", "hexmj.sweeps"),
-    *("hexmj.user_code.as_run", "hexmj.user_code.reads"),
+    *("hexmj.user_code.sources_as_run", "hexmj.user_code.opened_files"),
 }
 """What carries, keeps and shows this package's numbers, but computes none: another version makes no cell anew, unless
 a user's module imports it."""
@@ -101,7 +101,7 @@ def code(modules: frozenset[str]) -> Code:
     """
     needed, data = _needed(modules), dict[str, list[str]]()
     for name, file, paths in needed.modules:
-        source = as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
+        source = sources_as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         for path in paths:
@@ -215,18 +215,18 @@ def _found(module: str) -> Path | None:
 
 
 def _is_installed(file: Path) -> bool:
-    return any(file.is_relative_to(one) for one in _INSTALLED) or not as_run.INSTALLED.isdisjoint(file.parts)
+    return any(file.is_relative_to(one) for one in _INSTALLED) or not sources_as_run.INSTALLED.isdisjoint(file.parts)
 
 
 @cache
 def _read(name: str, file: Path) -> _Module:
     try:
-        changed, held = file.stat().st_mtime_ns, as_run.as_run(file, _stamp(name)) or file.read_bytes()
+        changed, held = file.stat().st_mtime_ns, sources_as_run.as_run(file, _stamp(name)) or file.read_bytes()
     except OSError as error:  # as of one in an archive
         raise InputError(f"{file} cannot be read: {error.strerror}; expected sources as files") from None
     if _AT_FIRST.get(file, changed) != changed:
         raise InputError(f"{file} was edited since this program began; start it again")
-    python = b"" if file.name.endswith(as_run.COMPILED) else held  # of a compiled module nothing is followed
+    python = b"" if file.name.endswith(sources_as_run.COMPILED) else held  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
     try:
         tree = parsed(python)

@@ -19,8 +19,8 @@ from hexmj.process.progress import Progress, shown
 from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
-from hexmj.sweeps.files import check_free, find, write
-from hexmj.user_code.reads import heard
+from hexmj.sweeps.kept_cells import check_free, find, write
+from hexmj.user_code.opened_files import heard
 
 if TYPE_CHECKING:
     import xarray as xr

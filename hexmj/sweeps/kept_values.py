@@ -12,7 +12,7 @@ import numpy as np
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
-from hexmj.user_code.reads import heard
+from hexmj.user_code.opened_files import heard
 
 
 class KeptValues:

@@ -20,8 +20,8 @@ from urllib.parse import quote_from_bytes, unquote_to_bytes
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
-from hexmj.user_code.as_run import is_users
 from hexmj.user_code.parsing import parsed
+from hexmj.user_code.sources_as_run import is_users
 
 __path__: list[str] = []
 """Makes this module a package: its modules are the loaded files."""

@@ -18,12 +18,12 @@ from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import draw_starts
 from hexmj.storage.attributes import attributes
 from hexmj.studies.frequencies import came, differences, frequencies, padded
-from hexmj.studies.league import paper
+from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_counts
 from hexmj.studies.short_names import short_names
 from hexmj.sweeps import Cell
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -127,20 +127,20 @@ class Ablation:
 
     def cells(self) -> list[Cell]:
         """Every controller, velocity and measure; see `sweeps.Study`."""
-        from hexmj.studies.league import physics
+        from hexmj.studies.league import in_physics
 
         def cell(name: str, measure: str, velocity: float, time: float) -> Cell:
             controller = self.controllers[name]
             told: dict[str, Any] = {"entrant": Entrant(controller), "velocity": velocity, "seed": self.seed}
             told |= {"stride": self.stride, "n_starts": self.n_starts}
             if measure in ("start", "walk"):
-                return Cell(f"{name}-{measure}-V-{velocity:g}", paper.losses, told | {"window": measure}, time)
+                return Cell(f"{name}-{measure}-V-{velocity:g}", on_paper.losses, told | {"window": measure}, time)
             if measure == "limit":
                 few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-                return Cell(f"{name}-limit-V-{velocity:g}", paper.regimes, told | few, 10 * time)
+                return Cell(f"{name}-limit-V-{velocity:g}", on_paper.regimes, told | few, 10 * time)
             own = {"controller": controller, "window": "walk", "conditions": self.conditions}
             walked = told | own | {"n_starts": self.n_physical}
-            return Cell(f"{name}-physical-V-{velocity:g}", physics.walks, walked, 20 * time)
+            return Cell(f"{name}-physical-V-{velocity:g}", in_physics.walks, walked, 20 * time)
 
         for one in self.controllers.values():
             check_fastest(one, draw_starts(FEW, self.seed, self.stride), self.velocities, self.stride)

@@ -15,11 +15,11 @@ from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
-from hexmj.studies.league import paper
+from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, TRIALS, crossed, walking
 from hexmj.sweeps import Cell
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride, observation_time
 
 if TYPE_CHECKING:
@@ -131,31 +131,31 @@ class League:
 
     def _asked(self, entrant: Entrant) -> Iterator[tuple[str, Cell]]:
         """Every cell of an entrant by what it is asked: random starts alone for regimes and in trials, too."""
-        from hexmj.studies.league import physics
+        from hexmj.studies.league import in_physics
 
         window = {"window": self.window}
         walked = window | {"controller": entrant.controller, "conditions": self.conditions}
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         for v, time in at:
             own = window | {"velocity": v}
-            yield f"paper {v}", self._cell(f"paper-V-{v:g}", paper.losses, time * PAPER, entrant, own)
+            yield f"paper {v}", self._cell(f"paper-V-{v:g}", on_paper.losses, time * PAPER, entrant, own)
         for v, time in at:
             own = walked | {"velocity": v, "n_starts": self.n_physical}
-            yield f"physics {v}", self._cell(f"physics-V-{v:g}", physics.walks, time, entrant, own)
+            yield f"physics {v}", self._cell(f"physics-V-{v:g}", in_physics.walks, time, entrant, own)
         if entrant.ideal:
             return
         for v, time in at:
             own = {"velocity": v, "n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-            yield f"regime {v}", self._cell(f"regime-V-{v:g}", paper.regimes, 20 * time * PAPER, entrant, own)
+            yield f"regime {v}", self._cell(f"regime-V-{v:g}", on_paper.regimes, 20 * time * PAPER, entrant, own)
         own = window | dict(zip(("low", "high"), RANGE, strict=True))
-        yield "range", self._cell("range", paper.losses_over_range, 600 * PAPER, entrant, own)
+        yield "range", self._cell("range", on_paper.losses_over_range, 600 * PAPER, entrant, own)
         if self.accelerating:
             own = window | {"velocity": FINAL, "acceleration": Acceleration()}
-            yield "accelerated", self._cell("accelerated", paper.losses, 10_000 * PAPER, entrant, own)
+            yield "accelerated", self._cell("accelerated", on_paper.losses, 10_000 * PAPER, entrant, own)
         tried = window | {"velocity": self.tried_at}
         for trial, leg in LEGS_LOST.items():
             own = tried | {"leg_lost": leg}
-            yield f"paper, {trial}", self._cell(f"paper-{trial}", paper.losses, 200 * PAPER, entrant, own)
+            yield f"paper, {trial}", self._cell(f"paper-{trial}", on_paper.losses, 200 * PAPER, entrant, own)
         for trial, function, cost, own in self._tried(entrant):
             yield trial, self._cell(trial, function, cost, entrant, tried | own | {"n_starts": self.n_tried})
 
@@ -163,7 +163,7 @@ class League:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
         from hexmj.physics.pushes import can_push
         from hexmj.studies.disturbance.disturbances import GRID
-        from hexmj.studies.league import physics
+        from hexmj.studies.league import in_physics
 
         way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
         for trial in TRIALS:
@@ -172,11 +172,11 @@ class League:
                 continue
             if case and entrant.steerable:
                 how = {"case": case, "conditions": self.conditions, "grid": GRID}
-                yield trial, physics.disturbed, 300, how
+                yield trial, in_physics.disturbed, 300, how
             elif case or (trial in GROUNDS and way < crossed(self.conditions)):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
-                yield trial, physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}
+                yield trial, in_physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}
 
     def _cell(
         self, name: str, function: Callable[..., Any], time: float, entrant: Entrant, own: Mapping[str, Any]

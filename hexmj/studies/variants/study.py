@@ -20,7 +20,7 @@ from hexmj.starts import check_draw, draw_starts
 from hexmj.storage.attributes import attributes
 from hexmj.storage.mjcf import content
 from hexmj.sweeps import Cell, over_axes
-from hexmj.sweeps.plain import plain
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.variants import instead, naming, variants, varied
 

@@ -19,7 +19,7 @@ from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.storage.mjcf import content, parts
-from hexmj.user_code.as_run import is_users
+from hexmj.user_code.sources_as_run import is_users
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""

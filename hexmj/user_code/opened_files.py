@@ -16,7 +16,7 @@ from traceback import walk_stack
 from types import FrameType
 from typing import Any
 
-from hexmj.user_code.as_run import is_users, plain
+from hexmj.user_code.sources_as_run import is_users, plain
 
 _PATH = {"open": 0, "exec": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
