@@ -65,6 +65,28 @@ SUMS = "from dataclasses import replace\nfrom hexmj import LDVS\nfrom hexmj.cont
 SUMS += "X = replace(LDVS, reading=Reading(cap='sum'), order='sequential')\n"
 
 
+WEIGHTED = """
+from dataclasses import dataclass, field
+import numpy as np, hexmj
+
+@dataclass(frozen=True)
+class Weighted:
+    weights: np.ndarray = field(default_factory=lambda: np.arange(3.0))
+    name: str = "weighted"
+
+    def begin(self, *how, **others):
+        return hexmj.LDVS.begin(*how, **others)
+"""
+
+
+def test_weights_of_a_controller_of_ones_own_are_no_preset_s(run, tmp_path):
+    (tmp_path / "mine.py").write_text(WEIGHTED)
+    code, out, _ = run(
+        "flss", "--model", f"{tmp_path}/mine.py:Weighted", "--velocities", 0.4, "--starts", 2, "--window", 3
+    )
+    assert code == 0 and "seed 0" in out and "a search found" not in out
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "told"),

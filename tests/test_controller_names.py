@@ -42,6 +42,11 @@ class Needy(Still):
             raise ValueError("legs is missing")
 
 @dataclass(frozen=True)
+class Named(Still):
+    def __post_init__(self):
+        {"still": 1}[self.name]
+
+@dataclass(frozen=True)
 class Switched(Still):
     def without(self, part):
         return {2: self, 3: None}[part]
@@ -106,6 +111,8 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 0.0}
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = 4\nname = "mine"\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "mine", "height": 4.0}
+    path.write_text('controller = "mine_of_a_user.py:Named"\n[fields]\nheight = 4\n')
+    assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "still", "height": 4.0}, "it takes no other name"
     path.write_text('controller = "mine_of_a_user.py:Still"\n[fields]\nheight = "4.0"\n')
     with pytest.raises(hexmj.InputError, match=r"\[fields\]: height = '4.0'; expected a number"):
         hexmj.load_controller("tall.toml")
@@ -276,7 +283,7 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("nowhere.py:Still", "nowhere.py is no file; expected one that ends in .py"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
         ("broken.py:Still", "broken.py cannot be loaded"),
-        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Switched"),
+        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched"),
         ("mine_of_a_user.py:Switched-without-1", "Switched-without-1' cannot be made: KeyError: 1; expected a"),
         ("mine_of_a_user.py:Switched-without-3", "Switched-without-3: controller = None; expected a controller"),
         ("mine_of_a_user.py:number", "controller = 6; expected a controller, a frozen dataclass"),

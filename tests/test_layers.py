@@ -19,7 +19,7 @@ FLOORS = (
     ("stability", "walks"),
     ("starts",),
     ("controllers",),
-    ("gaits", "measures.fastest_walk", "measures.frequency", "measures.kinematic", "measures.velocities", "variants"),
+    ("gaits", "measures.frequency", "measures.kinematic", "measures.velocities", "variants"),
     ("bodies.description", "bodies.stick_insect", "conditions"),
     ("bodies",),
     ("physics",),

@@ -1,6 +1,13 @@
 """What a later cell would refuse is refused before the first one, and nothing is kept."""
 
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 import pytest
+
+import hexmj
+from hexmj.measures.kinematic import KinematicFlss
 
 DIVERGES = "oscillators diverge at dt = "
 STEPPED_OVER = "expected V and a step together below 1"
@@ -25,3 +32,34 @@ def test_what_ends_the_work_is_said_before_it(run, tmp_path, words: str, said: s
     code, _, error = run(*words.split(), "--starts", 3, "--out", tmp_path / "out")
     assert code == 2 and said in error
     assert not [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """LDVS, which knows what it was asked for, and has weights of its own kind."""
+
+    begun: list[Any] = field(default_factory=list, compare=False, repr=False)
+    name: str = "counts"
+
+    def begin(self, starts: np.ndarray, *how: Any, **others: Any) -> Any:
+        self.begun.append(len(starts))
+        return hexmj.LDVS.begin(starts, *how, **others)
+
+
+def test_who_does_not_tell_limits_is_asked_for_nothing_before_the_work() -> None:
+    one = Counts()
+    lost = KinematicFlss(one, (0.02, 0.9), 20, 10.0).cells()
+    assert len(lost) == 2 and one.begun == []
+
+
+def test_limits_are_told_whatever_the_controller_raises() -> None:
+    with pytest.raises(hexmj.InputError, match=r"limited, check_velocity: ZeroDivisionError"):
+        hexmj.flss(Limited(), [0.3], n_starts=2)
+
+
+@dataclass(frozen=True)
+class Limited(Counts):
+    name: str = "limited"
+
+    def check_velocity(self, velocity: float, stride: hexmj.Stride) -> None:
+        raise ZeroDivisionError

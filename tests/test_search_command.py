@@ -196,9 +196,10 @@ class Odd:
 """
 
 
-def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run, tmp_path):
+@pytest.mark.parametrize("name", ["begun.toml", "begun.conf"])
+def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run, tmp_path, name):
     (tmp_path / "odd.py").write_text(ODD, encoding="utf-8")
-    begun = tmp_path / "begun.toml"
+    begun = tmp_path / name
     begun.write_text(f'controller = "{tmp_path}/odd.py:Odd"\n[fields]\ncap = inf\n[fields.gains]\nfront = 2.0\n')
     words = ["search", "--form", begun, "--velocity", 0.5, "--window", 1, "--starts", 2, "--budget", 2]
     words += ["--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]

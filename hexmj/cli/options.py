@@ -126,11 +126,12 @@ class Controlled:
 
     def preset_of(self, name: str) -> str:
         """The preset whose weights a controller has, or of which parts are left out."""
-        from hexmj.controllers.cruse1998 import PRESETS
+        from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
         from hexmj.controllers.named import PART
 
-        weights = getattr(LOADED.get(name, (None, None))[0], "weights", None)
-        same = (preset for preset, usual in PRESETS.items() if weights and usual.weights == weights)
+        found, _ = LOADED.get(name, (None, None))
+        known = PRESETS.items() if isinstance(found, Cruse1998) else ()
+        same = (preset for preset, usual in known if usual.weights == getattr(found, "weights", None))
         return next(same, PART.sub("", name))
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:

@@ -1,6 +1,7 @@
 """`hexmj search`."""
 
 from dataclasses import dataclass, field, replace
+from os.path import isfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -228,11 +229,13 @@ class Search(WalkingCommand):
         import tomli_w
 
         from hexmj.controllers.cruse1998.presets import network_toml
+        from hexmj.controllers.named import known_names
         from hexmj.search.network_forms import NetworkForm
 
         if isinstance(problem.form, NetworkForm):
             return network_toml(problem.form.controller(found.vector))
-        told = read_toml(Path(self.form)) if self.form.endswith(".toml") else {"controller": self.form, "fields": {}}
+        in_file = isfile(self.form) and self.form not in known_names()
+        told = read_toml(Path(self.form)) if in_file else {"controller": self.form, "fields": {}}
         values = told.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
         return tomli_w.dumps({"controller": told["controller"], "fields": values})
 

@@ -5,7 +5,7 @@ What a user's code raises becomes one sentence that says where.
 
 import os
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import typed, whole
 from hexmj.controllers.protocol import (
     Controller,
+    KnowsItsLimits,
     Plan,
     ReadingPlan,
     Sensed,
@@ -60,6 +61,18 @@ def begin(
         plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
     check_plan(plan, x, stride)
     return plan
+
+
+def check_velocities(controller: Controller, velocities: Iterable[float], stride: Stride) -> None:
+    """Refuse velocities V_r at which a controller says that it cannot plan with the stride's time step.
+
+    Raises:
+        InputError: one of them.
+    """
+    if isinstance(controller, KnowsItsLimits):
+        for velocity in velocities:
+            with said(f"{controller.name}, check_velocity"):
+                controller.check_velocity(velocity, stride)
 
 
 def begin_at_speed(

@@ -115,6 +115,19 @@ class SteerablePlan(Plan, Protocol):
 
 
 @runtime_checkable
+class KnowsItsLimits(Protocol):
+    """A controller that cannot plan at every velocity with every time step, and says so before any work."""
+
+    def check_velocity(self, velocity: float, stride: Stride) -> None:
+        """Refuse a V_r at which the stride's time step is too long.
+
+        Raises:
+            InputError: it is.
+        """
+        ...
+
+
+@runtime_checkable
 class FastLosses(Plan, Protocol):
     """A plan with a faster way to its first losses of static stability than being advanced."""
 

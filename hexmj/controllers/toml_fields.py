@@ -29,7 +29,10 @@ def with_fields(usual: Any, values: dict[str, Any], name: str) -> Any:
         Exception: whatever its class raises, and of fields that are not there.
     """
     named = any(one.name == "name" and one.init and one.type in (str, "str") for one in fields(usual))
-    return _made(type(usual), usual, {"name": name} | values if named else values)
+    if named and "name" not in values:
+        with suppress(Exception):  # of a class that takes no other name
+            return _made(type(usual), usual, {"name": name} | values)
+    return _made(type(usual), usual, values)
 
 
 def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:

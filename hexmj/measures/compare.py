@@ -9,11 +9,11 @@ import numpy as np
 
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw, draw_starts
@@ -78,8 +78,7 @@ class Comparison:
         from hexmj.measures.outcome_table import outcome_table
 
         for one in self.controllers.values():
-            starts = draw_starts(FEW, self.seed, self.stride)
-            check_fastest(one, starts, self.velocities, self.stride, self.acceleration)
+            check_velocities(one, self.velocities, self.stride)
         same = self.n_starts, self.seed, self.conditions, self.stride, self.acceleration
         return [
             Cell(f"{name}-V-{v:g}", outcome_table, {"walks": WalkSettings(one, v, t, *same)}, work=t)

@@ -11,16 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import check_types, given, typed, whole
-from hexmj.controllers.asking import advanced, begin
+from hexmj.controllers.asking import advanced, begin, check_velocities
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_interval
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
 from hexmj.measures.velocities import observed
 from hexmj.process.progress import Progress
-from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs, draw_starts
+from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
 from hexmj.storage.attributes import attributes
 from hexmj.sweeps import Cell, Execution, conduct
 from hexmj.timing import Acceleration, Stride, observation_time, steps_within
@@ -133,7 +132,7 @@ class KinematicFlss:
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`; each is a `losses_of_range`."""
         v, duration = self.observed
-        check_fastest(self.controller, draw_starts(FEW, self.seed, self.stride), v, self.stride, self.acceleration)
+        check_velocities(self.controller, self.velocities, self.stride)
         same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
         cells = []
         for i, first in self.places:

@@ -4,16 +4,13 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import ArrayLike
-
 from hexmj.checks import check_types
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.kinematic import settings
 from hexmj.measures.walk_settings import WalkSettings
-from hexmj.starts import check_draw, draw_starts
+from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.timing import Acceleration, Stride
 
@@ -54,11 +51,6 @@ class SameStarts:
     def lists(self) -> Mapping[str, str]:
         """Conditions that are varied, and the names of the lists in which they are given."""
         return {}
-
-    def check_fastest(self, velocities: ArrayLike) -> None:
-        """Refuse now what the plan refuses at the greatest of the velocities, see `fastest_walk`."""
-        starts = draw_starts(FEW, self.seed, self.stride)
-        check_fastest(self.controller, starts, velocities, self.stride, self.acceleration)
 
     def walks(self, velocity: float, duration: float, conditions: Conditions) -> WalkSettings:
         """What a cell is told that walks all starts."""

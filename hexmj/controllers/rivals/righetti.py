@@ -28,9 +28,15 @@ import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
 from hexmj.errors import InputError
+from hexmj.starts import draw_starts
+from hexmj.timing import Stride
 
 TRIPOD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """(leg,) k_ij is the product of two legs' signs."""
+
+
+N_TRIED, TRIED = 64, 400
+"""Starts and steps after which oscillators that will diverge have; of eight starts they had after 120."""
 
 
 class Hopf(NamedTuple):
@@ -68,6 +74,15 @@ class Righetti(Lifted):
 
     reads_load = True
     mirrored = True
+
+    def check_velocity(self, velocity: float, stride: Stride) -> None:
+        """See `KnowsItsLimits`: a time step that is too long shows within `TRIED` steps of a few starts.
+
+        Raises:
+            InputError: the oscillators diverge.
+        """
+        starts = draw_starts(N_TRIED, 0, stride)
+        self.begin(starts, np.full(N_TRIED, velocity), stride).advance(TRIED)
 
     def at_start(self, legs: Legs) -> Hopf:
         """See `LiftingRule`."""

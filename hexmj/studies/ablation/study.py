@@ -8,14 +8,13 @@ import numpy as np
 
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import check_velocities
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.starts import draw_starts
 from hexmj.storage.attributes import attributes
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league import on_paper
@@ -143,7 +142,7 @@ class Ablation:
             return Cell(f"{name}-physical-V-{velocity:g}", in_physics.walks, walked, 20 * time)
 
         for one in self.controllers.values():
-            check_fastest(one, draw_starts(FEW, self.seed, self.stride), self.velocities, self.stride)
+            check_velocities(one, self.velocities, self.stride)
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         return [cell(name, measure, *one) for name in self.controllers for measure in MEASURES for one in at]
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from hexmj.checks import whole
+from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError
 from hexmj.gaits import unrolled
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
@@ -53,7 +54,7 @@ class Biology(SameStarts):
             own = {"walks": walks, "measured": MEASURED * period}
             return Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity)
 
-        self.check_fastest(np.divide(SPEEDS, self.conditions.time.vp))
+        check_velocities(self.controller, np.divide(SPEEDS, self.conditions.time.vp).tolist(), self.stride)
         return [cell(speed) for speed in SPEEDS]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed
 from hexmj.starts import checked_list, draw_starts
@@ -97,10 +97,11 @@ class DisturbedWalks(SameStarts):
             name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
             return Cell(name, walks.times, settings, work=window)
 
-        starts = draw_starts(FEW, self.seed, self.stride)
-        check_fastest(self.controller, starts, self.velocities, self.stride)
+        check_velocities(self.controller, self.velocities, self.stride)
         if self.physical and "grasp" in self.strategies:
-            settle(starts[:1], self.conditions.but(grasp=self.adhesion), self.stride, threads=1)
+            settle(
+                draw_starts(1, self.seed, self.stride), self.conditions.but(grasp=self.adhesion), self.stride, threads=1
+            )
         at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
         return [cell(one, case, time) for one, time in at for case in self.cases]
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
-from hexmj.measures.fastest_walk import FEW, check_fastest
 from hexmj.measures.velocities import observed
 from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
@@ -104,17 +104,10 @@ class League:
         return {(name, what): cell for name, entrant in self.entrants.items() for what, cell in self._asked(entrant)}
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`.
-
-        Raises:
-            InputError: a plan that refuses to walk on paper at the fastest velocity, before all the work that it would
-                end.
-        """
+        """See `sweeps.Study`."""
         for entrant in self.entrants.values():
-            given = () if entrant.ideal else (FINAL if self.accelerating else RANGE[1],)
-            fastest = max(*self.observed[0].tolist(), self.tried_at, *given)
-            starts = entrant.starts(FEW, self.seed, fastest, self.stride)
-            check_fastest(entrant.controller, starts, fastest, self.stride)
+            random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
+            check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.asking import begin, check_velocities
 from hexmj.controllers.protocol import ReadingPlan
 from hexmj.errors import InputError, check_distinct
 from hexmj.measures.velocities import observed, velocity_axis
@@ -99,7 +99,7 @@ class StabilityMap(SameStarts):
             work = time * conditions.substeps(self.stride)
             return Cell(name, fates, {"walks": self.walks(velocity, time, conditions), "over": self.over}, work)
 
-        self.check_fastest(self.velocities)
+        check_velocities(self.controller, self.velocities, self.stride)
         return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
+from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError, check_distinct
 from hexmj.starts import checked_list, draw_starts
 from hexmj.studies.same_starts import SameStarts
@@ -113,7 +114,7 @@ class Terrain(SameStarts):
             walks = self.walks(velocity, self.distance / velocity, conditions)
             return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
 
-        self.check_fastest(self.velocities)
+        check_velocities(self.controller, self.velocities, self.stride)
         for grasp in self.grasps:
             settle(draw_starts(1, self.seed, self.stride), self.conditions.but(grasp=grasp), self.stride, threads=1)
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
