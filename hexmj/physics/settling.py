@@ -1,5 +1,6 @@
 """Every start is put on its six feet in MuJoCo and comes to rest before it walks."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +18,7 @@ from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import SINK
 from hexmj.physics.foot_path import standing_tips
 from hexmj.process.threads import check_memory
-from hexmj.starts import checked_starts
+from hexmj.starts import checked_starts, draw_starts
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0
@@ -157,6 +158,17 @@ def settle(
     """
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
     return Settling(conditions, stride, threads).at(starts)
+
+
+def check_adhesion(conditions: Conditions, stride: Stride) -> None:
+    """Refuse before the work adhesion that presses feet too deep, as one start at rest shows.
+
+    Raises:
+        InputError: it does.
+    """
+    if conditions.contact.grasp > 0:
+        with suppress(SimulationError):  # whether this start comes to rest is asked where it walks
+            settle(draw_starts(1, 0, stride), conditions, stride, threads=1)
 
 
 def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:

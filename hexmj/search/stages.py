@@ -20,7 +20,7 @@ from hexmj.search.evolution import Evolution
 from hexmj.search.history import History
 from hexmj.search.problems import Problem
 from hexmj.search.samples import REFUSED, Sample
-from hexmj.starts import check_draw, draw_starts
+from hexmj.starts import check_draw
 from hexmj.storage.locks import locked
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps.plain_settings import plain
@@ -130,9 +130,9 @@ def _search(
     problem: Problem, effort: Effort, folder: Path | None, threads: int | None, progress: Progress | None
 ) -> Found:
     if problem.conditions:
-        from hexmj.physics.settling import settle
+        from hexmj.physics.settling import check_adhesion
 
-        settle(draw_starts(1, effort.seed, problem.stride), problem.conditions, problem.stride, threads=1)
+        check_adhesion(problem.conditions, problem.stride)
     domain, history = problem.domain(effort.domain, effort.begin), History()
     refine_budget = 0 if domain.binary.all() else effort.refine_budget  # which leaves binary ones as they are
     work = effort.budget * effort.starts + refine_budget * effort.refine_starts

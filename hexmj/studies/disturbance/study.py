@@ -14,7 +14,7 @@ from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed
-from hexmj.starts import checked_list, draw_starts
+from hexmj.starts import checked_list
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.same_starts import SameStarts
@@ -80,7 +80,7 @@ class DisturbedWalks(SameStarts):
 
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""
-        from hexmj.physics.settling import settle
+        from hexmj.physics.settling import check_adhesion
         from hexmj.studies.disturbance.stable_walks import StableWalks
 
         def walks(velocity: float) -> StableWalks:
@@ -99,9 +99,7 @@ class DisturbedWalks(SameStarts):
 
         check_velocities(self.controller, self.velocities, self.stride)
         if self.physical and "grasp" in self.strategies:
-            settle(
-                draw_starts(1, self.seed, self.stride), self.conditions.but(grasp=self.adhesion), self.stride, threads=1
-            )
+            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride)
         at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
         return [cell(one, case, time) for one, time in at for case in self.cases]
 

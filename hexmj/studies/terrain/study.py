@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from hexmj.conditions import Conditions
 from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError, check_distinct
-from hexmj.starts import checked_list, draw_starts
+from hexmj.starts import checked_list
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Stride
@@ -105,7 +105,7 @@ class Terrain(SameStarts):
     def cells(self) -> list[Cell]:
         """A cell for each obstacle, grasp and velocity; see `sweeps.Study`."""
         from hexmj.measures.outcome_table import outcome_table
-        from hexmj.physics.settling import settle
+        from hexmj.physics.settling import check_adhesion
 
         before = self.obstacles
 
@@ -116,7 +116,7 @@ class Terrain(SameStarts):
 
         check_velocities(self.controller, self.velocities, self.stride)
         for grasp in self.grasps:
-            settle(draw_starts(1, self.seed, self.stride), self.conditions.but(grasp=grasp), self.stride, threads=1)
+            check_adhesion(self.conditions.but(grasp=grasp), self.stride)
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
