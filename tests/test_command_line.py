@@ -11,6 +11,7 @@ import pytest
 
 import hexmj
 from hexmj.cli.main import COMMANDS
+from hexmj.controllers.cruse1998.presets import network_toml
 
 
 def test_help_names_every_command_and_imports_nothing_slow():
@@ -96,6 +97,7 @@ def test_weights_of_a_controller_of_ones_own_are_no_preset_s(run, tmp_path):
         (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
         (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "own-0.4-without-3"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+        (["--model", "copy.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "mine.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--pep0", -9, "--geometry", "centred"], "; seed 0; pep0 -9.0; geometry centred"),
     ],
@@ -103,6 +105,7 @@ def test_weights_of_a_controller_of_ones_own_are_no_preset_s(run, tmp_path):
 def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, words, told):
     monkeypatch.chdir(tmp_path)
     Path("sums.py").write_text(SUMS)
+    Path("copy.toml").write_text(network_toml(hexmj.PRESETS["own-0.4"]))
     Path("mine.toml").write_text("controller = 'own-0.4'\n[fields]\norder = 'undelayed'\n")
     short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
     assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")

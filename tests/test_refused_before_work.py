@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
+from hexmj.studies.ablation.study import Ablation
+from hexmj.studies.biology.study import Biology
+from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.study import League
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.terrain.study import Terrain
 
 DIVERGES = "oscillators diverge at dt = "
 STEPPED_OVER = "expected V and a step together below 1"
@@ -36,7 +44,7 @@ def test_what_ends_the_work_is_said_before_it(run, tmp_path, words: str, said: s
 
 @dataclass(frozen=True)
 class Counts:
-    """LDVS, which knows what it was asked for, and has weights of its own kind."""
+    """LDVS, which knows what it was asked for."""
 
     begun: list[Any] = field(default_factory=list, compare=False, repr=False)
     name: str = "counts"
@@ -52,14 +60,50 @@ def test_who_does_not_tell_limits_is_asked_for_nothing_before_the_work() -> None
     assert len(lost) == 2 and one.begun == []
 
 
-def test_limits_are_told_whatever_the_controller_raises() -> None:
-    with pytest.raises(hexmj.InputError, match=r"limited, check_velocity: ZeroDivisionError"):
-        hexmj.flss(Limited(), [0.3], n_starts=2)
-
-
 @dataclass(frozen=True)
 class Limited(Counts):
+    """It plans below V = 0.3 alone."""
+
     name: str = "limited"
 
     def check_velocity(self, velocity: float, stride: hexmj.Stride) -> None:
-        raise ZeroDivisionError
+        if not 1 / velocity > 1 / 0.3:
+            raise hexmj.InputError(f"V = {velocity}; expected less than 0.3")
+
+    def begin_at_speed(self, *how: Any, **others: Any) -> Any:
+        return self.begin(*how, **others)
+
+
+LIMITED = Limited()
+FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
+
+
+@pytest.mark.parametrize(
+    "study",
+    [
+        KinematicFlss(LIMITED, **FAST),
+        Comparison({"first": hexmj.LDVS, "limited": LIMITED}, **FAST),
+        StabilityMap(LIMITED, values=(40.0,), **FAST),
+        Terrain(LIMITED, **FAST),
+        DisturbedWalks(LIMITED, disturbances=("push",), impulses=(1.0,), strategies=(), **FAST),
+        Biology(LIMITED, n_starts=2),
+        Ablation({"limited": {"limited": LIMITED}}, **FAST, n_physical=1),
+        League({"limited": Entrant(LIMITED)}, (0.1,), 2, 1, 1, accelerating=False),
+    ],
+    ids=lambda study: type(study).__name__,
+)
+def test_every_study_asks_for_limits_before_its_cells(study) -> None:
+    begun = len(LIMITED.begun)
+    with pytest.raises(hexmj.InputError, match=r"V = 0\.[35]\d*; expected less than 0.3"):
+        study.cells()
+    assert len(LIMITED.begun) == begun
+
+
+def test_limits_of_walks_that_accelerate_are_told_as_they_go() -> None:
+    accelerating = KinematicFlss(LIMITED, **FAST, acceleration=hexmj.Acceleration())
+    assert len(accelerating.cells()) == 2
+
+
+def test_limits_are_told_whatever_the_controller_raises() -> None:
+    with pytest.raises(hexmj.InputError, match=r"limited, check_velocity: ZeroDivisionError"):
+        hexmj.flss(LIMITED, [0.0], window=10.0, n_starts=2)

@@ -13,6 +13,7 @@ from hexmj.cli.loaded import LOADED, loaded
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
+from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -130,9 +131,12 @@ class Controlled:
         from hexmj.controllers.named import PART
 
         found, _ = LOADED.get(name, (None, None))
-        known = PRESETS.items() if isinstance(found, Cruse1998) else ()
-        same = (preset for preset, usual in known if usual.weights == getattr(found, "weights", None))
-        return next(same, PART.sub("", name))
+        if isinstance(found, Cruse1998):
+            weights = plain(found.weights)
+            for preset, usual in PRESETS.items():
+                if plain(usual.weights) == weights:
+                    return preset
+        return PART.sub("", name)
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

@@ -63,13 +63,17 @@ def begin(
     return plan
 
 
-def check_velocities(controller: Controller, velocities: Iterable[float], stride: Stride) -> None:
+def check_velocities(
+    controller: Controller, velocities: Iterable[float], stride: Stride, acceleration: Acceleration | None = None
+) -> None:
     """Refuse velocities V_r at which a controller says that it cannot plan with the stride's time step.
+
+    Of walks that accelerate it says so as they go, if they come to V_r.
 
     Raises:
         InputError: one of them.
     """
-    if isinstance(controller, KnowsItsLimits):
+    if isinstance(controller, KnowsItsLimits) and not acceleration:
         for velocity in velocities:
             with said(f"{controller.name}, check_velocity"):
                 controller.check_velocity(velocity, stride)

@@ -78,7 +78,7 @@ class Comparison:
         from hexmj.measures.outcome_table import outcome_table
 
         for one in self.controllers.values():
-            check_velocities(one, self.velocities, self.stride)
+            check_velocities(one, self.velocities, self.stride, self.acceleration)
         same = self.n_starts, self.seed, self.conditions, self.stride, self.acceleration
         return [
             Cell(f"{name}-V-{v:g}", outcome_table, {"walks": WalkSettings(one, v, t, *same)}, work=t)

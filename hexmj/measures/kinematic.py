@@ -132,7 +132,7 @@ class KinematicFlss:
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`; each is a `losses_of_range`."""
         v, duration = self.observed
-        check_velocities(self.controller, self.velocities, self.stride)
+        check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
         cells = []
         for i, first in self.places:

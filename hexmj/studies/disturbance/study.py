@@ -66,7 +66,7 @@ class DisturbedWalks(SameStarts):
         if self.physical and "push" in self.disturbances:
             steps_pushed(self.conditions.time, self.stride)
         self.conditions.but(grasp=self.adhesion)
-        _ = self.cells()
+        _ = self._cells()
 
     @property
     def cases(self) -> list[Case]:
@@ -81,6 +81,13 @@ class DisturbedWalks(SameStarts):
     def cells(self) -> list[Cell]:
         """A cell for each velocity and case; see `sweeps.Study`."""
         from hexmj.physics.settling import check_adhesion
+
+        check_velocities(self.controller, self.velocities, self.stride)
+        if self.physical and "grasp" in self.strategies:
+            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride)
+        return self._cells()
+
+    def _cells(self) -> list[Cell]:
         from hexmj.studies.disturbance.stable_walks import StableWalks
 
         def walks(velocity: float) -> StableWalks:
@@ -97,9 +104,6 @@ class DisturbedWalks(SameStarts):
             name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
             return Cell(name, walks.times, settings, work=window)
 
-        check_velocities(self.controller, self.velocities, self.stride)
-        if self.physical and "grasp" in self.strategies:
-            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride)
         at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
         return [cell(one, case, time) for one, time in at for case in self.cases]
 

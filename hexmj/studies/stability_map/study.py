@@ -99,7 +99,7 @@ class StabilityMap(SameStarts):
             work = time * conditions.substeps(self.stride)
             return Cell(name, fates, {"walks": self.walks(velocity, time, conditions), "over": self.over}, work)
 
-        check_velocities(self.controller, self.velocities, self.stride)
+        check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
