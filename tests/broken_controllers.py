@@ -1,0 +1,372 @@
+"""Controllers that each break one law of the protocol, with the law and what is said of it."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+import hexmj
+from hexmj.controllers import Sensed
+from hexmj.controllers.rivals.lifted import LiftedPlan
+from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.rivals.righetti import Righetti
+from hexmj.legs import CENTRED
+from hexmj.walks import PlannedWalk
+from stepwise_ldvs import Change, Own
+
+
+def steps_changed(**changed: Callable[[PlannedWalk], Any]) -> Own:
+    """A controller that changes every step of LDVS."""
+    return Own(lambda walk, _: {name: one(walk) for name, one in changed.items()})
+
+
+def spoilt(spoil: Callable[..., Any]) -> Any:
+    """LDVS with plans that are spoilt, or replaced, as they begin: by plan, starts, velocity and threads."""
+
+    @dataclass(frozen=True)
+    class Spoilt(Own):
+        def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+            plan = Own.begin(self, starts, velocity, stride, acceleration)
+            return spoil(plan, starts, velocity, threads) or plan
+
+    return Spoilt()
+
+
+def walks_changed(change: Callable[[PlannedWalk], dict[str, Any]]) -> Any:
+    """A controller whose plans give other walks than they should."""
+
+    def spoil(plan, *_):
+        inner = plan.advance
+        plan.advance = lambda steps: replace(walk := inner(steps), **change(walk))
+
+    return spoilt(spoil)
+
+
+COUNT = itertools.count()
+
+
+@dataclass
+class Melting:
+    """Not frozen."""
+
+    change: Change | None = None
+    name: str = "melting"
+    begin = Own.begin
+
+
+@dataclass(frozen=True)
+class Hiding(Own):
+    """With a setting that is no plain data."""
+
+    thing: Any = object()  # noqa: RUF009  # one for all
+
+
+@dataclass(frozen=True)
+class MirroredInVain(Own):
+    """Claims what it does not keep."""
+
+    mirrored = True
+
+
+@dataclass(frozen=True)
+class OfOneMind(Own):
+    """Its plans forget how far they are as soon as another one begins."""
+
+    mind: ClassVar[list[int]] = []
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        self.mind[:] = [0]
+
+        def forgetful(walk, _):
+            self.mind[0] += 1
+            return {"x": walk.x[0] + 1e-6 * self.mind[0]}
+
+        return Own(forgetful).begin(starts, velocity, stride, acceleration, threads)
+
+
+@dataclass(frozen=True)
+class Counting(Own):
+    """With a field that changes whenever a plan begins."""
+
+    begun: int = 0
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        object.__setattr__(self, "begun", self.begun + 1)
+        return Own.begin(self, starts, velocity, stride, acceleration)
+
+
+@dataclass(frozen=True)
+class Hurrying(Own):
+    """Changes the stride that it is told."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        """See `protocol.Controller`."""
+        plan = Own.begin(self, starts, velocity, replace(stride), acceleration)
+        object.__setattr__(stride, "dt", 0.2)
+        return plan
+
+
+def moved_by_all(plan, *_):
+    """Whoever is told something, all move."""
+    inner, told = plan.advance, []
+    plan.advance = lambda steps: replace(walk := inner(steps), x=walk.x - 0.001 * len(told))
+    plan.sense = told.append
+
+
+def moved_by(field: str, mix: Callable[[np.ndarray, Sensed, np.ndarray], None]) -> Any:
+    """Tips are moved by what their starts feel, as far as `mix` knows which start that is."""
+
+    def spoil(plan, starts, *_):
+        inner, felt = plan.advance, np.zeros(len(starts))
+        plan.advance = lambda steps: replace(walk := inner(steps), x=walk.x - 0.001 * felt[:, None])
+
+        def sense(sensed: Sensed) -> None:
+            values = getattr(sensed, field)
+            mix(felt, sensed, 0.1 * np.sign(1.0 * values).reshape(len(values), -1).mean(axis=1))
+
+        plan.sense = sense
+
+    return spoil
+
+
+def first_rows(felt: np.ndarray, sensed: Sensed, values: np.ndarray) -> None:
+    felt[: len(values)] = values
+
+
+def their_mean(felt: np.ndarray, sensed: Sensed, values: np.ndarray) -> None:
+    felt[sensed.ids] = values.mean()
+
+
+def right_rows_while_all_walk(felt: np.ndarray, sensed: Sensed, values: np.ndarray) -> None:
+    felt[::2] = values if len(values) == len(felt[::2]) else values[:1]
+
+
+def moved_by_swings(plan, starts, *_):
+    """Adds up in the first rows how often a swinging foot has touched."""
+    inner, touched, stands = plan.advance, np.zeros(starts.shape), np.ones(starts.shape, dtype=bool)
+
+    def advance(steps: int) -> PlannedWalk:
+        walk = inner(steps)
+        stands[:] = walk.stance[-1]
+        return replace(walk, x=walk.x - 0.001 * touched)
+
+    def sense(sensed: Sensed) -> None:
+        touched[: len(sensed.ids)] += sensed.gained & ~stands[sensed.ids]
+
+    plan.advance, plan.sense = advance, sense
+
+
+def slowed_by_anyone(plan, *_):
+    """All say that they go slower once any start tilts."""
+    inner, tilts = plan.advance, []
+    plan.advance = lambda steps: replace(walk := inner(steps), velocity=walk.velocity * (0.5 if any(tilts) else 1.0))
+    plan.sense = lambda sensed: tilts.append((sensed.tilt > 0.05).any())
+
+
+def ids_written_on(plan, *_):
+    def sense(sensed: Sensed) -> None:
+        sensed.ids[:] = 0
+
+    plan.sense = sense
+
+
+def written_on(plan, *_):
+    def sense(sensed: Sensed) -> None:
+        sensed.tips[:] = 0.0
+
+    plan.sense = sense
+
+
+def one_step_on(plan, *_):
+    plan.advance(1)
+
+
+def one_step_on_with_two_threads(plan, starts, velocity, threads):
+    if threads == 2:
+        plan.advance(1)
+        plan.done = 0
+
+
+def losses_of_its_own(plan, *_):
+    """Its fast way finds other losses than the plan has."""
+    plan.first_losses = np.ones_like
+
+
+def starts_halved(plan, starts, *_):
+    starts *= 0.5
+
+
+def left_leg_ahead(walk: PlannedWalk, _: int) -> dict[str, Any]:
+    return {"x": walk.x[0] + np.array([1e-6, 0.0, 0.0, 0.0, 0.0, 0.0])}
+
+
+@dataclass(frozen=True)
+class OtherAtSpeed:
+    """LDVS, but where it is disturbed or steered."""
+
+    name: str = "other at speed"
+
+    def begin(self, *given: Any) -> Any:
+        return hexmj.LDVS.begin(*given)
+
+    def begin_at_speed(self, *given: Any) -> Any:
+        return hexmj.UNCOORDINATED.begin_at_speed(*given)
+
+
+@dataclass(frozen=True)
+class AtSpeed:
+    """Begins at speed with what cannot be steered."""
+
+    other: Any = None
+    name: str = "at speed"
+
+    def begin(self, *given: Any) -> Any:
+        return hexmj.LDVS.begin(*given)
+
+    def begin_at_speed(self, *given: Any) -> Any:
+        return self.other and self.other.begin(*given)
+
+
+@dataclass(frozen=True)
+class BegunOtherwise(Metronome):
+    """An heir that nobody begins at speed, since its own begin does something else."""
+
+    def begin(self, *given: Any, **how: Any) -> Any:
+        return hexmj.LDVS.begin(*given, **how)
+
+
+def put_back(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
+    """To the tips, with what was remembered and as fast as before."""
+    rows = which[:, None]
+    plan.see(np.where(rows, tips, plan.tips), plan.standing | rows)
+
+
+def begun_elsewhere(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
+    """At the tips, with what the rule would remember at those of its first beginning."""
+    LiftedPlan.restart(plan, which, plan.starts)
+    plan.see(np.where(which[:, None], tips, plan.tips), plan.standing)
+
+
+def with_the_first(plan: LiftedPlan, tips: np.ndarray, standing: np.ndarray) -> None:
+    """All starts walk as fast as the first one after they were seen."""
+    LiftedPlan.see(plan, tips, standing)
+    plan._final = np.full_like(plan._final, plan._final[0])
+
+
+def forgetful(plan: LiftedPlan, which: np.ndarray) -> None:
+    """Those that slow down forget what the rule remembered."""
+    LiftedPlan.slow_down(plan, which)
+    plan._state = type(plan._state)(*(np.where(which[:, None], 0.0, one) for one in plan._state))
+
+
+def others_forget(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
+    """Those that do not restart do."""
+    LiftedPlan.restart(plan, which, tips)
+    plan._state = type(plan._state)(*(np.where(which[:, None], one, 0.0) for one in plan._state))
+
+
+@dataclass(frozen=True)
+class NeverSlow(Metronome):
+    """Knows of no acceleration once it walks."""
+
+    def begin_at_speed(
+        self, starts: Any, velocity: Any, stride: Any, acceleration: Any = None, threads: int | None = None
+    ) -> LiftedPlan:
+        return LiftedPlan(self, starts, velocity, stride, None)
+
+
+def steered(rule: type = Metronome, **changed: Any) -> Any:
+    """A rival whose plans do something else where they are steered."""
+    plan = type("SteeredPlan", (LiftedPlan,), changed)
+    return type("Steered", (rule,), {"_plan": lambda rule, *asked: plan(rule, *asked)})()
+
+
+BROKEN: list[tuple[str, Any, str]] = [
+    ("see", steered(see=lambda *_: None), "tips of start 0, leg 0 is .* after see; expected"),
+    ("see", steered(see=lambda plan, tips, _: LiftedPlan.see(plan, tips, plan.standing)), "standing of .* after see"),
+    ("see", steered(tips=property(lambda plan: plan.starts[:, :5])), r"tips has the shape \(8, 5\) after a step; exp"),
+    ("see", steered(standing=property(lambda plan: 1 / 0)), "a plan, tips and standing: ZeroDivisionError"),
+    ("see", steered(tips=property(lambda plan: plan.starts)), "tips of start 1, leg 0 is .* after a step; expected"),
+    ("see", steered(see=with_the_first), "among others, that go on after see, differ: .* in step 2.., start "),
+    (
+        "restart",
+        steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips)),
+        "tips of start 1, leg 0 is .* after restart of some starts; expected",
+    ),
+    (
+        "restart",
+        steered(restart=lambda plan, which, _: LiftedPlan.restart(plan, which, plan.starts)),
+        "tips of start 0, leg 0 is .* after restart of some starts; expected",
+    ),
+    ("restart", steered(Righetti, restart=begun_elsewhere), "restart, and beginning, differ: x is"),
+    ("restart", steered(Righetti, restart=others_forget), "starts alone, and beside some that restart, differ: x is"),
+    ("restart", steered(restart=put_back), "restart, and beginning, differ: x is"),
+    (
+        "slow down",
+        steered(slow_down=lambda *_: None),
+        "accelerating: velocity of start 2 is 0.225 in step 1 after slow_d",
+    ),
+    (
+        "slow down",
+        steered(slow_down=lambda plan, which: LiftedPlan.slow_down(plan, np.ones_like(which))),
+        "accelerating: velocity of start 3, which was not asked to, is",
+    ),
+    (
+        "slow down",
+        steered(slow_down=lambda plan, _: LiftedPlan.see(plan, plan.starts, plan.standing)),
+        "tips of start 1, leg 0 is .* after slow_down; expected",
+    ),
+    ("slow down", steered(Righetti, slow_down=forgetful), "go on as fast, and the same without slow_down, differ: "),
+    ("slow down", NeverSlow(), "accelerating: velocity of start 2 is 0.5 in step 1 after slow_down; expected 0.1"),
+    ("at speed", AtSpeed(), "begin_at_speed of at speed gave None; expected a plan that can be steered"),
+    ("at speed", AtSpeed(Own()), "begin_at_speed of at speed gave Step.*; expected a plan that can be steered"),
+    ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
+    ("settings", Melting(), "not frozen"),
+    ("settings", Hiding(), "object.*is no setting"),
+    ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),
+    ("begin", spoilt(one_step_on), "the plan is at step 1; expected one at time 0"),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "stride", hexmj.Stride(dt=0.2))), "the plan's stride is Stride"),
+    ("steps", spoilt(starts_halved), "starts are changed as it goes on; expected the plan to work on a copy"),
+    ("steps", Counting(), "begin changes begun of the controller; expected it left alone"),
+    ("steps", Hurrying(), "begin changes dt of the stride; expected it left alone"),
+    ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]}), r"x is float64 of the shape \(600, 1, 6\); expected"),
+    ("steps", walks_changed(lambda walk: {"stance": 1.0 * walk.stance}), "stance is float64 .* expected bool"),
+    ("steps", walks_changed(lambda walk: {"geometry": CENTRED}), "geometry = .*; expected that of the stride"),
+    ("steps", walks_changed(lambda walk: {"time": walk.time - 0.1}), "expected k dt"),
+    ("times", walks_changed(lambda walk: {"time": walk.time * (1 + 1e-12)}), "expected k dt"),
+    ("times", walks_changed(lambda walk: {"velocity": np.full_like(walk.velocity, 0.5)}), "expected V_r as commanded"),
+    ("steps", steps_changed(x=lambda walk: np.where(walk.stance[0], walk.x[0], np.nan)), "x is nan in step"),
+    ("steps", steps_changed(height=lambda walk: np.inf), "height is inf in step 0, start 0 .V = 0., leg L1"),
+    ("reach", steps_changed(x=lambda walk: walk.x[0] + 5.0), "x is .* mm in step .*; expected -21 to 11 mm"),
+    ("reach", steps_changed(y=lambda walk: 1.6 * walk.y[0]), "y is 28.8 mm in .*; expected 9 to 27 mm"),
+    ("reach", steps_changed(height=lambda walk: 30.0), "height is 30 mm in .*; expected -10 to 20 mm"),
+    ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT)), "begun alike differ: x is"),
+    ("begun again", spoilt(one_step_on_with_two_threads), "with 1 and 2 threads differ: x is"),
+    ("side by side", OfOneMind(), "a plan alone, and beside another of the same controller, differ: x is"),
+    ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean()), "or among others differ: x"),
+    ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)}), "in parts of .* differ: x is"),
+    ("first losses", spoilt(losses_of_its_own), r"first_losses gives the steps \[1 1 .* expected those of the plan"),
+    ("mirrored", MirroredInVain(left_leg_ahead), "mirrored starts, mirrored back, differ: x is"),
+    ("sense", spoilt(moved_by_all), "starts it is told nothing of differ: x is"),
+    *(
+        ("sense", spoilt(moved_by(one.name, first_rows)), "starts it is told nothing of differ: x is")
+        for one in fields(Sensed)
+        if one.name not in ("ids", "tips")
+    ),
+    ("sense", spoilt(moved_by("tilt", their_mean)), "a start it is told of, beside others and alone, differ: x is"),
+    ("sense", spoilt(moved_by("tilt", right_rows_while_all_walk)), "beside others and alone, differ: x is .* in step "),
+    ("sense", spoilt(moved_by_swings), "starts it is told nothing of differ: x is"),
+    (
+        "sense",
+        spoilt(slowed_by_anyone),
+        "starts it is told nothing of differ: velocity is 0.01 and 0.02",
+    ),
+    ("sense", spoilt(ids_written_on), "sense changes what it is told, ids"),
+    ("sense", spoilt(written_on), "sense changes what it is told, tips"),
+    ("steps", steps_changed(x=lambda walk: np.zeros((2, 2))), "x of a step has the shape"),
+]
