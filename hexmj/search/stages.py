@@ -122,6 +122,10 @@ def search(
     typed("problem", problem, Problem)
     typed("effort", effort, Effort)
     folder = None if folder is None else path_of(folder)
+    if problem.conditions:
+        from hexmj.physics.settling import check_adhesion
+
+        check_adhesion(problem.conditions, problem.stride)
     with shown(progress, "searching") as told, locked(folder) if folder else nullcontext():
         return _search(problem, effort, folder, threads, told)
 
@@ -129,10 +133,6 @@ def search(
 def _search(
     problem: Problem, effort: Effort, folder: Path | None, threads: int | None, progress: Progress | None
 ) -> Found:
-    if problem.conditions:
-        from hexmj.physics.settling import check_adhesion
-
-        check_adhesion(problem.conditions, problem.stride)
     domain, history = problem.domain(effort.domain, effort.begin), History()
     refine_budget = 0 if domain.binary.all() else effort.refine_budget  # which leaves binary ones as they are
     work = effort.budget * effort.starts + refine_budget * effort.refine_starts
