@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.controllers.asking import check_velocities
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
+from hexmj.physics.settling import check_adhesion
 from hexmj.studies.ablation.study import Ablation
 from hexmj.studies.biology.study import Biology
 from hexmj.studies.disturbance.study import DisturbedWalks
@@ -26,6 +28,7 @@ PRESSES = "expected at most about 10: it presses feet"
     ("words", "said"),
     [
         ("flss --model righetti --velocities 0.02 0.9 --dt 0.5", DIVERGES),
+        ("flss --model righetti --velocities 0.6 --dt 0.4", DIVERGES),
         ("compare --models ldvs righetti --velocities 0.5 --dt 1", DIVERGES),
         ("terrain --model righetti --velocities 0.1 0.9 --dt 0.5", DIVERGES),
         ("disturb --model righetti --velocities 0.1 0.9 --dt 0.5 --disturbances halt", DIVERGES),
@@ -73,6 +76,9 @@ class Limited(Counts):
     def begin_at_speed(self, *how: Any, **others: Any) -> Any:
         return self.begin(*how, **others)
 
+    def ideal_start(self, velocity: float, stride: hexmj.Stride) -> np.ndarray:
+        return hexmj.draw_starts(1, 0, stride)
+
 
 LIMITED = Limited()
 FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
@@ -88,7 +94,10 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         DisturbedWalks(LIMITED, disturbances=("push",), impulses=(1.0,), strategies=(), **FAST),
         Biology(LIMITED, n_starts=2),
         Ablation({"limited": {"limited": LIMITED}}, **FAST, n_physical=1),
+        Terrain(hexmj.ReadsLegs(LIMITED), **FAST),
         League({"limited": Entrant(LIMITED)}, (0.1,), 2, 1, 1, accelerating=False),
+        League({"limited": Entrant(LIMITED)}, (0.1,), 2, 1, 1, tried_at=0.2, accelerating=False),
+        League({"limited": Entrant(LIMITED, ideal=True)}, (0.1, 0.3), 2, 1, 1),
     ],
     ids=lambda study: type(study).__name__,
 )
@@ -97,6 +106,25 @@ def test_every_study_asks_for_limits_before_its_cells(study) -> None:
     with pytest.raises(hexmj.InputError, match=r"V = 0\.[35]\d*; expected less than 0.3"):
         study.cells()
     assert len(LIMITED.begun) == begun
+
+
+def test_ideal_entrants_are_asked_for_the_velocities_at_which_they_walk_alone() -> None:
+    assert League({"limited": Entrant(LIMITED, ideal=True)}, (0.1,), 2, 1, 1).cells()
+
+
+def test_adhesion_of_a_start_that_does_not_settle_is_no_matter_of_this_check() -> None:
+    check_adhesion(hexmj.Conditions.of(grasp=1.0, settling_time=3.0), hexmj.Stride(), 0)
+    with pytest.raises(hexmj.InputError, match="grasp = 50"):
+        check_adhesion(hexmj.Conditions.of(grasp=50.0), hexmj.Stride(), 0)
+
+
+def test_what_is_no_method_tells_no_limits() -> None:
+    check_velocities(Told(), [0.5], hexmj.Stride())
+
+
+@dataclass(frozen=True)
+class Told(Counts):
+    check_velocity: float = 3.0
 
 
 def test_limits_of_walks_that_accelerate_are_told_as_they_go() -> None:

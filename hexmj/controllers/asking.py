@@ -73,7 +73,7 @@ def check_velocities(
     Raises:
         InputError: one of them.
     """
-    if isinstance(controller, KnowsItsLimits) and not acceleration:
+    if isinstance(controller, KnowsItsLimits) and callable(controller.check_velocity) and not acceleration:
         for velocity in velocities:
             with said(f"{controller.name}, check_velocity"):
                 controller.check_velocity(velocity, stride)

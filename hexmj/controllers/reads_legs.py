@@ -13,6 +13,7 @@ its servo.  `docs/feedback.md` tells what else was tried.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,11 @@ class ReadsLegs:
     def mirrored(self) -> bool:
         """As the controller that plans."""
         return claims_mirrored(self.controller)
+
+    @property
+    def check_velocity(self) -> Any:
+        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
+        return getattr(self.controller, "check_velocity", None)
 
     def begin(
         self,

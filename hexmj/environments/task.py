@@ -29,7 +29,7 @@ command c and the upward component u of the body's vertical; it is 0 on a fall. 
 trunk touches the ground (terminated); or after its duration, or where a foot comes to the end of a step, gap or hurdle
 (truncated).
 
-`observing` and `passes` compute all this, for every face the same.
+`observing` and `compiled_passes` compute all this, for every face the same.
 """
 
 from collections.abc import Mapping

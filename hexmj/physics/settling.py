@@ -160,15 +160,15 @@ def settle(
     return Settling(conditions, stride, threads).at(starts)
 
 
-def check_adhesion(conditions: Conditions, stride: Stride) -> None:
-    """Refuse before the work adhesion that presses feet too deep, as one start at rest shows.
+def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:
+    """Refuse before the work adhesion that presses feet too deep, as the seed's first start at rest shows.
 
     Raises:
         InputError: it does.
     """
     if conditions.contact.grasp > 0:
         with suppress(SimulationError):  # whether this start comes to rest is asked where it walks
-            settle(draw_starts(1, 0, stride), conditions, stride, threads=1)
+            settle(draw_starts(1, seed, stride), conditions, stride, threads=1)
 
 
 def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:

@@ -125,7 +125,7 @@ def search(
     if problem.conditions:
         from hexmj.physics.settling import check_adhesion
 
-        check_adhesion(problem.conditions, problem.stride)
+        check_adhesion(problem.conditions, problem.stride, effort.seed)
     with shown(progress, "searching") as told, locked(folder) if folder else nullcontext():
         return _search(problem, effort, folder, threads, told)
 

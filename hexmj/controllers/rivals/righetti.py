@@ -78,6 +78,8 @@ class Righetti(Lifted):
     def check_velocity(self, velocity: float, stride: Stride) -> None:
         """See `KnowsItsLimits`: a time step that is too long shows within `TRIED` steps of a few starts.
 
+        Shorter walks are refused, too: their oscillators are on the way.
+
         Raises:
             InputError: the oscillators diverge.
         """

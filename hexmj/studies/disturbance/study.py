@@ -84,7 +84,7 @@ class DisturbedWalks(SameStarts):
 
         check_velocities(self.controller, self.velocities, self.stride)
         if self.physical and "grasp" in self.strategies:
-            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride)
+            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride, self.seed)
         return self._cells()
 
     def _cells(self) -> list[Cell]:

@@ -116,7 +116,7 @@ class Terrain(SameStarts):
 
         check_velocities(self.controller, self.velocities, self.stride)
         for grasp in self.grasps:
-            check_adhesion(self.conditions.but(grasp=grasp), self.stride)
+            check_adhesion(self.conditions.but(grasp=grasp), self.stride, self.seed)
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
