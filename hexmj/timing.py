@@ -83,10 +83,10 @@ class Acceleration:
 
 
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
-    """Refuse velocities V_r that an acceleration steps over.
+    """Refuse velocities V_r, (...) fractions of V_p, that an acceleration (Eq. 11) steps over.
 
     Raises:
-        InputError: V_r and a step of it are 1 or more together.
+        InputError: V_r and the growth of V in a time step are 1 or more together.
     """
     if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
         raise InputError(

@@ -66,7 +66,7 @@ def begin(
 def check_velocities(
     controller: Controller, velocities: Iterable[float], stride: Stride, acceleration: Acceleration | None = None
 ) -> None:
-    """Refuse velocities V_r at which a controller says that it cannot plan with the stride's time step.
+    """Refuse velocities V_r, fractions of V_p, at which a controller says that it cannot plan with the time step.
 
     Of walks that accelerate it says so as they go, if they come to V_r.
 

@@ -119,7 +119,7 @@ class KnowsItsLimits(Protocol):
     """A controller that cannot plan at every velocity with every time step, and says so before any work."""
 
     def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """Refuse a V_r at which the stride's time step is too long.
+        """Refuse a V_r, a fraction of V_p, at which the stride's time step is too long.
 
         Raises:
             InputError: it is.

@@ -97,7 +97,8 @@ def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
 
 
 def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", one: "xr.Dataset", name: str, **style: Any) -> None:
-    """One of a result's frequencies with its intervals, in the style of `Axes.errorbar`."""
+    """One of a result's frequencies, `name`, with its interval `_low`, `_high`, against x, all of one dimension, in the
+    style of `Axes.errorbar`."""
     low, middle, high = (one[name + end].values for end in ("_low", "", "_high"))
     dots: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
     axes.errorbar(x, middle, [middle - low, high - middle], **dots | style)

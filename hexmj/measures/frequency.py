@@ -61,7 +61,7 @@ def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, d
 
 
 def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str] = {}) -> "xr.Dataset":
-    """A table of columns over start; those whose unit is not told are numbers."""
+    """A table of columns, (start,) each; those whose unit is not told are numbers."""
     import xarray as xr
 
     return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})

@@ -34,7 +34,6 @@ from hexmj.timing import Stride
 TRIPOD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """(leg,) k_ij is the product of two legs' signs."""
 
-
 N_TRIED, TRIED = 64, 400
 """Starts and steps after which oscillators that will diverge have; of eight starts they had after 120."""
 
