@@ -90,7 +90,7 @@ def test_models_that_make_no_sense_are_refused(models, said: str) -> None:
 
 
 def test_a_contact_gap_is_refused_where_nobody_reads_it() -> None:
-    from hexmj.cli.main import options_of
+    from hexmj.cli.commands import options_of
 
     with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
         options_of(["ablate", "--contact-gap", "5"]).study()
@@ -147,7 +147,7 @@ def test_sets_that_are_not_read_as_printed_are_told_once() -> None:
 
 
 def test_parts_of_a_set_are_known_to_be_searched_on_these_starts() -> None:
-    from hexmj.cli.main import options_of
+    from hexmj.cli.commands import options_of
 
     for words, name in ((["ablate", "--models", "own-0.3"], "own-0.3"), (["flss", "--model"], "own-0.3-without-4")):
         line = options_of([*words, *([name] if name not in words else []), "--seed", "0"]).conditions_line()

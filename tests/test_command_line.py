@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hexmj
-from hexmj.cli.main import COMMANDS
+from hexmj.cli.commands import COMMANDS
 from hexmj.controllers.cruse1998.presets import network_toml
 
 

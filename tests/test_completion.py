@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from hexmj.cli.main import COMMANDS
+from hexmj.cli.commands import COMMANDS
 
 
 def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):

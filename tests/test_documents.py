@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import hexmj
-from hexmj.cli.main import options_of
+from hexmj.cli.commands import options_of
 from hexmj.cli.words import checked
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller

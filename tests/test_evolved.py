@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.cli.main import options_of
+from hexmj.cli.commands import options_of
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.gaits import gait

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from hexmj.cli.main import options_of
+from hexmj.cli.commands import options_of
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import InputError
 from hexmj.studies.league.study import League

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import hexmj
-from hexmj.cli.main import options_of
+from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import HWS, LDVS, READINGS, Reading
 from hexmj.errors import InputError
 from hexmj.legs import CENTRED

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import hexmj
-from hexmj.cli.main import options_of
+from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import READINGS, Cruse1998
 from waiting_legs import OWN
 

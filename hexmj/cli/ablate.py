@@ -9,7 +9,7 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes, arg
 
 from hexmj.cli.options import AS_THEY_ARE, STEADY, Accelerating, Controlled, Walks, hiding
-from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
 from hexmj.storage.attributes import settings
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ablate(StudyCommand):
-    """Options of `hexmj ablate`, which `main.COMMANDS` describes."""
+    """Options of `hexmj ablate`, which `commands.COMMANDS` describes."""
 
     models: Annotated[tuple[str, ...], arg(help="Sets of the 1998 network by name, or walknet, walknet-reacog.")] = (
         "ldvs",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import table
 from hexmj.conditions import Conditions
 from hexmj.storage.results import save_text
@@ -24,7 +24,7 @@ TABLE = "biology.md"
 
 @dataclass(frozen=True)
 class Biology(StudyCommand):
-    """Options of `hexmj biology`, which `main.COMMANDS` describes."""
+    """Options of `hexmj biology`, which `commands.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     starts: int = biology.Biology.n_starts

@@ -10,7 +10,7 @@ from hexmj.cli.options import ControllerName
 
 @dataclass(frozen=True)
 class CheckController:
-    """Options of `hexmj check-controller`, which `main.COMMANDS` describes."""
+    """Options of `hexmj check-controller`, which `commands.COMMANDS` describes."""
 
     name: Positional[ControllerName]
     json: bool = False

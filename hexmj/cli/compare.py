@@ -11,7 +11,7 @@ from tyro.conf import arg
 
 from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
-from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, physical_report, report_line, table
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
@@ -34,7 +34,7 @@ FILMED = 0.3
 
 @dataclass(frozen=True)
 class Compare(StudyCommand):
-    """Options of `hexmj compare`, which `main.COMMANDS` describes."""
+    """Options of `hexmj compare`, which `commands.COMMANDS` describes."""
 
     models: Annotated[tuple[str, ...], arg(help=f"Controllers, each {CONTROLLER}.")] = ("ldvs", "uncoordinated")
     velocities: Sequence[float] = Comparison.velocities

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, hiding
-from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.measures.captions import of_starts
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.disturbance.frequencies import MEASURES
@@ -28,7 +29,7 @@ NEEDS = {"impulses": "push", "adhesion": "grasp", "recovery": "slow_down", "init
 
 @dataclass(frozen=True)
 class Disturb(StudyCommand):
-    """Options of `hexmj disturb`, which `main.COMMANDS` describes."""
+    """Options of `hexmj disturb`, which `commands.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: Sequence[float] = DisturbedWalks.velocities
@@ -89,7 +90,7 @@ class Disturb(StudyCommand):
             if measure in result:
                 yield from _tables(result, measure)
         found = (f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
-        starts = f"{self.starts} starts whose plan is stable until it is disturbed"
+        starts = f"{of_starts(self.starts)} whose plan is stable until it is disturbed"
         yield "takes off: how much lower than without a strategy, on the same starts"
         yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
         told = {
@@ -113,7 +114,7 @@ def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
     answered, slow = [n for n in shown if strategy[n] != "none"], [n for n in shown if strategy[n] == "slow_down"]
     least = result[f"{measure}_reached"].min().item()
     parts: list[str | Table] = [
-        f"{measure} FLSS from the disturbance on, at least {least} starts, with 95 % intervals"
+        f"{measure} FLSS from the disturbance on, at least {of_starts(least)}, with 95 % intervals"
         + (", to the end of the window, which begins at full velocity again" if slow else ""),
         _table(result.sel(window="whole").isel(case=shown), measure),
     ]

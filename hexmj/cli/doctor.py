@@ -7,7 +7,7 @@ from hexmj.cli.findings import report
 
 @dataclass(frozen=True)
 class Doctor:
-    """Options of `hexmj doctor`, which `main.COMMANDS` describes."""
+    """Options of `hexmj doctor`, which `commands.COMMANDS` describes."""
 
     json: bool = False
     """Print one JSON object on standard output, nothing else."""

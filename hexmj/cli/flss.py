@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import physical_report, print_json, report_line, save_figure, show, table
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
@@ -27,7 +27,7 @@ FINISHED = "walks"
 
 @dataclass(frozen=True)
 class Flss(WalkingCommand):
-    """Options of `hexmj flss`, which `main.COMMANDS` describes."""
+    """Options of `hexmj flss`, which `commands.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -91,6 +91,8 @@ class Flss(WalkingCommand):
         return [*files, save_manifest(self, settings(result), files, out / MANIFEST)]
 
     def _print(self, result: "xr.Dataset", files: list[Path]) -> None:
+        from hexmj.measures.captions import of_starts
+
         columns = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
         report = physical_report(result) if self.physical else {}
         if self.json:
@@ -102,7 +104,7 @@ class Flss(WalkingCommand):
         rows = [(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns)) for v, one in at.items()]
         lines = [self.conditions_line(self.physical), *([report_line(report)] if report else [])]
         show(
-            f"{self.kind} FLSS of {self.model}, {self.n_starts} starts",
+            f"{self.kind} FLSS of {self.model}, {of_starts(self.n_starts)}",
             table(("V", *columns), rows),
             *lines,
             *map(str, files),

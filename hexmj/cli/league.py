@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, arg
 from hexmj.cli.loaded import loaded
 from hexmj.cli.options import AS_THEY_ARE, CONTROLLER, STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.recorded import recorded
-from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
@@ -43,7 +43,7 @@ QUICK: dict[str, Any] = {"velocities": (0.1, 0.5, 0.9), "n_starts": 200, "n_phys
 
 @dataclass(frozen=True)
 class League(StudyCommand):
-    """Options of `hexmj league`, which `main.COMMANDS` describes."""
+    """Options of `hexmj league`, which `commands.COMMANDS` describes."""
 
     controllers: Annotated[
         tuple[str, ...] | None,

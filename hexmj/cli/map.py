@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Controlled, ControllerName, hiding
-from hexmj.cli.study import Outputs, StudyCommand
+from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
@@ -23,7 +23,7 @@ DIFFERENCES = ("dynamics", "change")
 
 @dataclass(frozen=True)
 class Map(StudyCommand):
-    """Options of `hexmj map`, which `main.COMMANDS` describes."""
+    """Options of `hexmj map`, which `commands.COMMANDS` describes."""
 
     over: Over = StabilityMap.over
     """The condition that is varied."""

@@ -16,7 +16,7 @@ NAME = "walk.html"
 
 @dataclass(frozen=True)
 class Page:
-    """Options of `hexmj page`, which `main.COMMANDS` describes."""
+    """Options of `hexmj page`, which `commands.COMMANDS` describes."""
 
     recordings: Positional[tuple[Path, ...]] = ()
     """One recording, or two side by side with one clock (recording.nc of `hexmj walk`)."""

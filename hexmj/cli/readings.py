@@ -7,7 +7,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import whole
 from hexmj.cli.manifest import MANIFEST, save_manifest
-from hexmj.cli.study import lists_of
+from hexmj.cli.study_command import lists_of
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show, table
 from hexmj.errors import InputError
@@ -19,7 +19,7 @@ from hexmj.storage.results import results_folder, save_dataset, save_text
 
 @dataclass(frozen=True)
 class Readings:
-    """Options of `hexmj readings`, which `main.COMMANDS` describes."""
+    """Options of `hexmj readings`, which `commands.COMMANDS` describes."""
 
     only: tuple[str, ...] | None = None
     """Named readings alone ('printed', 'lasting'); every combination of choices unless given."""

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.command import WalkingCommand
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.process.progress import progress_bar
 from hexmj.process.threads import check_memory

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional
 
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.recorded import walk_summary, walked_start
 from hexmj.cli.registry import changed
 from hexmj.cli.tables import print_json, show
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
 from hexmj.replay.film.film import MOST_PANELS, Film
@@ -31,7 +31,7 @@ LONGEST_NAME = 120
 
 @dataclass(frozen=True)
 class Render(WalkingCommand):
-    """Options of `hexmj render`, which `main.COMMANDS` describes."""
+    """Options of `hexmj render`, which `commands.COMMANDS` describes."""
 
     recordings: Positional[tuple[Path, ...]] = ()
     """One recording, or up to six side by side (recording.nc of `hexmj walk`); none: record a physical walk first, to

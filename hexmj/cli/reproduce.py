@@ -16,7 +16,7 @@ from hexmj.storage.results import results_folder
 
 @dataclass(frozen=True)
 class Reproduce:
-    """Options of `hexmj reproduce`, which `main.COMMANDS` describes."""
+    """Options of `hexmj reproduce`, which `commands.COMMANDS` describes."""
 
     quick: bool = False
     """Fewer starts and velocities, coarser steps of gaits, under a minute; the full protocol takes several."""

@@ -29,7 +29,7 @@ NOTHING = "nothing that the manifest knows of differs (files that your code read
 
 @dataclass(frozen=True)
 class Rerun:
-    """Options of `hexmj rerun`, which `main.COMMANDS` describes."""
+    """Options of `hexmj rerun`, which `commands.COMMANDS` describes."""
 
     result: Positional[Path]
     """A folder that a command wrote results to, or one manifest in it; of several in a folder, every one with numbers
@@ -140,7 +140,7 @@ def _check(path: Path, manifest: Manifest) -> None:
 
 def _repeat(path: Path, then: Manifest, more: list[str]) -> _Repeated:
     """Run the words of a manifest again, in a folder of their own, and compare what comes of them."""
-    from hexmj.cli.main import options_of
+    from hexmj.cli.commands import options_of
 
     words = deciding(then.command)
     with TemporaryDirectory(prefix="hexmj-rerun-") as folder:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.command import WalkingCommand
 from hexmj.cli.loaded import loaded
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, print_json, save_figure, show, table
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
 from hexmj.starts import SAMPLE
@@ -37,7 +37,7 @@ KEPT = "evaluations"
 
 @dataclass(frozen=True)
 class Search(WalkingCommand):
-    """Options of `hexmj search`, which `main.COMMANDS` describes."""
+    """Options of `hexmj search`, which `commands.COMMANDS` describes."""
 
     form: str = "ldvs"
     """Nine parameters (hws), ten with a neutral position that depends on the velocity (ldvs), or 29, in which only

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
-from hexmj.cli.study import Outputs, StudyCommand, lists_of
+from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions, Ground
+from hexmj.measures.captions import of_starts
 from hexmj.studies.terrain import study as terrain
 from hexmj.studies.terrain.figure import terrain_figure
 from hexmj.studies.terrain.study import FARTHER, VARIED, ObstacleKind
@@ -35,7 +36,7 @@ class _Ground(Ground):
 
 @dataclass(frozen=True)
 class Terrain(StudyCommand):
-    """Options of `hexmj terrain`, which `main.COMMANDS` describes."""
+    """Options of `hexmj terrain`, which `commands.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocities: Sequence[float] = terrain.Terrain.velocities
@@ -80,7 +81,7 @@ class Terrain(StudyCommand):
         """A table of the obstacles, and the conditions."""
         name = self.controlled.controller(self.model).name
         yield (
-            f"{name}, {self.starts} starts at each velocity: FLSS once the obstacle has been reached, with 95 %"
+            f"{name}, {of_starts(self.starts)} at each velocity: FLSS once the obstacle has been reached, with 95 %"
             " intervals; who falls on the way to it does not count"
         )
         yield _table(result, self.conditions.body.trunk)

@@ -17,7 +17,7 @@ END = "Ctrl-C ends it."
 
 @dataclass(frozen=True)
 class View:
-    """Options of `hexmj view`, which `main.COMMANDS` describes."""
+    """Options of `hexmj view`, which `commands.COMMANDS` describes."""
 
     recording: Positional[Path | None] = None
     """A recording (recording.nc of `hexmj walk`); none: an insect walks while you look, to which the options of walks

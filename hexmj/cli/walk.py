@@ -7,11 +7,11 @@ from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import print_json, save_figure, show
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.conditions import FootPath, TimeScale
 from hexmj.storage.results import results_folder
 
@@ -24,7 +24,7 @@ TIMES = ("planned loss", "measured loss", "fall")
 
 @dataclass(frozen=True)
 class Walk(WalkingCommand):
-    """Options of `hexmj walk`, which `main.COMMANDS` describes."""
+    """Options of `hexmj walk`, which `commands.COMMANDS` describes."""
 
     model: ControllerName = "ldvs"
     velocity: float = 0.3

@@ -39,8 +39,8 @@ WORDS = {
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """Between a condition's number and its unit, which stay in one line."""
 
-WALKS = {"starts": "{} starts", "window": "window {}", "seed": "seed {}"}
-"""What is told of the walks."""
+WALKS = {"window": "window {}", "seed": "seed {}"}
+"""What is told of the walks, beside the number of starts."""
 
 STRIDE = {"aep0": "AEP$_0$ = {:g} mm", "pep0": "PEP$_0$ = {:g} mm", "pep_min": "PEP_min = {:g} mm", "dt": "dt = {:g}"}
 """Field of a stride -> how it is told."""
@@ -129,11 +129,16 @@ def _walks(told: dict[str, Any]) -> list[str]:
     """Starts, window, seed and acceleration, as far as a result has them."""
     window = told.get("window")
     own = {"window": f"of {window:g} time units"} if isinstance(window, float) else {}
-    found = [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
-    found = ["1 start" if word == "1 starts" else word for word in found]
+    found = [of_starts(told["starts"])] if "starts" in told else []
+    found += [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
     if acceleration := told.get("acceleration"):
         found.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
     return found
+
+
+def of_starts(number: int) -> str:
+    """A number of starts in words."""
+    return "1 start" if number == 1 else f"{number} starts"
 
 
 def rules(controller: Any) -> str:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.command import WalkingCommand
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Figures
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
+from hexmj.cli.walking_command import WalkingCommand
 from hexmj.process.progress import progress_bar
 from hexmj.storage.attributes import settings
 from hexmj.storage.results import results_folder, save_dataset
