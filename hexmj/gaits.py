@@ -1,38 +1,23 @@
-"""Gaits (paper, Section 5.3): limit regimes, their period, duty factors and relative phases; reference gaits.
+"""Gaits (paper, Section 5.3): limit regimes, their period, duty factors and relative phases.
 
-A leg's movement is timed by its onsets, the instants at which it is raised and protraction begins.  The relative
-phase Phi_{j-k} is the time lag of leg k behind leg j, from onset to onset, divided by the period.  The paper prints
+A leg's movement is timed by its onsets, the instants at which it is raised and protraction begins.  The paper prints
 no event and no threshold: the onset, `TOLERANCE` and `CYCLES` are conventions of ours.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from hexmj.checks import numbers, short, typed
+from hexmj.checks import typed
 from hexmj.controllers.asking import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
-from hexmj.legs import MIRROR, N2
+from hexmj.phases import PAIRS, circular_mean
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import Walk, part_of
-
-PAIRS: dict[str, tuple[int, int]] = {
-    f"{j + 1}-{k + 1}": (j, k)
-    for j, k in [(front, rear) for front, behind in enumerate(N2) for rear in behind] + list(enumerate(MIRROR[:3]))
-}
-"""The paper's name j-k of each pair of neighbours -> their indices: four ipsilateral pairs, three contralateral.
-
-The paper's contralateral pairs (1-3), (2-4), (5-6) are taken for a misprint of 1-4, 2-5, 3-6.
-"""
-
-IPSILATERAL, CONTRALATERAL = slice(0, 4), slice(4, 7)
-"""Where the two kinds lie on a ``pair`` axis."""
 
 TOLERANCE = 0.002
 """A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
@@ -43,19 +28,11 @@ STEPS = 5
 CYCLES = 10
 """Fewest whole cycles of every leg that show a limit regime; some settle so slowly that three look alike too soon."""
 
-TRIPOD_PHASE = 0.5
-"""Tripod gait: all neighbouring legs move in anti-phase."""
-
-NEAR = 0.05
-"""Phases that differ by no more than this count as equal where a gait is named."""
-
 FINE = Stride(dt=0.01)
 """The stride with the time step of Figs. 5 and 6."""
 
 PART = 4096
 """Steps of a walk held in memory at a time."""
-
-GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "other"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,64 +141,6 @@ def limit_gait(
     time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
     return _with_stability(_regimes(row, foot, down, time, n_starts), np.concatenate(upright), time)
-
-
-def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Mean direction of phases on the circle [0, 1).
-
-    Raises:
-        InputError: no numbers, none at all, or no such axis.
-    """
-    angle, axis = 2.0 * np.pi * numbers("phase", phase), typed("axis", axis, int | None)
-    if axis is not None and not -angle.ndim <= axis < angle.ndim:
-        raise InputError(f"axis = {axis}; expected one of the {angle.ndim} of phase")
-    if not (angle.size if axis is None else angle.shape[axis]):
-        raise InputError(f"phase = {short(phase)}; expected at least one")
-    mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
-    return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
-
-
-def unrolled(phase: np.ndarray) -> np.ndarray:
-    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN."""
-    known = phase[np.isfinite(phase)]
-    middle = circular_mean(known) if len(known) else np.nan
-    return phase + (phase < middle - 0.5) - (phase > middle + 0.5)
-
-
-def wilson_phase(v: ArrayLike) -> np.ndarray:
-    """Ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
-
-    The paper says: a front leg begins protraction when the leg behind it ends its own (zero delay), and the duration
-    of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
-    V / (1 + V) of the period, and by that part the front leg lags behind.
-
-    Raises:
-        InputError: velocities that are none.
-    """
-    velocity = numbers("velocity", v)
-    if ((velocity < 0) | (velocity > 1)).any():
-        raise InputError(f"velocity = {short(v)}; expected 0 <= V <= 1")
-    return 1.0 / (1.0 + velocity)
-
-
-def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName:
-    """Name a gait by its phases, as Section 5.3 does.
-
-    Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'.  'tripod': so do those
-    along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
-    'negative metachrony': both between 0 and 0.5, front, middle, hind.
-    """
-    along = typed("phase_12", phase_12, float), typed("phase_23", phase_23, float)
-    typed("contralateral", contralateral, float)
-    if not abs(contralateral - 0.5) <= NEAR:
-        return "other"
-    if all(abs(phase - TRIPOD_PHASE) <= NEAR for phase in along):
-        return "tripod"
-    if all(0.5 < phase < 1.0 for phase in along):
-        return "positive metachrony"
-    if all(0.0 < phase < 0.5 for phase in along):
-        return "negative metachrony"
-    return "other"
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

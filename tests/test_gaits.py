@@ -13,21 +13,10 @@ from scipy.stats import circmean, circstd
 import hexmj.gaits
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.gaits import (
-    CONTRALATERAL,
-    CYCLES,
-    IPSILATERAL,
-    PAIRS,
-    Gait,
-    circular_mean,
-    classify,
-    gait,
-    limit_gait,
-    unrolled,
-    wilson_phase,
-)
+from hexmj.gaits import CYCLES, Gait, gait, limit_gait
 from hexmj.legs import FIG1, MIRROR
 from hexmj.measures.kinematic import walk
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, classify, unrolled, wilson_phase
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import Walk

@@ -7,8 +7,9 @@ import hexmj
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.controllers.rivals.phase_oscillators import BIASES, Oscillators, PhaseOscillators
 from hexmj.controllers.rivals.table import RIVALS
-from hexmj.gaits import PAIRS, gait
+from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
+from hexmj.phases import PAIRS
 from hexmj.timing import Stride
 
 GAITS = ("tripod", "tetrapod", "wave")

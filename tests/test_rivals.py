@@ -12,8 +12,9 @@ from hexmj.controllers.rivals.lifted import Lifted
 from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.controllers.rivals.table import RIVALS
 from hexmj.errors import InputError
-from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, gait, wilson_phase
+from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean, wilson_phase
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED
 

@@ -10,8 +10,9 @@ from hexmj.controllers.rivals.lifted import Legs
 from hexmj.controllers.rivals.table import RIVALS
 from hexmj.controllers.rivals.walknet import CURVE, REACOG, Reading, Walknet, sent_load
 from hexmj.errors import InputError
-from hexmj.gaits import IPSILATERAL, gait
+from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
+from hexmj.phases import IPSILATERAL
 from hexmj.timing import Stride
 
 L1, L2, L3, R1, R2, R3 = range(6)

@@ -19,12 +19,13 @@ from hexmj.controllers.asking import begin
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
-from hexmj.gaits import circular_mean, gait, limit_gait, wilson_phase
+from hexmj.gaits import gait, limit_gait
 from hexmj.legs import LEGS
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.paper.protocol import FULL
 from hexmj.paper.reproduce import measure
+from hexmj.phases import circular_mean, wilson_phase
 from hexmj.physics.settling import settle
 from hexmj.search import samples, stages
 from hexmj.walks import one_start, part_of

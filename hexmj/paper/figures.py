@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.diagrams import spans
-from hexmj.gaits import PAIRS, circular_mean, wilson_phase
 from hexmj.legs import LEGS
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
+from hexmj.phases import PAIRS, circular_mean, wilson_phase
 from hexmj.timing import WINDOWS
 
 if TYPE_CHECKING:

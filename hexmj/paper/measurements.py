@@ -11,10 +11,11 @@ import numpy as np
 
 from hexmj.controllers.asking import begin
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.gaits import PAIRS, limit_gait
+from hexmj.gaits import limit_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.paper.late_losses import lost_after, lost_at_periods
+from hexmj.phases import PAIRS
 from hexmj.starts import draw_starts
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hexmj.controllers.cruse1998 import Reading
-from hexmj.gaits import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
 from hexmj.intervals import WILSON_Z, wilson_interval
 from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.gaits import unrolled
 from hexmj.measures.captions import caption
 from hexmj.measures.figures import tidy
 from hexmj.measures.parts import check_starts
+from hexmj.phases import unrolled
 from hexmj.studies.biology.animals import ANIMALS
 from hexmj.studies.biology.names import JOINTS, PHASES, SEGMENTS
 from hexmj.studies.biology.study import walked

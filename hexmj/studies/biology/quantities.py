@@ -7,9 +7,9 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.grounds import ground_level
 from hexmj.bodies.reading import joint_numbers, posed
-from hexmj.gaits import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.legs import SIDE
 from hexmj.measures.walk_settings import WalkSettings
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.physics.settling import settle
 from hexmj.process.threads import check_memory
 from hexmj.rotations import heading, rotated, turned

@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 from hexmj.checks import whole
 from hexmj.controllers.asking import check_velocities
 from hexmj.errors import InputError
-from hexmj.gaits import unrolled
+from hexmj.phases import unrolled
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
 from hexmj.studies.biology.names import PHASES, UNITS
 from hexmj.studies.same_starts import SameStarts

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.controllers.leg_lost import LegLost
-from hexmj.gaits import CONTRALATERAL, IPSILATERAL, circular_mean, limit_gait
+from hexmj.gaits import limit_gait
 from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.league.entrant import Entrant
 from hexmj.timing import Acceleration, Stride, observation_time

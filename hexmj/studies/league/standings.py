@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.gaits import circular_mean
+from hexmj.phases import circular_mean
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
