@@ -126,6 +126,7 @@ class Ablation:
 
     def cells(self) -> list[Cell]:
         """Every controller, velocity and measure; see `sweeps.Study`."""
+        from hexmj.physics.settling import check_adhesion
         from hexmj.studies.league import in_physics
 
         def cell(name: str, measure: str, velocity: float, time: float) -> Cell:
@@ -143,6 +144,7 @@ class Ablation:
 
         for one in self.controllers.values():
             check_velocities(one, self.velocities, self.stride)
+        check_adhesion(self.conditions, self.stride, self.seed)
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         return [cell(name, measure, *one) for name in self.controllers for measure in MEASURES for one in at]
 

@@ -105,9 +105,12 @@ class League:
 
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`."""
+        from hexmj.physics.settling import check_adhesion
+
         for entrant in self.entrants.values():
             random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
             check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
+        check_adhesion(self.conditions, self.stride, self.seed)
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

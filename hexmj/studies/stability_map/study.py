@@ -92,6 +92,7 @@ class StabilityMap(SameStarts):
 
     def cells(self) -> list[Cell]:
         """A cell for each value and velocity; see `sweeps.Study`."""
+        from hexmj.physics.settling import check_adhesion
         from hexmj.studies.stability_map.fates import fates
 
         def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
@@ -100,6 +101,8 @@ class StabilityMap(SameStarts):
             return Cell(name, fates, {"walks": self.walks(velocity, time, conditions), "over": self.over}, work)
 
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
+        for one in self.varied:
+            check_adhesion(one, self.stride, self.seed)
         return [cell(one, v, time) for one in self.varied for v, time in zip(*self.observed, strict=True)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

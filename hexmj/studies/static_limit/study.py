@@ -64,6 +64,7 @@ class StaticLimit(SameStarts):
 
     def cells(self) -> list[Cell]:
         """A cell for each mass of the legs and V_p; see `sweeps.Study`."""
+        from hexmj.physics.settling import check_adhesion
         from hexmj.studies.static_limit.distances import distance_table
 
         def cell(conditions: Conditions) -> Cell:
@@ -71,6 +72,8 @@ class StaticLimit(SameStarts):
             walks = self.walks(self.velocity, self.duration, conditions)
             return Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride))
 
+        for one in self.varied:
+            check_adhesion(one, self.stride, self.seed)
         return [cell(one) for one in self.varied]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
