@@ -10,7 +10,7 @@ import pytest
 
 from hexmj import LDVS, Film, draw_starts, physical_walk, record, render
 from hexmj.bodies.loading import compile_body
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 from hexmj.replay.take import Take
 
 FLSS = "-m", "hexmj", "flss", "--velocities", "0.5"

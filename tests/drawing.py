@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 
 drawing = pytest.mark.skipif(
     not os.environ.get("CI") and gl.missing() is not None,

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from drawing import drawing
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 
 KEPT = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
 
@@ -19,7 +19,7 @@ before = dict(os.environ)
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 import hexmj.measures.compare, hexmj.replay.recording, hexmj.replay.film.video
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 assert dict(os.environ) == before, "changed by importing"
 usual = mujoco.GLContext
 assert usual.__module__ == "mujoco.glfw"
@@ -56,7 +56,7 @@ assert not {"OpenGL", "mujoco.egl", "dm_control"} & {*sys.modules}, "there may b
 
 FORKED = """
 import multiprocessing
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 
 def told(_):
     return gl.missing() or "drawn"

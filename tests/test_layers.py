@@ -23,7 +23,7 @@ FLOORS = (
     ("bodies.description", "bodies.stick_insect", "conditions"),
     ("bodies",),
     ("physics",),
-    ("measures",),
+    ("measures", "rendering"),
     ("paper", "search", "studies"),
     ("environments", "plots", "replay", "view"),
     ("registering",),

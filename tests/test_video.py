@@ -20,7 +20,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.overlay import Overlay, _ticks
 from hexmj.replay.film.video import _view, render
@@ -284,7 +284,7 @@ def test_without_what_encodes_films_it_is_said_what_brings_it(fallen, tmp_path, 
 def test_whether_anything_can_be_rendered_is_known():
     assert gl.missing() is None
     kept = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
-    program = "from hexmj.replay.film import gl; gl.missing(); print(gl.missing())"
+    program = "from hexmj.rendering import gl; gl.missing(); print(gl.missing())"
     for backend in ("glfw", "disable"):
         done = subprocess.run(
             [sys.executable, "-W", "error", "-c", program],

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from hexmj.process.threads import cores
-from hexmj.replay.film.gl import PACKAGES
+from hexmj.rendering.gl import PACKAGES
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where Linux tells how much processor time a container gets: microseconds of it, or max, in each period; elsewhere
@@ -23,7 +23,7 @@ RENDERING = """
 import mujoco
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 model = compile_body(Conditions()).model
 data = mujoco.MjData(model)
 mujoco.mj_forward(model, data)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hexmj.errors import InputError
-from hexmj.replay.film.gl import drop_vain_wish
+from hexmj.rendering.gl import drop_vain_wish
 from hexmj.storage.literal import literal
 
 NARROWEST = 40

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import glfw
 import numpy as np
 
-from hexmj.replay.film.gl import import_what_clashes
+from hexmj.rendering.gl import import_what_clashes
 
 with warnings.catch_warnings():
     if "MUJOCO_GL" not in os.environ:  # without a screen GLFW only warns, and dm_control would never come to EGL

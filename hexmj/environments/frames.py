@@ -14,7 +14,7 @@ import numpy as np
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
-from hexmj.replay.film import gl
+from hexmj.rendering import gl
 
 if TYPE_CHECKING:
     from mujoco import Renderer

@@ -16,8 +16,8 @@ from hexmj.bodies.loading import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import without_extra
 from hexmj.legs import LEGS
-from hexmj.replay.film.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
-from hexmj.replay.page.shapes import body_shape, ground_shape
+from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
+from hexmj.rendering.shapes import body_shape, ground_shape
 from hexmj.replay.take import support_on_ground
 from hexmj.view.charts import CHARTED, footfall, readout
 from hexmj.view.live import LiveWalk, Moment

@@ -15,7 +15,7 @@ import numpy as np
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
-from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.take import support_on_ground
 from hexmj.view.session import IMPULSE, LiveSession, ReplaySession, ticks
 

@@ -16,10 +16,11 @@ from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.process.progress import Progress, shown
-from hexmj.replay.film import encoder, gl
+from hexmj.rendering import gl
+from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.replay.film import encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay
-from hexmj.replay.film.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.take import Take, support_on_ground, takes_of
 from hexmj.storage.files import replacing
 

@@ -11,7 +11,7 @@ from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions, unusual
 from hexmj.legs import LEGS
-from hexmj.replay.page.shapes import body_shape, ground_shape
+from hexmj.rendering.shapes import body_shape, ground_shape
 from hexmj.replay.take import Take, support_on_ground
 
 APART = 0.005

@@ -70,7 +70,7 @@ def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Render
     """
     from mujoco.rendering.classic import gl_context
 
-    from hexmj.replay.film.renderer import Renderer
+    from hexmj.rendering.renderer import Renderer
 
     check_not_forked()
     usual, gl_context.GLContext = gl_context.GLContext, context_type()
@@ -128,7 +128,7 @@ def missing() -> str | None:
 
         if not hasattr(mujoco, "Renderer"):
             return _sentence("MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none")
-        from hexmj.replay.film.renderer import kept_current
+        from hexmj.rendering.renderer import kept_current
 
         with kept_current(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns where there is no screen, and makes no context

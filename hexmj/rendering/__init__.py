@@ -1,0 +1,1 @@
+"""What is drawn anywhere: how MuJoCo renders without harm, marks in its scenes, and bodies as triangles."""
