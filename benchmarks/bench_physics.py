@@ -9,7 +9,7 @@ import pytest
 from mujoco.batch import Batch
 
 from hexmj import LDVS, ReadsLegs, compare, draw_starts
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.backend import STATE
 from hexmj.physics.callbacks import STOPPED_CLOCK

@@ -7,7 +7,7 @@ unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import hexmj.process.beginning  # first of all
+import hexmj.process.early_stops  # first of all
 import hexmj.registering
 import hexmj.user_code.opened_files  # from now on
 import hexmj.user_code.sources_as_run  # noqa: F401

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.checks import typed
 from hexmj.errors import InputError
-from hexmj.measures.parts import check_axes, check_window, what_parts_may_lack
+from hexmj.measures.drawable_parts import check_axes, check_window, what_parts_may_lack
 
 if TYPE_CHECKING:
     import xarray as xr

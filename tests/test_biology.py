@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import cfunc
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.environments import dm

@@ -10,7 +10,7 @@ import xarray as xr
 
 from hexmj import HWS, LDVS, UNCOORDINATED, Acceleration, Cruse1998, InputError, ReadsLegs, Stride
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Sensed

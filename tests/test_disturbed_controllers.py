@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsLegs, Stride, physical_walk
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import is_steerable
 from hexmj.controllers.rivals.table import RIVALS
 from hexmj.starts import draw_starts

@@ -7,15 +7,15 @@ from importlib import metadata
 import pytest
 
 from drawing import drawing
-from hexmj.cli import machine
-from hexmj.cli.machine import CHECKS, Unfit, examine
+from hexmj.cli import machine_checks
+from hexmj.cli.machine_checks import CHECKS, Unfit, examine
 from hexmj.errors import SimulationError
 from hexmj.measures import physical
 from hexmj.process import threads
 
 
 def only(monkeypatch, name: str) -> None:
-    monkeypatch.setattr(machine, "CHECKS", {name: CHECKS[name]})
+    monkeypatch.setattr(machine_checks, "CHECKS", {name: CHECKS[name]})
 
 
 @drawing
@@ -28,26 +28,26 @@ def test_this_machine_is_fit(run):
 
 
 def an_old_mujoco(monkeypatch, tmp_path):
-    monkeypatch.setattr(machine, "version", lambda name: "4.0.0" if name == "mujoco" else metadata.version(name))
+    monkeypatch.setattr(machine_checks, "version", lambda name: "4.0.0" if name == "mujoco" else metadata.version(name))
 
 
 def a_missing_package(monkeypatch, tmp_path):
-    monkeypatch.setattr(machine, "requires", lambda name: [*(metadata.requires(name) or []), "no-such-package"])
+    monkeypatch.setattr(machine_checks, "requires", lambda name: [*(metadata.requires(name) or []), "no-such-package"])
 
 
 def test_extras_need_not_be_installed(run, monkeypatch):
     only(monkeypatch, "versions")
-    monkeypatch.setattr(machine, "requires", lambda name: ["mujoco", 'no-such-package; extra == "rl"'])
+    monkeypatch.setattr(machine_checks, "requires", lambda name: ["mujoco", 'no-such-package; extra == "rl"'])
     assert run("doctor")[0] == 0
 
 
 def an_old_python(monkeypatch, tmp_path):
-    monkeypatch.setattr(machine.platform, "python_version", lambda: "3.10.4")
+    monkeypatch.setattr(machine_checks.platform, "python_version", lambda: "3.10.4")
 
 
 def a_small_quota(monkeypatch, tmp_path):
     (tmp_path / "cpu.max").write_text("50000 100000\n")
-    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(machine_checks, "QUOTA", tmp_path / "cpu.max")
 
 
 def no_driver(monkeypatch, tmp_path):
@@ -62,7 +62,7 @@ def no_cache(monkeypatch, tmp_path):
     def refuse(dir: str) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(machine.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(machine_checks.tempfile, "TemporaryFile", refuse)
 
 
 def no_walk(monkeypatch, tmp_path):
@@ -110,26 +110,26 @@ def test_one_failure_does_not_hide_the_others(monkeypatch):
     def broken() -> str:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(machine, "CHECKS", {"first": (broken, "mend it"), "second": (lambda: "all is well", "")})
+    monkeypatch.setattr(machine_checks, "CHECKS", {"first": (broken, "mend it"), "second": (lambda: "all is well", "")})
     first, second = examine()
     assert (first.well, first.found, first.remedy) == (False, "ZeroDivisionError", "mend it")
     assert (second.well, second.found) == (True, "all is well")
 
 
 def test_quotas_are_read_where_there_are_any(monkeypatch, tmp_path):
-    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
-    assert "one for each core" in machine.threads()
+    monkeypatch.setattr(machine_checks, "QUOTA", tmp_path / "cpu.max")
+    assert "one for each core" in machine_checks.threads()
     (tmp_path / "cpu.max").write_text("max 100000\n")
-    assert "one for each core" in machine.threads()
+    assert "one for each core" in machine_checks.threads()
     (tmp_path / "cpu.max").write_text("1000 100000\n")
     with pytest.raises(Unfit, match=r"share 0\.01 cores"):
-        machine.threads()
+        machine_checks.threads()
 
 
 def test_elsewhere_there_is_no_quota_and_all_cores_are_counted(monkeypatch, tmp_path):
     """Linux alone tells which cores a process may use, and what a container is granted."""
-    monkeypatch.setattr(machine, "QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(machine_checks, "QUOTA", tmp_path / "cpu.max")
     monkeypatch.setattr(threads.sys, "platform", "darwin")
     monkeypatch.delattr(threads.os, "sched_getaffinity", raising=False)
     assert threads.cores() >= 1
-    assert machine.threads().startswith(str(threads.cores()))
+    assert machine_checks.threads().startswith(str(threads.cores()))

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 import hexmj
+from hexmj.cli.command_words import checked
 from hexmj.cli.commands import options_of
-from hexmj.cli.words import checked
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller
 

@@ -13,7 +13,7 @@ from hexmj.controllers.rivals.metronomes import Metronome
 from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
 from hexmj.errors import InputError
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.entrants import EVERYONE, entrants
+from hexmj.studies.league.entrants_by_name import EVERYONE, entrants
 from hexmj.studies.league.study import League
 from hexmj.studies.league.trials import TRIALS
 from hexmj.studies.short_names import short_names

@@ -5,7 +5,7 @@ import pytest
 
 from episodes import KINDS, ZEROS, episode, run_steps
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs

@@ -15,7 +15,7 @@ from hexmj.intervals import paired_difference
 from hexmj.measures.captions import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.entrants import entrants
+from hexmj.studies.league.entrants_by_name import entrants
 from hexmj.studies.league.figure import FEWER, NOTHING, league_figure, walks_figure
 from hexmj.studies.league.on_paper import losses
 from hexmj.studies.league.study import League

@@ -19,7 +19,7 @@ from hexmj.studies.biology.study import Biology
 from hexmj.studies.biology.table import biology_markdown
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
 from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.studies.league.entrants import entrants
+from hexmj.studies.league.entrants_by_name import entrants
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import league_markdown
 from hexmj.studies.stability_map.study import StabilityMap

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, SimulationError

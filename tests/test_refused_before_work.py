@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
 from hexmj.physics.settling import check_adhesion

@@ -7,7 +7,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers import Step, stepwise
-from hexmj.controllers.asking import advanced
+from hexmj.controllers.checked_plans import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from hexmj.cli.command_words import deciding, files
 from hexmj.cli.rerun import _Repeated
-from hexmj.cli.words import deciding, files
 from hexmj.paper.protocol import QUICK
 from hexmj.storage import netcdf
 from hexmj.storage.files import digest, sealed, write_whole

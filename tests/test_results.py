@@ -55,7 +55,7 @@ def study(name: str) -> xr.Dataset:
     from hexmj.studies.ablation.study import Ablation, switched
     from hexmj.studies.biology.study import Biology
     from hexmj.studies.disturbance.study import DisturbedWalks
-    from hexmj.studies.league.entrants import entrants
+    from hexmj.studies.league.entrants_by_name import entrants
     from hexmj.studies.league.study import League
     from hexmj.studies.stability_map.study import StabilityMap
     from hexmj.studies.static_limit.study import StaticLimit

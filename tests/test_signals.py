@@ -50,7 +50,7 @@ def test_before_it_hears_them(by, how):
     words = [sys.executable, "-X", "importtime", *how, "flss"]
     with subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE) as running:
         assert running.stderr
-        while b"hexmj.process.beginning" not in running.stderr.readline():
+        while b"hexmj.process.early_stops" not in running.stderr.readline():
             assert running.poll() is None
         running.send_signal(by)
         told = running.stderr.read()

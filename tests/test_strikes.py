@@ -13,7 +13,7 @@ from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.loading import compile_body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs

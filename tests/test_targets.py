@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError

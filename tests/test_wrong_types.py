@@ -15,7 +15,7 @@ import xarray as xr
 import hexmj
 from hexmj.checks import typed
 from hexmj.conditions import Ground, Masses, TimeScale
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.additions import complete
-from hexmj.bodies.checks import check_described
+from hexmj.bodies.check_described import check_described
+from hexmj.bodies.check_finished import check_finished
 from hexmj.bodies.compiled import CompiledBody, measured
 from hexmj.bodies.description import Body
-from hexmj.bodies.finished import check_finished
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
 from hexmj.bodies.reading import posed

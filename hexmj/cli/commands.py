@@ -12,8 +12,8 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
+from hexmj.cli.command_words import shell
 from hexmj.cli.completion import completed
-from hexmj.cli.words import shell
 from hexmj.version import __version__
 
 ABOUT = (

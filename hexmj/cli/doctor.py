@@ -14,6 +14,6 @@ class Doctor:
 
     def run(self) -> None:
         """One line for each check."""
-        from hexmj.cli.machine import examine
+        from hexmj.cli.machine_checks import examine
 
         report(examine(), self.json)

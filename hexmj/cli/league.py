@@ -19,7 +19,7 @@ from hexmj.replay.film.film import Film
 from hexmj.storage.literal import literal
 from hexmj.storage.results import save_text
 from hexmj.studies.league import study
-from hexmj.studies.league.entrants import EVERYONE, FOUR, entrants
+from hexmj.studies.league.entrants_by_name import EVERYONE, FOUR, entrants
 from hexmj.studies.league.figure import league_figure, walks_figure
 from hexmj.studies.league.table import by_rank, league_markdown, tables
 

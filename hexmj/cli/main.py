@@ -9,10 +9,10 @@ from io import StringIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
-from hexmj.cli import answers
+from hexmj.cli import answer_stream
+from hexmj.cli.command_words import checked, typed
 from hexmj.cli.commands import COMMANDS, GOES_ON, options_of
 from hexmj.cli.surroundings import settle
-from hexmj.cli.words import checked, typed
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.process.signals import of_stop
 from hexmj.storage.literal import literal
@@ -41,7 +41,7 @@ def main() -> None:
             settle()
             with nullcontext() if sys.stdout else redirect_stdout(StringIO()):  # tyro asks it how wide it is
                 options = options_of(words := checked(sys.argv[1:]))
-            with typed(words), answers.alone() if getattr(options, "json", False) else nullcontext():
+            with typed(words), answer_stream.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
         except BaseException as error:
             if of_stop(error):

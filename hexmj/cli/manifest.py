@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.cli import words
+from hexmj.cli import command_words
 from hexmj.cli.loaded import check_loaded
 from hexmj.errors import InputError
 from hexmj.storage.files import DIGEST, WRITTEN, digest_of, read_text
@@ -78,8 +78,8 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
         InputError: the code, or what a controller names, was edited meanwhile, or a file cannot be written or read.
     """
     check_loaded()
-    typed = words.command()
-    own = {str(file): one for file, one in words.own().items()}
+    typed = command_words.command()
+    own = {str(file): one for file, one in command_words.own().items()}
     made = code(frozenset({type(command).__module__, *_modules(typed)}))
     told = Manifest(
         command=typed,
@@ -180,11 +180,11 @@ def _modules(typed: Sequence[str]) -> Iterator[str]:
     from hexmj.controllers.named import ENTRY_POINTS
 
     points = {point.name: point.module for point in entry_points(group=ENTRY_POINTS)}
-    for file, stamp in words.own().items():
+    for file, stamp in command_words.own().items():
         if file.suffix == ".py":
             name = module_name(file.absolute(), stamp)
             yield name if name in sys.modules else importable(file).__name__
-    for name in words.named(typed):
+    for name in command_words.named(typed):
         module = points.get(name) or name.rpartition(":")[0]
         if (getattr(sys.modules.get(module), "__file__", None) or "").endswith(".py"):
             yield module

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
+from hexmj.cli.command_words import deciding, typed
 from hexmj.cli.manifest import Manifest, changed_files, differences, manifests, told
 from hexmj.cli.tables import print_json, show, table
-from hexmj.cli.words import deciding, typed
 from hexmj.errors import InputError, SimulationError
 from hexmj.storage.same_numbers import Compared, compared, holds_numbers
 

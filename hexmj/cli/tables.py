@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.answers import ANSWERS
+from hexmj.cli.answer_stream import ANSWERS
 from hexmj.storage import results
 from hexmj.storage.literal import literal
 from hexmj.storage.results import json_text

@@ -107,7 +107,7 @@ class WalkingCommand:
         Raises:
             InputError: it is not the usual one.
         """
-        from hexmj.controllers.asking import begin
+        from hexmj.controllers.checked_plans import begin
         from hexmj.starts import draw_starts
 
         gap, stride = self.conditions.numerics.contact_gap, self.walks.stride

@@ -1,8 +1,8 @@
 """Does a controller keep the laws of `protocol`?  `check_controller` asks, from pytest or the command line.
 
 Every law is one function of a trial, a controller with starts, velocities and a stride; it raises a sentence on the
-first thing that is wrong, as `asking` does for all who walk.  On paper nobody knows the legs, so reach is that of the
-stride: tips within `REACH` of its range.
+first thing that is wrong, as `checked_plans` does for all who walk.  On paper nobody knows the legs, so reach is that
+of the stride: tips within `REACH` of its range.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.asking import advanced, place, said
+from hexmj.controllers.checked_plans import advanced, place, said
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, claims_mirrored, is_steerable, settings_of
 from hexmj.controllers.reading_law import told

@@ -4,7 +4,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, said
+from hexmj.controllers.checked_plans import advanced, said
 from hexmj.controllers.protocol import FastLosses, Plan, goes_with
 from hexmj.errors import InputError
 from hexmj.stability import walk_margin

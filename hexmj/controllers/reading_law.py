@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, tell
+from hexmj.controllers.checked_plans import advanced, tell
 from hexmj.controllers.protocol import ReadingPlan, Sensed
 from hexmj.controllers.trial import Trial, every_other, mixed, same
 from hexmj.errors import InputError

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, said
+from hexmj.controllers.checked_plans import advanced, said
 from hexmj.controllers.protocol import SteerablePlan, is_steerable
 from hexmj.controllers.trial import Trial, every_other, mixed, same
 from hexmj.errors import InputError

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, begin, begin_at_speed, difference
+from hexmj.controllers.checked_plans import advanced, begin, begin_at_speed, difference
 from hexmj.controllers.protocol import Controller, Plan, SteerableController
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride

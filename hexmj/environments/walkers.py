@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.controllers.asking import advanced, begin, tell
+from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
 from hexmj.environments.observing import Observer, Places, Planned

@@ -9,7 +9,7 @@ import numpy as np
 
 from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals

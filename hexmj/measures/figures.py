@@ -6,7 +6,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.measures.captions import caption, conditions
-from hexmj.measures.parts import check_starts
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.storage.attributes import settings
 from hexmj.storage.literal import in_figure
 

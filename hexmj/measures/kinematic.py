@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import check_types, given, typed, whole
-from hexmj.controllers.asking import advanced, begin, check_velocities
+from hexmj.controllers.checked_plans import advanced, begin, check_velocities
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError

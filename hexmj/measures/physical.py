@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.checks import given, typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin, check_repeats, check_same
+from hexmj.controllers.checked_plans import begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk

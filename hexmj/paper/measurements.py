@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.gaits import limit_gait
 from hexmj.legs import LEGS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import SteerableController
 from hexmj.studies.disturbance.disturbances import disturbance_of, find_stable_starts

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from hexmj.controllers.asking import tell
+from hexmj.controllers.checked_plans import tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan

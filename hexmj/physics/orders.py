@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import advanced, check_plan, said
+from hexmj.controllers.checked_plans import advanced, check_plan, said
 from hexmj.controllers.protocol import Plan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips

@@ -11,7 +11,7 @@ import numpy as np
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Bound, Conditions
-from hexmj.controllers.asking import begin, begin_at_speed, said, tell
+from hexmj.controllers.checked_plans import begin, begin_at_speed, said, tell
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, SteerablePlan, is_steerable
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.measured import measured_walk

@@ -29,7 +29,7 @@ from pydrake.all import (  # pyright: ignore[reportMissingImports]
 from pydrake.common.eigen_geometry import Quaternion  # pyright: ignore[reportMissingImports]
 
 from hexmj.bodies.description import ROOT_QPOS
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.intervals import wilson_interval
 from hexmj.measures.physical import physical_outcomes

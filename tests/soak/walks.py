@@ -24,7 +24,7 @@ import numpy as np
 
 import hexmj
 from hexmj.bodies.description import Body
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998, Weights
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs

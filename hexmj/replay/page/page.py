@@ -11,7 +11,7 @@ from hexmj.bodies.description import Body
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
-from hexmj.replay.page.shown import shown
+from hexmj.replay.page.page_data import shown
 from hexmj.replay.take import takes_of
 from hexmj.storage.files import write_whole
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError

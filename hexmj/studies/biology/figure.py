@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.measures.captions import caption
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import tidy
-from hexmj.measures.parts import check_starts
 from hexmj.phases import unrolled
 from hexmj.studies.biology.animals import ANIMALS
 from hexmj.studies.biology.names import JOINTS, PHASES, SEGMENTS

@@ -7,7 +7,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.physics.drive import Chunk, drive
 from hexmj.physics.settling import Settled

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from hexmj.checks import whole
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError
 from hexmj.phases import unrolled
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from hexmj.measures.parts import check_axes, what_parts_may_lack
+from hexmj.measures.drawable_parts import check_axes, what_parts_may_lack
 from hexmj.storage.markdown import markdown_table
 from hexmj.studies.biology.animals import SOURCES
 

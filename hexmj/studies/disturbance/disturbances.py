@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from hexmj.controllers.asking import advanced, begin
+from hexmj.controllers.checked_plans import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss

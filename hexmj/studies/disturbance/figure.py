@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption_of_at_least
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import frequency_curve, tidy, velocity_ticks
-from hexmj.measures.parts import check_starts
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
 
 if TYPE_CHECKING:

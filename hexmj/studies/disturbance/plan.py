@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.controllers.asking import begin_at_speed
+from hexmj.controllers.checked_plans import begin_at_speed
 from hexmj.controllers.protocol import ReadingPlan, Sensed, SteerableController, SteerablePlan, check_steerable
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import REPEATED, advanced, begin, check_repeats
+from hexmj.controllers.checked_plans import REPEATED, advanced, begin, check_repeats
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController
 from hexmj.controllers.reads_legs import ReadsLegs

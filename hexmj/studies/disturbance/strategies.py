@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.controllers.asking import begin
+from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import limit_gait

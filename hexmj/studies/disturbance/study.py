@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed

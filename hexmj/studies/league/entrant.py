@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from hexmj.checks import check_types, numbers
-from hexmj.controllers.asking import begin, said
+from hexmj.controllers.checked_plans import begin, said
 from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type, is_steerable
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin, check_repeats
+from hexmj.controllers.checked_plans import begin, check_repeats
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.measures.frequency import over_start

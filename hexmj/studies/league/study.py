@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.checks import check_types, typed, whole
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed

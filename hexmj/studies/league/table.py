@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.measures.captions import of_starts, rules
-from hexmj.measures.parts import check_axes, check_whole, what_parts_may_lack
+from hexmj.measures.drawable_parts import check_axes, check_whole, what_parts_may_lack
 from hexmj.storage.attributes import settings
 from hexmj.storage.markdown import markdown_table
 from hexmj.studies.league.trials import LEGS_LOST, TOLD

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption
-from hexmj.measures.parts import check_starts
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.studies.stability_map.mechanisms import SAVED
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import begin, check_velocities
+from hexmj.controllers.checked_plans import begin, check_velocities
 from hexmj.controllers.protocol import ReadingPlan
 from hexmj.errors import InputError, check_distinct
 from hexmj.measures.velocities import observed, velocity_axis

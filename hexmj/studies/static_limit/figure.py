@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from hexmj.measures.captions import caption
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import MEASURE_COLOURS, frequency_curve, tidy
-from hexmj.measures.parts import check_starts
 
 if TYPE_CHECKING:
     import xarray as xr

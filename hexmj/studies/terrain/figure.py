@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.measures.captions import caption_of_at_least
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import frequency_curve, tidy
-from hexmj.measures.parts import check_starts
 
 if TYPE_CHECKING:
     import xarray as xr

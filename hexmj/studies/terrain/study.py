@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.asking import check_velocities
+from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError, check_distinct
 from hexmj.starts import checked_list
 from hexmj.studies.same_starts import SameStarts

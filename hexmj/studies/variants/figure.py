@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from hexmj.measures.captions import caption, of_starts
+from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import tidy
-from hexmj.measures.parts import check_starts
 from hexmj.storage.literal import in_figure
 from hexmj.studies.variants.study import notes
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from hexmj.bodies.check_finished import MASS_TOLERANCE
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
-from hexmj.bodies.finished import MASS_TOLERANCE
 from hexmj.bodies.reading import segments
 from hexmj.errors import InputError
 

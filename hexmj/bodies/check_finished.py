@@ -1,6 +1,6 @@
 """What the model that walks has to be, after everything was added: whatever hexmj takes for granted, as tables.
 
-`hexmj.bodies.checks` asks whether an MJCF is what its description says.  But MJCF has defaults, classes, flags and
+`check_described` asks whether an MJCF is what its description says.  But MJCF has defaults, classes, flags and
 overrides besides, so here nothing is asked but the finished model.
 """
 
