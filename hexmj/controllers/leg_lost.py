@@ -1,4 +1,7 @@
-"""A controller that has lost a leg and does not know: the leg is held up, whatever it is told, and never stands."""
+"""A controller that has lost a leg and does not know: the leg is held up, whatever it is told.
+
+A body that tips far enough onto it comes down on it.
+"""
 
 import math
 from dataclasses import dataclass, replace
