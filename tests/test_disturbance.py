@@ -1,37 +1,21 @@
-"""Disturbed walks: the plan that meets a disturbance, the strategies, the frequencies and the experiment."""
+"""Disturbed walks: the plan that meets a disturbance, and the strategies."""
 
-import json
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from hexmj import HWS, LDVS, UNCOORDINATED, Acceleration, Cruse1998, InputError, ReadsLegs, Stride
-from hexmj.conditions import Conditions
+from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, ReadsLegs, Stride
 from hexmj.controllers.checked_plans import begin
-from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.reads_legs import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance import disturbances
-from hexmj.studies.disturbance.cases import Case, every_case
-from hexmj.studies.disturbance.disturbances import (
-    SETTLED,
-    Disturbance,
-    TooFewStable,
-    disturbance_of,
-    find_stable_starts,
-)
-from hexmj.studies.disturbance.frequencies import with_flss_after
+from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed, DisturbedPlan
-from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.disturbance.strategies import Postures, collect_postures, reorganise
 from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.sweeps import conduct
 
 STRIDE, V, GRID = Stride(), 0.5, 20
 STABLE = find_stable_starts(LDVS, V, 6, 0, STRIDE, GRID)
@@ -183,89 +167,12 @@ def test_a_reorganised_walk_goes_on_with_the_posture_s_states(postures):
         assert not whole.velocity[step:resumed, start].any() and whole.velocity[resumed, start] == V
 
 
-def test_starts_are_stable_until_disturbed_and_do_not_depend_on_their_number():
-    period = 20 * (1 + 1 / V) / STRIDE.dt
-    assert (STABLE.step % GRID == 0).all()
-    assert ((STABLE.step >= SETTLED * period) & (STABLE.step < (SETTLED + 1) * period + GRID)).all()
-    assert np.isinf(first_loss(STABLE.starts, LDVS, V, STABLE.step * STRIDE.dt)).all()
-    more = find_stable_starts(LDVS, V, 50, 0, STRIDE, GRID)
-    for name in ("starts", "step", "draw"):
-        assert np.array_equal(getattr(more, name)[:6], getattr(STABLE, name))
-
-
-def test_as_many_starts_are_drawn_as_are_said_to_be(monkeypatch):
-    """Of a controller that never keeps stability, in place of the hours that this would take."""
-    drawn = []
-
-    def lost(starts, *how, **also):
-        drawn.append(len(starts))
-        return np.zeros(len(starts))
-
-    monkeypatch.setattr(disturbances, "first_loss", lost)
-    monkeypatch.setattr(disturbances, "MOST_DRAWN", 100)
-    with pytest.raises(TooFewStable, match="not so many of 100 keep"):
-        find_stable_starts(LDVS, 0.9, 30, 0, Stride(), 1)
-    assert drawn == [30, 60, 100]
-    with pytest.raises(TooFewStable, match="starts = 101;"):
-        find_stable_starts(LDVS, 0.9, 101, 0, Stride(), 1)
-    assert drawn == [30, 60, 100], "more than are ever drawn are refused at once"
-
-
-@dataclass(frozen=True)
-class Unsure:
-    """LDVS that draws random numbers without a seed, from one of the methods by which it begins."""
-
-    method: str
-    name: str = "unsure"
-
-    def begin(self, starts, velocity, *how):
-        return self._plan("begin", starts, velocity, *how)
-
-    def begin_at_speed(self, starts, velocity, *how):
-        return self._plan("begin_at_speed", starts, velocity, *how)
-
-    def _plan(self, method, starts, velocity, *how):
-        noise = np.random.default_rng().uniform(0.0, 0.1) if method == self.method else 0.0
-        return getattr(LDVS, method)(starts, np.maximum(velocity - noise, 0.0), *how)
-
-
-@pytest.mark.parametrize("method", ["begin", "begin_at_speed"])
-def test_who_begins_otherwise_each_time_is_not_disturbed(method):
-    unsure: Any = Unsure(method)
-    walks = StableWalks(unsure, V, 3, 0, STRIDE, GRID)
-    with pytest.raises(InputError, match="plans another walk when it begins again"):
-        walks.times(Case("halt", "none"), 2.0, None, None)
-
-
 def test_planned_losses_are_those_of_the_network():
     starts = np.random.default_rng(1).uniform(-10, 10, (40, 6))
     lost = planned_losses(begin(LDVS, starts, 0.7, STRIDE), np.array(1200))
     times = np.where(lost > 0, lost * STRIDE.dt, np.inf)
     np.testing.assert_allclose(times, first_loss(starts, LDVS, 0.7, 120.0))
     assert 0 < np.isfinite(times).sum() < 40
-
-
-def test_only_losses_after_the_disturbance_and_within_the_window_count():
-    #              before, short, between, whole's end, later, never
-    lost = [[5.0, 20.0, 31.0, 45.0, 45.1, np.inf], [np.inf, np.inf, np.inf, 12.0, np.inf, np.inf]]
-    table = xr.Dataset(
-        {
-            "time": (("velocity", "case", "start"), np.full((1, 2, 6), 10.0)),
-            "back": (("velocity", "case", "start"), np.full((1, 2, 6), 25.0)),
-            "planned_loss": (("velocity", "case", "start"), [lost]),
-        },
-        coords={
-            "duration": ("velocity", [20.0]),
-            "disturbance": ("case", ["halt", "halt"]),
-            "strategy": ("case", ["none", "slow_down"]),
-        },
-    )
-    result = with_flss_after(table).isel(velocity=0)
-    assert result.kinematic_reached.values.tolist() == [5, 6]
-    np.testing.assert_allclose(result.kinematic.sel(window="short"), [1 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic.sel(window="whole"), [3 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic_buys.sel(window="whole")[1], 2 / 5)  # of the five that reach both
-    assert (result.kinematic_low <= result.kinematic).all() and (result.kinematic <= result.kinematic_high).all()
 
 
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
@@ -298,72 +205,6 @@ def test_a_halted_start_holds_on_to_where_its_tips_were_seen():
     np.testing.assert_allclose(rest[-1].x[0, start], tips[0] - V * STRIDE.dt)
 
 
-FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "window": 30.0}
-
-
-@pytest.mark.slow
-def test_disturbed_walks_can_read_their_legs():
-    halted: dict[str, Any] = FEW | {
-        "disturbances": ["halt"],
-        "strategies": ["reorganise"],
-        "n_starts": 2,
-        "window": 15.0,
-    }
-    alone, reading = (conduct(DisturbedWalks(one, **halted)) for one in (LDVS, ReadsLegs(LDVS)))
-    assert np.isfinite(reading.physical.sel(window="whole")).all()
-    assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
-
-
-def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
-    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "window": 45.0}
-    study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)
-    result = conduct(study, tmp_path, threads=1)
-    assert result.physical_reached.values.tolist() == [[4, 4]]
-    assert result.physical.sel(window="whole").values.tolist() == [[0.0, 0.25]]
-    assert (result.planned_loss.isel(case=0) == result.planned_loss.isel(case=1)).all()
-    files = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    assert len(files) == 2
-    assert conduct(study, tmp_path, threads=2).identical(result)
-    assert files == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    other = conduct(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
-    assert other.fall[0, 2].equals(result.fall[0, 1])
-
-
-@pytest.mark.parametrize("kind", ["halt", "leg", "push"])
-def test_some_starts_alone_go_as_among_all(kind):
-    walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)
-    asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
-    every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
-    assert alone.identical(every.isel(start=[2, 0]))
-
-
-def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():
-    frozen: Any = dataclass(frozen=True)(type("Rigid", (), {"name": "rigid", "begin": LDVS.begin}))()
-    with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
-        DisturbedWalks(frozen, **FEW)
-    with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
-        DisturbedWalks(ReadsLegs(frozen), **FEW)
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ((["fall"], [], [], True), "none of halt, leg, push"),
-        ((["halt", "halt"], [], [], True), "twice"),
-        ((["halt"], [], ["jump"], True), "none of reorganise, slow_down, grasp"),
-        ((["push"], [-1.0], [], True), "above 0"),
-        ((["push"], [np.nan], [], True), "above 0"),
-        ((["push"], [], [], True), "at least one"),
-        (([], [], [], True), "at least one"),
-        ((["push"], [1.0], [], False), "'push' without physics"),
-        ((["halt"], [], ["grasp"], False), "'grasp' without physics"),
-    ],
-)
-def test_cases_that_make_no_sense_are_refused(given, said):
-    with pytest.raises(InputError, match=said):
-        every_case(*given)
-
-
 def test_disturbances_that_make_no_sense_are_refused():
     wrong: list[tuple[Any, list[float], list[int]]] = [
         ("jump", [1], [0]),
@@ -383,33 +224,3 @@ def test_disturbances_that_make_no_sense_are_refused():
         collect_postures(UNCOORDINATED, 0.9, 0, STRIDE)
     with pytest.raises(InputError, match="expected fewer starts or a lower velocity"):
         find_stable_starts(UNCOORDINATED, 0.9, 50_000, 0, STRIDE, GRID)
-
-
-def test_any_weights_can_be_disturbed():
-    """General weights have no hash."""
-    controller = Cruse1998(general(HWS.weights))
-    study = DisturbedWalks(controller, disturbances=["halt"], strategies=["reorganise"], physical=False, **FEW)
-    assert np.isfinite(conduct(study).kinematic.sel(window="whole")).all()
-
-
-def test_the_command_prints_one_object_and_refuses_with_exit_code_2(tmp_path, run):
-    words = ["disturb", "--kinematic", "--velocities", 0.5, "--starts", 20, "--out", tmp_path / "out"]
-    code, text, _ = run(*words, "--strategies", "slow_down", "--json")
-    assert code == 0
-    assert json.loads(text)["strategy"] == ["none", "none", "slow_down", "none", "slow_down"]
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "disturb.nc",
-        "disturb.png",
-        "manifest.json",
-        "walks",
-    }
-    for wrong, said in (
-        (["--disturbances", "push"], "expected others, since a plan knows nothing of it"),
-        (["--grasp", 1], "Unrecognized options"),
-        (["--acceleration", 0.1], "Unrecognized options"),
-        (["--recovery", "nan"], "acceleration = nan; expected"),
-        (["--friction", 0.5], "--friction with --kinematic; expected"),
-        (["--feedback"], "--feedback with --kinematic; expected"),
-    ):
-        code, _, error = run(*words, *wrong)
-        assert code == 2 and said in " ".join(error.split())

@@ -36,8 +36,8 @@ HEIGHT = 0.3
 """Of the ground, in standing heights of the body."""
 
 HELD = 1.2
-"""Height at which a lost leg is held, in standing heights of the body: off the ground, however short the steps, until the
-body tips onto it."""
+"""Height at which a lost leg is held, in standing heights of the body: off the ground, however short the steps, until
+the body tips onto it."""
 
 LOAD = 1.0
 """What is carried, in weights of the body."""
