@@ -56,6 +56,11 @@ def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
     assert np.array_equal(result.physical.sel(entrant="wilson"), falls.flss)
 
 
+def test_everything_tells_its_units(result) -> None:
+    assert {values.attrs["units"] for values in result.values()} == {"1", "mm/s", "time unit"}
+    assert (result.slip.units, result.reached.units, result.cost.units) == ("mm/s", "time unit", "1")
+
+
 def test_differences_are_those_on_the_same_starts(result) -> None:
     assert result.attrs["reference"] == "ldvs"
     assert not result.kinematic_above.sel(entrant="ldvs").any()

@@ -31,7 +31,7 @@ class Walks:
     """Which walks: their starts, how long they are observed, and where the tips step."""
 
     window: str = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (40 time units) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     seed: int = 0
     """Seed of the random starts; those of 0 are the ones on which our own presets were searched."""
     stride: OmitArgPrefixes[Stride] = field(default_factory=Stride)

@@ -32,7 +32,7 @@ SWITCHES = (*(f"without-{part}" for part in (1, 2, 3, 4, 5)), "with-2", "with-4"
 """What may be done to a controller, as `load_controller` names it."""
 
 MEASURES = {
-    "start": "lost on paper within 40 time units",
+    "start": "lost on paper within two protractions",
     "walk": "lost on paper within three periods",
     "limit": "no statically stable limit regime",
     "physical": "fell within three periods",

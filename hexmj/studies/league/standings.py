@@ -24,6 +24,9 @@ Rows = Sequence[Sequence["xr.Dataset | None"]]
 
 OVER_VELOCITY = ("entrant", "velocity")
 
+UNITS = {"slip": "mm/s", "reached": "time unit"}
+"""Of what is no frequency, rank, phase or ratio."""
+
 REFERENCE = "ldvs"
 """Whom all are compared with; where it does not take part the first entrant from random starts, if there is one."""
 
@@ -74,7 +77,10 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
     velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
-    return xr.Dataset(table, axes, {"reference": reference})
+    result = xr.Dataset(table, axes, {"reference": reference})
+    for name, values in result.items():
+        values.attrs["units"] = UNITS.get(str(name), "1")
+    return result
 
 
 LOST = attrgetter("lost")
