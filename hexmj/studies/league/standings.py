@@ -8,13 +8,12 @@ import numpy as np
 
 from hexmj.phases import circular_mean
 from hexmj.studies.frequencies import came, differences, frequencies, padded
+from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hexmj.studies.league.study import League
 
 Data = Mapping[tuple[str, str], "xr.Dataset"]
 """Of every cell, by its entrant and what it was asked."""
@@ -31,8 +30,8 @@ REFERENCE = "ldvs"
 """Whom all are compared with; where it does not take part the first entrant from random starts, if there is one."""
 
 
-def standings(league: "League", data: Data) -> "xr.Dataset":
-    """The whole league as one dataset.
+def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Data) -> "xr.Dataset":
+    """A league of entrants by name, at velocities V_r, (velocity,), as one dataset.
 
     Returns:
         Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
@@ -47,7 +46,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     """
     import xarray as xr
 
-    names, v = list(league.entrants), league.observed[0].tolist()
+    names, v = list(entrants), velocities.tolist()
     on_paper, walked, regimes = (
         [[data.get((name, f"{kind} {one}")) for one in v] for name in names] for kind in ("paper", "physics", "regime")
     )
@@ -56,9 +55,9 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
         "measured": _each(walked, lambda one: came(one.measured_loss)),
         "physical": _each(walked, lambda one: came(one.fall)),
     }
-    random = [name for name, entrant in league.entrants.items() if not entrant.ideal]
+    random = [name for name, entrant in entrants.items() if not entrant.ideal]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
-    ideal = np.array([entrant.ideal for entrant in league.entrants.values()])[:, None, None]
+    ideal = np.array([entrant.ideal for entrant in entrants.values()])[:, None, None]
     same = {measure: np.where(ideal, np.nan, values) for measure, values in happened.items()}  # the same random starts
     table: dict[str, Any] = {}
     for measure, values in same.items():
@@ -75,7 +74,7 @@ def standings(league: "League", data: Data) -> "xr.Dataset":
     table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
     table["missing"] = _over(walked, lambda one: one.fall.isnull().sum())
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
-    velocity = ("velocity", league.observed[0], {"units": "V_p", "long_name": "velocity V_r"})
+    velocity = ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
     result = xr.Dataset(table, axes, {"reference": reference})
     for name, values in result.items():

@@ -123,7 +123,8 @@ class League:
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
         settings["controllers"] = {name: plain(entrant) for name, entrant in self.entrants.items()}
         settings["not_printed"] = not_printed(settings)
-        return standings(self, dict(zip(self.named_cells(), data, strict=True))).assign_attrs(attributes(settings))
+        found = dict(zip(self.named_cells(), data, strict=True))
+        return standings(self.entrants, self.observed[0], found).assign_attrs(attributes(settings))
 
     def _asked(self, entrant: Entrant) -> Iterator[tuple[str, Cell]]:
         """Every cell of an entrant by what it is asked: random starts alone for regimes and in trials, too."""
