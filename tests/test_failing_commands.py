@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import sys
+
 import mujoco
 import numpy as np
 import pytest
@@ -80,6 +82,16 @@ def test_an_answer_that_can_go_nowhere_is_a_sentence(run, monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
     code, _, error = run("flss", "--starts", 5, "--window", 10, "--json")
     assert (code, error) == (2, "hexmj: standard output is closed; expected it open, for the answer\n")
+
+
+def test_nothing_but_the_answer_is_on_standard_output_where_the_other_one_is_closed(run, tmp_path, monkeypatch):
+    words = ["flss", "--starts", 5, "--window", 10, "--out", tmp_path / "out", "--velocities"]
+    assert "this has taken its place" not in run(*words, 0.3)[2]
+    assert "this has taken its place" in run(*words, 0.5)[2]
+    monkeypatch.setattr("sys.stderr", None)
+    code, text, _ = run(*words, 0.7)
+    sys.stderr.close()
+    assert code == 0 and text.startswith("kinematic FLSS of ldvs, 5 starts") and "hexmj:" not in text
 
 
 @pytest.mark.parametrize(

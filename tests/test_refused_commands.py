@@ -1,5 +1,7 @@
 """Options that make no sense get one sentence and exit code 2, and results that lie there stay as they are."""
 
+import os
+
 import pytest
 
 import hexmj
@@ -125,11 +127,15 @@ def test_a_folder_that_is_a_file(run, tmp_path):
     assert code == 2
     assert "expected a folder" in error
     assert (tmp_path / "taken").read_text() == "precious"
-    (tmp_path / "results" / "manifest.json").mkdir(parents=True)
-    code, _, error = run("walk", "--out", tmp_path / "results")
+
+
+@pytest.mark.parametrize(("make", "what"), [(os.mkdir, "folder"), (os.mkfifo, "pipe or a device")])
+def test_a_result_s_place_that_is_taken_by_no_file(run, tmp_path, make, what):
+    make(tmp_path / "manifest.json")
+    code, _, error = run("walk", "--out", tmp_path)
     assert code == 2
-    assert "manifest.json is a folder there" in error
-    assert [path.name for path in (tmp_path / "results").iterdir()] == ["manifest.json"]
+    assert f"manifest.json is a {what} there" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.json"]
 
 
 def test_bad_input_makes_no_folder(run, tmp_path):

@@ -31,6 +31,8 @@ SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
 
 def main() -> None:
     """The command `hexmj`: exit code 2 for input that makes no sense, 1 for a simulation that failed."""
+    if sys.stderr is None:  # it was closed, and print would take standard output instead
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # neither closed nor replaced
             stream.reconfigure(errors="backslashreplace")
@@ -104,7 +106,6 @@ def _drop_output() -> None:
 
 
 def _complain(error: Exception | str, code: int) -> int:
-    if sys.stderr:  # there is none where it was closed
-        with suppress(OSError):
-            print(f"hexmj: {literal(str(error))}", file=sys.stderr, flush=True)
+    with suppress(OSError):
+        print(f"hexmj: {literal(str(error))}", file=sys.stderr, flush=True)
     return code

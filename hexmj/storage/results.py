@@ -68,11 +68,12 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
         if os.pardir in missing:
             raise InputError(f"--out {path} leads through {missing[0]}, which is not there; expected a folder")
         _try(nearest, missing)
-        taken = [name for name in names if (path / name).is_dir()]
+        taken = [name for name in names if (path / name).exists() and not (path / name).is_file()]
     except OSError as error:
         raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None
     if taken:
-        raise InputError(f"--out {path}: {taken[0]} is a folder there; expected a file or nothing")
+        what = "folder" if (path / taken[0]).is_dir() else "pipe or a device"
+        raise InputError(f"--out {path}: {taken[0]} is a {what} there; expected a file or nothing")
     remove_leftovers(path)
     return path
 
