@@ -1,8 +1,7 @@
 """What fails on a command's way is one sentence: compiled code, memory, a simulation."""
 
-from pathlib import Path
-
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
