@@ -131,6 +131,19 @@ class Told(Counts):
     check_velocity: float = 3.0
 
 
+@dataclass(frozen=True)
+class Untold(Counts):
+    @property
+    def check_velocity(self) -> Any:
+        raise AttributeError if self.name == "silent" else ValueError("none")
+
+
+def test_limits_that_cannot_be_read_are_a_sentence() -> None:
+    check_velocities(Untold(name="silent"), [0.5], hexmj.Stride())
+    with pytest.raises(hexmj.InputError, match="counts, check_velocity: ValueError in .*: none"):
+        check_velocities(Untold(), [0.5], hexmj.Stride())
+
+
 def test_limits_of_walks_that_accelerate_are_told_as_they_go() -> None:
     accelerating = KinematicFlss(LIMITED, **FAST, acceleration=hexmj.Acceleration())
     assert len(accelerating.cells()) == 2

@@ -73,9 +73,11 @@ def check_velocities(
     Raises:
         InputError: one of them.
     """
-    if isinstance(controller, KnowsItsLimits) and callable(controller.check_velocity) and not acceleration:
-        for velocity in velocities:
-            with said(f"{controller.name}, check_velocity"):
+    if acceleration:
+        return
+    with said(f"{controller.name}, check_velocity"):
+        if isinstance(controller, KnowsItsLimits) and callable(controller.check_velocity):
+            for velocity in velocities:
                 controller.check_velocity(velocity, stride)
 
 
