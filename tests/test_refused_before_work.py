@@ -135,12 +135,11 @@ class Told(Counts):
 class Untold(Counts):
     @property
     def check_velocity(self) -> Any:
-        raise AttributeError if self.name == "silent" else ValueError("none")
+        raise ValueError("none")
 
 
 def test_limits_that_cannot_be_read_are_a_sentence() -> None:
-    check_velocities(Untold(name="silent"), [0.5], hexmj.Stride())
-    with pytest.raises(hexmj.InputError, match="counts, check_velocity: ValueError in .*: none"):
+    with pytest.raises(hexmj.InputError, match=r"counts, check_velocity: ValueError in .*: none"):
         check_velocities(Untold(), [0.5], hexmj.Stride())
 
 
