@@ -14,9 +14,13 @@ from hexmj.errors import InputError
 from hexmj.intervals import paired_difference
 from hexmj.measures.captions import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
+from hexmj.measures.physical import physical_walk
+from hexmj.physics.settling import settle
+from hexmj.starts import draw_starts
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants_by_name import entrants
 from hexmj.studies.league.figure import FEWER, NOTHING, league_figure, walks_figure
+from hexmj.studies.league.in_physics import walks
 from hexmj.studies.league.on_paper import losses
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
@@ -54,6 +58,17 @@ def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
     assert result.range.sel(entrant="ldvs") == j_n
     falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, window=40.0)
     assert np.array_equal(result.physical.sel(entrant="wilson"), falls.flss)
+
+
+def test_the_way_is_what_was_walked_in_whole_steps() -> None:
+    stride, conditions = Stride(dt=1.0), hexmj.Conditions()
+    told: Any = {"conditions": conditions, "stride": stride, "threads": 1}
+    found = walks(Entrant(hexmj.LDVS), hexmj.LDVS, 0.3, 20.9, n_starts=3, seed=1, **told)
+    starts = draw_starts(3, 1, stride)
+    end = physical_walk(starts, hexmj.LDVS, 0.3, 20.9, **told).qpos[-1, :, 0]
+    walked, upright = end - settle(starts, conditions, stride, 1).qpos[:, 0], np.isinf(found.fall.values)
+    assert upright.sum() == 2
+    np.testing.assert_allclose(found.way[upright], walked[upright], rtol=1e-12)
 
 
 def test_everything_tells_its_units(result) -> None:

@@ -160,6 +160,25 @@ def test_a_cell_is_a_physical_walk_under_those_conditions(few):
         assert_array_equal(one[name], getattr(walks, name))
 
 
+def test_the_distance_is_what_was_walked_in_whole_steps():
+    told: dict[str, Any] = {
+        "velocities": (0.4,),
+        "n_starts": 3,
+        "stride": Stride(dt=0.8),
+        "grounds": ("rough",),
+        "heights": (0.1,),
+        "grasps": (0.0,),
+    }
+    flat = conduct(Terrain(LDVS, **told)).sel(obstacle="flat").squeeze()
+    duration = flat.attrs["distance"] / 0.4
+    starts = draw_starts(3, 0, told["stride"])
+    walk = physical_walk(starts, LDVS, 0.4, duration, conditions=FARTHER, stride=told["stride"], threads=1)
+    upright = np.isinf(flat.fall.values)
+    walked = walk.qpos[-1, :, 0] - settle(starts, FARTHER, told["stride"], 1).qpos[:, 0]
+    assert upright.any() and duration % 0.8 > 0.1
+    assert_allclose(flat.distance.values[upright], walked[upright], rtol=1e-12)
+
+
 def test_what_is_finished_is_not_walked_again(few, folder, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
     xr.testing.assert_identical(conduct(Terrain(LDVS, **FEW), folder), few)

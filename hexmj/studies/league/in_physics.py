@@ -93,10 +93,11 @@ def walks(
     """
     starts = entrant.starts(n_starts, seed, velocity, stride)
     duration = float(observation_time(window, velocity, stride))
+    steps = int(steps_within(duration, stride))
 
     def walked(which: np.ndarray) -> "xr.Dataset":
         some = starts[which]
-        check_repeats(controller, some, velocity, int(steps_within(duration, stride)), stride)
+        check_repeats(controller, some, velocity, steps, stride)
         settled = settle(some, conditions, stride, threads)
         lost = first_loss(some, controller, velocity, duration, stride=stride, threads=threads)
         so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)
@@ -105,7 +106,8 @@ def walks(
             effort.add(chunk)
         outcomes = so_far.outcomes()
         told = vars(outcomes) | {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
-        return over_start(told | {"way": np.minimum(outcomes.fall, duration) * velocity * outcomes.speed}, COLUMNS)
+        commanded = np.minimum(outcomes.fall, steps * stride.dt) * velocity
+        return over_start(told | {"way": commanded * outcomes.speed}, COLUMNS)
 
     found = unless_refused(walked, len(starts), COLUMNS)
     if found.fall.isnull().all():

@@ -5,23 +5,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.intervals import wilson_intervals
+from hexmj.timing import Stride, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def with_crossings(data: "xr.Dataset", distance: float, begin: float, behind: float) -> "xr.Dataset":
+def with_crossings(data: "xr.Dataset", distance: float, stride: Stride, begin: float, behind: float) -> "xr.Dataset":
     """The FLSS of the starts that reach an obstacle, and what else becomes of them, beside their outcomes.
 
     Args:
         data: over (obstacle, grasp, velocity, start).
-        distance: to which all are told to walk [mm].
+        distance: to which all are told to walk, in whole steps [mm].
+        stride: of these steps.
         begin: commanded distance at which a front foot may reach the obstacle [mm].
         behind: how far behind O a hind foot may stand [mm].
     """
     import xarray as xr
 
-    commanded = np.minimum(data.fall * data.velocity, distance)
+    time = steps_within(distance / data.velocity.values, stride) * stride.dt
+    commanded = np.minimum(data.fall, data.velocity.copy(data=time)) * data.velocity
     walked = (data.speed * commanded).assign_attrs(units="mm", long_name="distance walked by O")
     upright, reaching = np.isinf(data.fall), commanded > begin
     after = reaching & ~upright

@@ -132,7 +132,7 @@ class Terrain(SameStarts):
         from hexmj.studies.terrain.crossings import with_crossings
 
         (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
-        table = with_crossings(self._over_obstacles(data), self.distance, at - ahead, behind)
+        table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
         return self.labelled(table, "terrain", window=f"{self.distance:g} / V", distance=self.distance)
 
     def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
