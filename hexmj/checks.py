@@ -4,6 +4,7 @@ NumPy's scalars are taken for the Python numbers that they are; True and False a
 """
 
 import math
+import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import fields
@@ -90,6 +91,10 @@ def path_of(path: Path | str) -> Path:
     """
     if "\0" in str(typed("path", path, Path | str)):
         raise InputError(f"path = {str(path)!r:.80}; expected one without a null character")
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise InputError(f"path = {str(path)!r:.80}; expected characters that names of files can have") from None
     if path == "":
         raise InputError("path = ''; expected a name, or '.' for the current folder")
     return Path(path)

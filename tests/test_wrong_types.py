@@ -124,6 +124,10 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: first_loss(duration="x"), "duration = 'x'; expected numbers"),
     (lambda: first_loss(duration=[True, False]), "duration = [True, False]; expected numbers"),
     (lambda: first_loss(stride="fig1"), "stride = 'fig1'; expected a Stride"),
+    (lambda: compare(threads=[1]), "threads = [1]; expected"),
+    (lambda: walk(controller=np.ones((2, 2))), "controller = array([[1., 1.], [1., 1.]]); expected a controller"),
+    (lambda: hexmj.load("\ud800.nc"), r"path = '\ud800.nc'; expected characters that names of files can have"),
+    (lambda: flss(folder="\ud800"), r"path = '\ud800'; expected characters that names of files can have"),
     (lambda: first_loss(threads=0.5), "threads = 0.5; expected a whole number of at least 1"),
     (lambda: first_loss(acceleration=STRIDE), "acceleration = Stride(aep0=10.0,"),
     (lambda: begin(LDVS, STARTS, 0.3, anything), "stride = <module 'hexmj'"),
@@ -312,6 +316,9 @@ def test_numbers_of_numpy_are_numbers():
     assert stride == hexmj.Stride(dt=0.25, geometry=hexmj.CENTRED)
     assert json.dumps(settings_of(replace(LDVS, weights=hexmj.Symmetric(np.float32(2.0)))))  # pyright: ignore
     assert np.array_equal(first_loss(threads=np.int64(1)), first_loss())
+    few: Any = {"window": 2.0, "threads": 1}
+    falls = hexmj.physical_flss(LDVS, [0.3], n_starts=np.int8(2), **few)  # pyright: ignore
+    assert falls.identical(hexmj.physical_flss(LDVS, [0.3], n_starts=2, **few))
     assert one_start(walk(), np.int64(1)).x.shape == (50, 1, 6)  # pyright: ignore
 
 

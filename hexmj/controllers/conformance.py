@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.checked_plans import advanced, place, said
+from hexmj.controllers.checked_plans import advanced, check_velocities, place, said
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, claims_mirrored, is_steerable, settings_of
 from hexmj.controllers.reading_law import told
@@ -114,6 +114,7 @@ def _settings(trial: Trial) -> None:
 
 
 def _begin(trial: Trial) -> None:
+    check_velocities(trial.controller, sorted({*trial.velocity.tolist()}), trial.stride, trial.acceleration)
     trial.begin()
 
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 
-from hexmj.checks import printable
+from hexmj.checks import printable, short
 from hexmj.errors import InputError
 from hexmj.sweeps.plain_settings import field_names, plain
 from hexmj.timing import Acceleration, Stride
@@ -116,7 +116,7 @@ class SteerablePlan(Plan, Protocol):
 
 @runtime_checkable
 class KnowsItsLimits(Protocol):
-    """A controller that cannot plan at every velocity with every time step, and says so before any work."""
+    """A controller whose `begin` refuses some velocities with some time steps, and that says so before any work."""
 
     def check_velocity(self, velocity: float, stride: Stride) -> None:
         """Refuse a V_r, a fraction of V_p, at which the stride's time step is too long.
@@ -233,7 +233,7 @@ def check_controller_type(controller: object) -> None:
         well = False
     if not well:
         raise InputError(
-            f"controller = {controller!r:.200}; expected a controller, a frozen dataclass with a name and a method"
+            f"controller = {short(controller)}; expected a controller, a frozen dataclass with a name and a method"
             " begin, as a preset or hexmj.load_controller gives one"
         )
     printable("a controller's name", controller.name)  # pyright: ignore[reportAttributeAccessIssue]

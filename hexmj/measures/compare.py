@@ -175,7 +175,7 @@ def physical_flss(
         acceleration=acceleration, folder=folder, **how,
     )  # fmt: skip
     fell = losses_by_sample(np.isfinite(result.fall.values[0]))
-    table = frequency_table(fell, n_starts, result.velocity.values, result.duration.values)
+    table = frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
     beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
     wanted = [*beside, "fall", *BESIDE.values(), *REPORTED]
     reported = result.isel(controller=0, drop=True)[wanted].drop_vars("duration")

@@ -93,7 +93,8 @@ def finish(
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
     folder = None if folder is None else path_of(folder).absolute()
     executor = typed("executor", how.get("executor"), Executor | None)
-    progress, threads = typed("progress", how.get("progress"), Progress | None), how.get("threads")
+    progress = typed("progress", how.get("progress"), Progress | None)
+    threads = typed("threads", how.get("threads"), int | None)
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
     records = [cell.record() if folder else "" for cell in cells]
     paths = [
