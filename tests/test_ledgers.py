@@ -62,6 +62,7 @@ def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_pat
         *map(other._line, [row, row], [3.0, -1.0]),
         "zz 0x1p-1 00000000\n",
         "00\n",
+        "00 0x1p9999 00000000\n",
         ledger(tmp_path)._line(row, np.nan),
     ):
         path.write_text(f"{record}\n{line}")

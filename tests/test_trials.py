@@ -67,14 +67,16 @@ def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
     assert (walked.height[raised][..., leg][upright] > lame.held / 3).mean() > 0.9
 
 
-def test_a_lost_leg_is_held_as_high_as_the_body_asks_for_however_short_the_steps() -> None:
+def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() -> None:
     high = []
-    for body, stride in ((STICK_INSECT, Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)), (LARGER, Stride())):
-        trial = walking("lost 1", Entrant(hexmj.LDVS), Conditions(body=body), stride)
+    short = Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)
+    tall = Conditions.of(standing_height=14.0)
+    for conditions, stride in ((Conditions(), short), (Conditions(body=LARGER), Stride()), (tall, Stride())):
+        trial = walking("lost 1", Entrant(hexmj.LDVS), conditions, stride)
         assert trial is not None
         plan = trial.controller.begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
         high.append(np.nanmax(plan.advance(300).height[..., 0]))
-    assert high == [12.0, 18.0]
+    assert high == pytest.approx([12.0, 18.0, 16.8])
     with pytest.raises(InputError, match=r"held = 0.0; expected a height above 0 mm"):
         LegLost(hexmj.LDVS, 0, 0.0)
 

@@ -134,6 +134,12 @@ def test_what_makes_no_sense_changes_nothing():
         live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights))
     with pytest.raises(InputError, match="begin_at_speed of network gave None; expected a plan that can be steered"):
         live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights, name="network", raises=False))
+    nothing: Any
+    for nothing in ("", 0, [], np.ones(2)):
+        with pytest.raises(InputError, match=r"controller = .*; expected a controller"):
+            live.steer(controller=nothing)
+        with pytest.raises(InputError, match=r"conditions = .*; expected a Conditions"):
+            live.begin(conditions=nothing)
     assert (live.velocity, live.controller) == (0.4, LDVS)
     assert live.moment is before
 

@@ -97,7 +97,7 @@ class Problem:
             raise InputError(f"domain = {reach}; expected above 0 and at most {FARTHEST:g}")
         form, size = self.form, len(self.form.names)
         box = numbers("box of the form", form.box(reach))
-        where = form.vector(begin) if begin else form.begin
+        where = form.begin if begin is None else form.vector(begin)
         where = None if where is None else numbers("begin of the form", where)
         if box.shape != (2, size) or not ((np.abs(box) <= MOST) & (box[0] < box[1])).all():
             raise InputError(f"the form's box is {box}; expected a least and a greatest value of its {size} parameters")

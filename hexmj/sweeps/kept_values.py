@@ -82,7 +82,7 @@ class KeptValues:
                 lines = file.read().decode(errors="replace").split("\n")
         for line in lines:
             row, _, value = line.rpartition(" ")[0].partition(" ")
-            with suppress(ValueError):  # of what is no line
+            with suppress(ValueError, OverflowError):  # of what is no line
                 key, number = bytes.fromhex(row), float.fromhex(value)
                 if f"{line}\n" == self._line(key, number) and math.isfinite(number):
                     self._values[key] = number

@@ -152,14 +152,14 @@ class LiveWalk:
             InputError: the insect cannot walk so; the walk goes on as it was.
         """
         start = self.start if start is None else numbers("start", in_order(start))
-        conditions = conditions or self.conditions
-        settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
+        wanted: Conditions = typed("conditions", self.conditions if conditions is None else conditions, Conditions)
+        settled = settle(start[np.newaxis], wanted, self.stride, threads=1)
         plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
         self._insects = Insects(settled, self._push, threads=1)
         self._lasts = steps_in_chunk(settled.substeps)
-        self.start, self.conditions, self.settled = start, conditions, settled
+        self.start, self.conditions, self.settled = start, wanted, settled
         self.trace, self.fell_on = [], ""
         self._before: PlannedWalk | None = None
         self._left = 0.0
@@ -182,7 +182,7 @@ class LiveWalk:
             InputError: a velocity or controller that makes no sense; the walk goes on as it was.
         """
         wanted: float = typed("velocity", self.velocity if velocity is None else velocity, float)
-        controller = controller or self.controller
+        controller = self.controller if controller is None else controller
         begin(controller, self.start[np.newaxis], wanted, self.stride, threads=1)  # refuses what makes no sense
         before, self.velocity, self.controller = (self.velocity, self.controller), wanted, controller
         try:

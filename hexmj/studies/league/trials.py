@@ -36,8 +36,8 @@ HEIGHT = 0.3
 """Of the ground, in standing heights of the body."""
 
 HELD = 1.2
-"""Height at which a lost leg is held, in standing heights of the body: off the ground, however short the steps, until
-the body tips onto it."""
+"""Height at which a lost leg is held, in standing heights of the body or of the walk, whichever is higher: off the
+ground, however short the steps, until the body tips onto it."""
 
 LOAD = 1.0
 """What is carried, in weights of the body."""
@@ -87,14 +87,15 @@ def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride)
         stride: with the time step.
     """
     controller, reading = entrant.controller, entrant.reading if name in READING else None
+    body = conditions.body
     if name in GROUNDS:
-        body = conditions.body
         near, high = body.lengths.nearest_obstacle, HEIGHT * body.standing_height
         return Walking(controller, conditions.but(ground=name, ground_height=high, ground_at=near))
     if name == "load":
         return Walking(controller, conditions.but(load=LOAD))
     if name in LEGS_LOST:
-        return Walking(LegLost(controller, LEGS_LOST[name], HELD * conditions.body.standing_height), conditions)
+        held = HELD * max(conditions.path.standing_height, body.standing_height)
+        return Walking(LegLost(controller, LEGS_LOST[name], held), conditions)
     late = DELAY * conditions.time.vp
     if reading is None or (name == "late" and not round(late / stride.dt)):
         return None
