@@ -134,6 +134,8 @@ def test_what_makes_no_sense_changes_nothing():
         live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights))
     with pytest.raises(InputError, match="begin_at_speed of network gave None; expected a plan that can be steered"):
         live.steer(velocity=0.3, controller=NeverAtSpeed(LDVS.weights, name="network", raises=False))
+    with pytest.raises(InputError, match=r"velocity = \[0.3\]; expected"):
+        LiveWalk(LDVS, [0.3], live.start)  # pyright: ignore[reportArgumentType]
     nothing: Any
     for nothing in ("", 0, [], np.ones(2)):
         with pytest.raises(InputError, match=r"controller = .*; expected a controller"):
