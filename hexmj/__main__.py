@@ -13,6 +13,8 @@ def main() -> None:
 
     Once all is said they change nothing: the interpreter may take a moment to end.
     """
+    if sys.stderr is None:  # it was closed, and print would take standard output instead
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     try:
         hear_stops()
         gc.set_threshold(10_000)  # after so many new objects: `hexmj flss` takes 5 % less time

@@ -57,6 +57,15 @@ class Melting:
 
 
 @dataclass(frozen=True)
+class Slow(Own):
+    """Says that it cannot what it does."""
+
+    def check_velocity(self, velocity, stride):
+        if velocity > 0.5:
+            raise hexmj.InputError(f"V = {velocity:g} is too fast")
+
+
+@dataclass(frozen=True)
 class Hiding(Own):
     """With a setting that is no plain data."""
 
@@ -327,6 +336,7 @@ BROKEN: list[tuple[str, Any, str]] = [
     ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
     ("settings", Melting(), "not frozen"),
     ("settings", Hiding(), "object.*is no setting"),
+    ("begin", Slow(), r"V = 0.\d+ is too fast"),
     ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),
     ("begin", spoilt(one_step_on), "the plan is at step 1; expected one at time 0"),
     ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),

@@ -185,6 +185,8 @@ def test_the_command_prints_one_object_and_refuses_with_exit_code_2(tmp_path, ru
         "manifest.json",
         "walks",
     }
+    code, text, _ = run(*words, "--strategies", "--json")
+    assert json.loads(text)["strategy"] == 3 * ["none"]
     for wrong, said in (
         (["--disturbances", "push"], "expected others, since a plan knows nothing of it"),
         (["--grasp", 1], "Unrecognized options"),

@@ -39,6 +39,7 @@ PRESSES = ": it presses feet"
         ("map --over load --values 0 10 --grasp 9 --velocities 0.3", PRESSES),
         ("converge --velocity 0.5 --grasp 9.9", PRESSES),
         ("league --grasp 50", PRESSES),
+        ("league --grasp 10", PRESSES),
         ("ablate --models ldvs --grasp 50", PRESSES),
         ("search --form hws --velocity 0.5 --physical --grasp 50", PRESSES),
     ],

@@ -40,6 +40,8 @@ NONSENSE = [
     (["flss", "--aep0", "1e308", "--pep0=-1e308", "--pep-min=-1e308"], "expected aep0, pep0 and pep_min between"),
     (["search", "--population", "0"], "expected a whole number of at least 2"),
     (["search", "--algorithm", "cmaes", "--population", "1"], "expected a whole number of at least 4"),
+    (["map", "--values"], "--values without numbers; expected at least one, or no --values for the usual ones"),
+    (["disturb", "--disturbances"], "no disturbance was given"),
     (["search", "--budget", "0"], "at least one generation, 10 evaluations"),
     (["search", "--refine-starts", "0"], "starts = 0; expected"),
     (["search", "--verdict-starts", "0"], "starts = 0; expected"),

@@ -56,6 +56,12 @@ def test_the_fields_of_a_controller_are_searched():
         assert abs(found.vector[0] - 3.0) < 2.0
 
 
+def test_a_controller_that_is_false_is_begun_with(monkeypatch):
+    monkeypatch.setattr(Pace, "__bool__", lambda _: False, raising=False)
+    domain = Problem(FieldsForm(Pace()), 0.4, 0.4, window=5.0).domain(4.0, Pace(good=1.0))
+    assert domain.begin is not None and domain.begin.tolist() == [1.0, -0.5]
+
+
 @dataclass(frozen=True)
 class Picky(Pace):
     """Refuses nearly all that is not usual."""

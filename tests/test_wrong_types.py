@@ -124,7 +124,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: first_loss(duration="x"), "duration = 'x'; expected numbers"),
     (lambda: first_loss(duration=[True, False]), "duration = [True, False]; expected numbers"),
     (lambda: first_loss(stride="fig1"), "stride = 'fig1'; expected a Stride"),
-    (lambda: compare(threads=[1]), "threads = [1]; expected"),
+    (lambda: compare(threads=[1]), "threads = [1]; expected a whole number of at least 1"),
     (lambda: walk(controller=np.ones((2, 2))), "controller = array([[1., 1.], [1., 1.]]); expected a controller"),
     (lambda: hexmj.load("\ud800.nc"), r"path = '\ud800.nc'; expected characters that names of files can have"),
     (lambda: flss(folder="\ud800"), r"path = '\ud800'; expected characters that names of files can have"),

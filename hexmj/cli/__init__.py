@@ -1,1 +1,1 @@
-"""The command line: `main` lists the commands, each of which is a module of its own."""
+"""The command line: `commands` lists the commands, each of which is a module of its own."""

@@ -12,7 +12,7 @@ from hexmj.cli.options import ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
-from hexmj.measures.captions import of_starts
+from hexmj.measures.captions import starts_in_words
 from hexmj.studies.static_limit.figure import static_limit_figure
 from hexmj.studies.static_limit.study import FINE, VARIED, StaticLimit
 
@@ -78,7 +78,7 @@ class Converge(StudyCommand):
         from hexmj.studies.static_limit.distances import LOSSES
 
         name, means = self.controlled.controller(self.model).name, _means(result)
-        yield f"{name}, V = {self.velocity:g}, {of_starts(self.starts)}: FLSS, with 95 % intervals"
+        yield f"{name}, V = {self.velocity:g}, {starts_in_words(self.starts)}: FLSS, with 95 % intervals"
         yield _table(means, {measure: partial(interval, measure=measure) for measure in LOSSES})
         yield "Starts whose answer is the kinematic one; steps in which the planned feet stand, or are at the ground"
         yield _table(means, {heading: partial(_number, name=one) for heading, one in SAME.items()})

@@ -12,7 +12,7 @@ from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.measures.captions import of_starts
+from hexmj.measures.captions import starts_in_words
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.disturbance.frequencies import MEASURES
@@ -34,11 +34,11 @@ class Disturb(StudyCommand):
     model: ControllerName = "ldvs"
     velocities: Sequence[float] = DisturbedWalks.velocities
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
-    disturbances: Sequence[Kind] = ()
+    disturbances: Sequence[Kind] | None = None
     """The body is halted, or one protracting leg is stopped, or the body is pushed from the side; all unless given."""
     impulses: Sequence[float] = DisturbedWalks.impulses
     """Impulses of the pushes, in multiples of the insect's mass times V_p."""
-    strategies: Sequence[Answer] = ()
+    strategies: Sequence[Answer] | None = None
     """Legs go to the nearest posture of undisturbed walking, or the walk begins again from --initial-velocity, or feet
     hold on to the ground; all, beside none, unless given."""
     recovery: float = RECOVERY.rate
@@ -63,12 +63,16 @@ class Disturb(StudyCommand):
         controller = self.controlled.controller(self.model)
         self.refuse_contact_gap(controller)
         left_out = PHYSICAL if self.kinematic else ()
+
+        def chosen(given: Sequence[Any] | None, every: Sequence[Any]) -> Sequence[Any]:
+            return [one for one in every if one not in left_out] if given is None else given
+
         study = DisturbedWalks(
             controller,
             self.velocities,
-            self.disturbances or [one for one in DisturbedWalks.disturbances if one not in left_out],
+            chosen(self.disturbances, DisturbedWalks.disturbances),
             self.impulses,
-            self.strategies or [one for one in DisturbedWalks.strategies if one not in left_out],
+            chosen(self.strategies, DisturbedWalks.strategies),
             Acceleration(self.recovery, self.initial_velocity),
             self.adhesion,
             not self.kinematic,
@@ -90,7 +94,7 @@ class Disturb(StudyCommand):
             if measure in result:
                 yield from _tables(result, measure)
         found = (f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
-        starts = f"{of_starts(self.starts)} whose plan is stable until it is disturbed"
+        starts = f"{starts_in_words(self.starts)} whose plan is stable until it is disturbed"
         yield "takes off: how much lower than without a strategy, on the same starts"
         yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
         told = {
@@ -114,7 +118,7 @@ def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
     answered, slow = [n for n in shown if strategy[n] != "none"], [n for n in shown if strategy[n] == "slow_down"]
     least = result[f"{measure}_reached"].min().item()
     parts: list[str | Table] = [
-        f"{measure} FLSS from the disturbance on, at least {of_starts(least)}, with 95 % intervals"
+        f"{measure} FLSS from the disturbance on, at least {starts_in_words(least)}, with 95 % intervals"
         + (", to the end of the window, which begins at full velocity again" if slow else ""),
         _table(result.sel(window="whole").isel(case=shown), measure),
     ]

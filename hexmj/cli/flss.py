@@ -91,7 +91,7 @@ class Flss(WalkingCommand):
         return [*files, save_manifest(self, settings(result), files, out / MANIFEST)]
 
     def _print(self, result: "xr.Dataset", files: list[Path]) -> None:
-        from hexmj.measures.captions import of_starts
+        from hexmj.measures.captions import starts_in_words
 
         columns = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
         report = physical_report(result) if self.physical else {}
@@ -104,7 +104,7 @@ class Flss(WalkingCommand):
         rows = [(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns)) for v, one in at.items()]
         lines = [self.conditions_line(self.physical), *([report_line(report)] if report else [])]
         show(
-            f"{self.kind} FLSS of {self.model}, {of_starts(self.n_starts)}",
+            f"{self.kind} FLSS of {self.model}, {starts_in_words(self.n_starts)}",
             table(("V", *columns), rows),
             *lines,
             *map(str, files),

@@ -10,6 +10,8 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.options import Controlled, ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
+from hexmj.errors import InputError
+from hexmj.measures.captions import starts_in_words
 from hexmj.measures.compare import MEASURES
 from hexmj.studies.stability_map.study import Over, StabilityMap
 
@@ -27,7 +29,7 @@ class Map(StudyCommand):
 
     over: Over = StabilityMap.over
     """The condition that is varied."""
-    values: Sequence[float] = ()
+    values: Sequence[float] | None = None
     """Its values, in its own unit; five usual ones unless given."""
     velocities: Sequence[float] = StabilityMap.velocities
     """Velocities V_r as fractions of V_p, 0 <= V < 1."""
@@ -41,10 +43,12 @@ class Map(StudyCommand):
     )
 
     def study(self) -> StabilityMap:
+        if self.values is not None and not self.values:
+            raise InputError("--values without numbers; expected at least one, or no --values for the usual ones")
         return StabilityMap(
             self.controlled.controller(self.model),
             self.over,
-            self.values,
+            self.values or (),
             self.velocities,
             n_starts=self.starts,
             conditions=self.conditions,
@@ -75,7 +79,7 @@ class Map(StudyCommand):
         yield f"Why they fall or do not, and how many toppled, numbers of starts at each {self.over}"
         yield _reasons(result)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
-        starts = f"{result.sizes['start']} of {self.starts} starts"
+        starts = f"{result.sizes['start']} of {starts_in_words(self.starts)}"
         yield f"{starts}, which stand on six feet at every value ({', '.join(stand)})"
         yield self.conditions_line(varied=[self.over])
 

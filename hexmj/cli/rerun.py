@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import Positional
 
 from hexmj.cli.command_words import deciding, typed
+from hexmj.cli.commands import options_of
 from hexmj.cli.manifest import Manifest, changed_files, differences, manifests, told
 from hexmj.cli.tables import print_json, show, table
 from hexmj.errors import InputError, SimulationError
@@ -140,8 +141,6 @@ def _check(path: Path, manifest: Manifest) -> None:
 
 def _repeat(path: Path, then: Manifest, more: list[str]) -> _Repeated:
     """Run the words of a manifest again, in a folder of their own, and compare what comes of them."""
-    from hexmj.cli.commands import options_of
-
     words = deciding(then.command)
     with TemporaryDirectory(prefix="hexmj-rerun-") as folder:
         with redirect_stdout(io.StringIO()), typed(words):

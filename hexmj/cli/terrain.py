@@ -11,7 +11,7 @@ from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hidin
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions, Ground
-from hexmj.measures.captions import of_starts
+from hexmj.measures.captions import starts_in_words
 from hexmj.studies.terrain import study as terrain
 from hexmj.studies.terrain.figure import terrain_figure
 from hexmj.studies.terrain.study import FARTHER, VARIED, ObstacleKind
@@ -81,8 +81,8 @@ class Terrain(StudyCommand):
         """A table of the obstacles, and the conditions."""
         name = self.controlled.controller(self.model).name
         yield (
-            f"{name}, {of_starts(self.starts)} at each velocity: FLSS once the obstacle has been reached, with 95 %"
-            " intervals; who falls on the way to it does not count"
+            f"{name}, {starts_in_words(self.starts)} at each velocity: FLSS once the obstacle has been reached, with"
+            " 95 % intervals; who falls on the way to it does not count"
         )
         yield _table(result, self.conditions.body.trunk)
         walks = replace(self.walks, window=f"{result.attrs['distance']:g} / V")

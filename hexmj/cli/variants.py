@@ -12,7 +12,7 @@ from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError, check_distinct
-from hexmj.measures.captions import of_starts
+from hexmj.measures.captions import starts_in_words
 from hexmj.studies.short_names import short_names
 from hexmj.studies.variants import study
 from hexmj.studies.variants.figure import variants_figure
@@ -77,7 +77,7 @@ class Variants(StudyCommand):
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """A table for each velocity, what it comes to, and the conditions."""
         kind = "physical" if self.physical else "kinematic"
-        yield f"{kind} FLSS of {of_starts(result.sizes['start'])}, one constant or rule changed at a time"
+        yield f"{kind} FLSS of {starts_in_words(result.sizes['start'])}, one constant or rule changed at a time"
         for velocity in result.velocity.values:
             yield f"V = {velocity:g}"
             yield _table(result.sel(velocity=velocity))

@@ -77,5 +77,5 @@ class LameReadingPlan(LamePlan):
     """The same of a `protocol.ReadingPlan`."""
 
     def sense(self, sensed: Sensed) -> None:
-        """Hand on what the legs tell, the lost one included, whose foot never meets the ground."""
+        """Hand on what the legs tell, the lost one included."""
         self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]

@@ -129,14 +129,14 @@ def _walks(told: dict[str, Any]) -> list[str]:
     """Starts, window, seed and acceleration, as far as a result has them."""
     window = told.get("window")
     own = {"window": f"of {window:g} time units"} if isinstance(window, float) else {}
-    found = [of_starts(told["starts"])] if "starts" in told else []
+    found = [starts_in_words(told["starts"])] if "starts" in told else []
     found += [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
     if acceleration := told.get("acceleration"):
         found.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
     return found
 
 
-def of_starts(number: int) -> str:
+def starts_in_words(number: int) -> str:
     """A number of starts in words."""
     return "1 start" if number == 1 else f"{number} starts"
 

@@ -1,4 +1,4 @@
-"""How films are rendered: settled when something is drawn, never by importing this package.
+"""How MuJoCo renders: settled when something is drawn, never by importing this package.
 
 MuJoCo settles it when it is imported, by MUJOCO_GL, and takes a screen unless told.  Where nobody has told it and there
 is no screen, its renderers are handed contexts of EGL, which needs none.

@@ -1,4 +1,4 @@
-"""Marks within the filmed scene: the support polygon, the projected centre of mass and the planned tips."""
+"""Marks within a scene of MuJoCo: the support polygon, the projected centre of mass and the planned tips."""
 
 from itertools import pairwise
 

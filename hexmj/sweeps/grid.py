@@ -16,6 +16,7 @@ from warnings import warn
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
+from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
@@ -83,8 +84,9 @@ def finish(
         how: see `Execution`.
 
     Raises:
-        InputError: a cell cannot be named, sent, written or believed, what it depends on has changed meanwhile or is
-            another where a worker is, or a worker was killed.  And whatever the first cell to fail raises.
+        InputError: threads that are none; a cell cannot be named, sent, written or believed, what it depends on has
+            changed meanwhile or is another where a worker is, or a worker was killed.  And whatever the first cell to
+            fail raises.
 
     Warns:
         UserWarning: cells are not kept, since their code opens files that nothing names.
@@ -94,7 +96,7 @@ def finish(
     folder = None if folder is None else path_of(folder).absolute()
     executor = typed("executor", how.get("executor"), Executor | None)
     progress = typed("progress", how.get("progress"), Progress | None)
-    threads = typed("threads", how.get("threads"), int | None)
+    thread_count(threads := how.get("threads"))
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
     records = [cell.record() if folder else "" for cell in cells]
     paths = [

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.measures.captions import caption, of_starts
+from hexmj.measures.captions import caption, starts_in_words
 from hexmj.storage.literal import in_figure
 from hexmj.studies.ablation.study import MEASURES
 from hexmj.studies.league.study import REGIMES
@@ -48,7 +48,7 @@ def ablation_figure(result: "xr.Dataset") -> "Picture":
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
     starts = result.attrs["n_starts"]
-    counts = f"{of_starts(starts)}, {result.attrs['n_physical']} in physics, {min(starts, REGIMES)} for the limit"
+    counts = f"{starts_in_words(starts)}, {result.attrs['n_physical']} in physics, {min(starts, REGIMES)} for the limit"
     heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
     head(figure, heading, f"{counts}; {caption(result)}")
     if used:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hexmj.measures.captions import caption, of_starts
+from hexmj.measures.captions import caption, starts_in_words
 from hexmj.storage.literal import in_figure
 from hexmj.studies.league.table import MEASURES, by_rank, place
 
@@ -59,7 +59,7 @@ def league_figure(result: "xr.Dataset") -> "Picture":
     missing = shown.missing.values > 0
     titles = dict(zip(MEASURES, ("on paper (kinematic)", "under the feet (measured)", "falls (physical)"), strict=True))
     panels = [
-        Panel(f"{title}\n{of_starts(shown[f'{name}_starts'].max().item())}", shown[name].values, "YlOrRd", SHARES,
+        Panel(f"{title}\n{starts_in_words(shown[f'{name}_starts'].max().item())}", shown[name].values, "YlOrRd", SHARES,
               None if name == "kinematic" else missing)
         for name, title in titles.items()
     ]  # fmt: skip
@@ -79,7 +79,7 @@ def walks_figure(result: "xr.Dataset") -> "Picture":
     """Falls in trials, limit regimes and costs, the best in physics at the top, from `League`."""
     shown = by_rank(result)
     few = shown.fell_starts.values
-    trials = f"falls in trials at V = {result.attrs['tried_at']:g}\n{of_starts(few.max())}"
+    trials = f"falls in trials at V = {result.attrs['tried_at']:g}\n{starts_in_words(few.max())}"
     panels = (
         Panel(trials, shown.fell.values, "YlOrRd", SHARES, (few > 0) & (few < few.max())),
         Panel("limit regimes that are\nstatically stable", shown.stable.values, "YlGn", SHARES),

@@ -17,7 +17,7 @@ from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, TRIALS, crossed, walking
+from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, LOAD, TRIALS, crossed, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride, observation_time
@@ -110,7 +110,8 @@ class League:
         for entrant in self.entrants.values():
             random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
             check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
-        check_adhesion(self.conditions, self.stride, self.seed)
+        for load in (self.conditions.masses.load, LOAD):
+            check_adhesion(self.conditions.but(load=load), self.stride, self.seed)
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.measures.captions import of_starts, rules
+from hexmj.measures.captions import rules, starts_in_words
 from hexmj.measures.drawable_parts import check_axes, check_whole, what_parts_may_lack
 from hexmj.storage.attributes import settings
 from hexmj.storage.markdown import markdown_table
@@ -109,7 +109,7 @@ def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
         cells = (one.isel(velocity=i) for i in range(shown.sizes["velocity"]))
         rows.append((name, *(frequency(one, measure) + _left(one, measure) + _against(one, measure) for one in cells)))
     reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
-    told = f"{title} of {of_starts(starts)}"
+    told = f"{title} of {starts_in_words(starts)}"
     told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
     return Table(told, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
@@ -136,7 +136,7 @@ def _trials(shown: "xr.Dataset") -> Table:
         falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
         rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
     v = shown.attrs["tried_at"]
-    title = f"Falls at V = {v:g} in {of_starts(most)}; at last losses on paper without a leg.  {TOLD}"
+    title = f"Falls at V = {v:g} in {starts_in_words(most)}; at last losses on paper without a leg.  {TOLD}"
     return Table(title, ("controller", *shown.trial.values, "paper"), rows)
 
 

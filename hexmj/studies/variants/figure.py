@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from hexmj.measures.captions import caption, of_starts
+from hexmj.measures.captions import caption, starts_in_words
 from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import tidy
 from hexmj.storage.literal import in_figure
@@ -48,7 +48,7 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
     marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
     handles = [Line2D([], [], label=name, **dots | mark) for name, mark in (marks | STYLES).items()]
     figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
-    told = f"{of_starts(result.attrs['n_starts'])}; {caption(result)}"
+    told = f"{starts_in_words(result.attrs['n_starts'])}; {caption(result)}"
     head(figure, "FLSS with one constant or rule changed at a time", told)
     figure.supxlabel("\n".join(map(in_figure, notes(result))), fontsize=9)
     return figure
