@@ -294,7 +294,7 @@ class PointMasses:
             after.append(self.now[ids])
         rows = np.array(after).swapaxes(0, 1)
         seen = np.array(sensors).swapaxes(0, 1)
-        return Rolled(before, np.array(feet).swapaxes(0, 1), seen, control.copy(), rows)
+        return Rolled(before, np.array(feet).swapaxes(0, 1), seen, control.copy(), seen[:, :, 1:], rows)
 
     def _feet(self, ids: np.ndarray) -> np.ndarray:
         feet = np.full((len(ids), 6, 3), 100.0)
@@ -327,6 +327,7 @@ def test_any_engine_takes_strikes_again_finely():
     parts, force = shown["sensors"][:, :, 0], shown["sensors"][:, :, 1]
     assert_array_equal(parts, [8 * [1], [4, 4, 16, 16, 1, 1, 1, 1], 8 * [1], [64, 64, 1, 1, 1, 1, 1, 1]])
     assert_allclose(force[1], [0, 0, 9 / 16, 1, 1, 1, 1, 1])  # means over the parts of a step
+    assert_array_equal(shown["torque"][:, :, 0], force)  # so are these
     assert (shown["depth"][:3] <= 0.02).all()
     assert 0.02 < shown["depth"][3].max() <= 2140.0 * PointMasses.STEP / FINEST  # no finer than this
     alone = PointMasses(np.ones(1), np.array([5000.0]))

@@ -61,7 +61,8 @@ class Alone:
         return {"sensors": sensors, "force": force}
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """See `backend.Engine.roll`; no states are kept, since a plan's step is all that is taken at once."""
+        """See `backend.Engine.roll`; neither torques nor states are kept, since a plan's step is all that is taken at
+        once."""
         before = np.empty_like(self._begun)
         mujoco.mj_getState(self.model, self.data, before[0], _STATE)
         if parts == 1:
@@ -73,7 +74,8 @@ class Alone:
             mujoco.mj_step1(fine, self.data)
             seen = self._roll(control[0], fine)
             mujoco.mj_step1(self.model, self.data)
-        return Rolled(before, *seen, after=np.empty((1, control.shape[1], 0)))
+        nothing = np.empty((1, control.shape[1], 0))
+        return Rolled(before, *seen, torque=nothing, after=nothing)
 
     def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step for each row of the controls, (step, actuator); feet, sensors and force as `Rolled` has them."""

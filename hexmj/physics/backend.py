@@ -38,6 +38,8 @@ class Rolled:
     """(n, step, column) as each step begins."""
     force: np.ndarray
     """(n, step, actuator) as each step begins [g mm^2/s^2]."""
+    torque: np.ndarray
+    """(n, step, joint) as it acted over each step, in which the speed changes and with it the damping [g mm^2/s^2]."""
     after: np.ndarray
     """(n, step, state) after each step; what `Engine.put` takes."""
 
@@ -104,6 +106,8 @@ class MujocoBatch:
         self.push = self._batch.bind("xfrc_applied")[:, compiled.root, 1]
         self.sensors, self._foot = self._batch.bind("sensordata"), compiled.columns.foot
         self.force = self._batch.bind("actuator_force")
+        servos, speeds = compiled.columns.ctrl, compiled.columns.qvel.start + model.nq
+        self._joints = speeds, servos.start, -model.actuator_biasprm[servos, 2], compiled.torque_limits
 
     def reset(self) -> None:
         """All bodies as they were at first; nothing remains of those that diverged."""
@@ -166,7 +170,8 @@ class MujocoBatch:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
-        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], seen[AFTER])
+        torque = _acting(before.states, seen[AFTER], seen["actuator_force"], *self._joints)
+        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], torque, seen[AFTER])
 
     def replayed(self, ids: np.ndarray) -> Replayed:
         """What replays some bodies from now on; MuJoCo takes back states and pushes of one that diverges."""
@@ -222,6 +227,29 @@ def _side_by_side(ids: Any, values: Any) -> Any:
                 rows[i, at + j] = of_one[n, j]
         at += of_one.shape[1]
     return rows
+
+
+@jitted
+def _acting(before: Any, after: Any, force: Any, speeds: int, servos: int, damping: Any, limits: Any) -> Any:
+    """Torques of the joints over each step, (n, step, joint), of forces as it begins, and states before and after.
+
+    The damping of a servo is integrated implicitly, but of one that pulls at its limit.
+
+    Args:
+        speeds: first column of the states that holds a joint's.
+        servos: first column of the forces of a joint's.
+        damping: of each servo, (joint,).
+        limits: of each, (joint,).
+    """
+    torque = np.empty((force.shape[0], force.shape[1], len(damping)))
+    for n in range(torque.shape[0]):
+        for step in range(torque.shape[1]):
+            was = after[n, step - 1] if step else before[n]
+            for joint in range(len(damping)):
+                pull, at = force[n, step, servos + joint], speeds + joint
+                slowed = damping[joint] * (after[n, step, at] - was[at])
+                torque[n, step, joint] = pull if abs(pull) >= limits[joint] else pull - slowed
+    return torque
 
 
 @jitted

@@ -1,7 +1,8 @@
 """Settled insects carry out orders, and every chunk of steps shows what happened.
 
 A chunk shows the insects before each of their physics steps: what MuJoCo's sensors hold after a step belongs to the
-state before it.  Of a step in parts (`fine_steps`) it shows the first part, but for the ground's forces and the depth.
+state before it.  Of a step in parts (`fine_steps`) it shows the first part, but for the ground's forces, the torques
+that acted and the depth.
 """
 
 from collections.abc import Iterable
@@ -23,7 +24,7 @@ from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
 from hexmj.walks import PlannedWalk, joined
 
-SHOWN = ("qpos", "sensors", "standing", "targets", "force", "depth")
+SHOWN = ("qpos", "sensors", "standing", "targets", "force", "torque", "depth")
 """What is shown of every start, see `Chunk`."""
 
 
@@ -47,6 +48,8 @@ class Chunk:
     """(n, substep, leg, 3) where the tips shall be, in the root frame [mm]."""
     force: np.ndarray
     """(n, substep, joint) torques of the joints [g mm^2/s^2]."""
+    torque: np.ndarray
+    """(n, substep, joint) the same as they acted over each substep, their means over a step in parts."""
     depth: np.ndarray
     """(n, substep) how deep the deepest foot gets in the ground by the end of each substep [mm]; negative above it."""
     valid: np.ndarray

@@ -19,7 +19,8 @@ from hexmj.jitted import jitted
 from hexmj.physics.backend import Diverged, Engine
 
 Shown = dict[str, np.ndarray]
-"""What is shown of some bodies by its name, each (n, substep, ...): sensors, force, depth, and the states after."""
+"""What is shown of some bodies by its name, each (n, substep, ...): sensors, force, torque, depth, and the states
+after."""
 
 SINK = 0.02
 """How deep a foot may be in the ground, as a share of the standing height."""
@@ -83,16 +84,19 @@ class FineSteps:
             raise
         depth, m = self.depth_of(seen.feet), self.substeps
         strike = strikes(depth, parts * m, self.allowed)
-        shown = {"sensors": seen.sensors, "force": seen.force, "depth": depth[:, 1:].max(axis=2), "after": seen.after}
+        shown = {"sensors": seen.sensors, "force": seen.force, "torque": seen.torque, "after": seen.after}
+        shown["depth"] = depth[:, 1:].max(axis=2)
         struck = np.where(strike.any(axis=1), begin + np.argmax(strike, axis=1) // (parts * m) * m, end)
         return seen.before, shown, struck
 
     def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
         """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""
         before, every, struck = self._roll(ids, control, begin, end, parts)
+        torque = every["torque"].reshape(len(ids), end - begin, parts, every["torque"].shape[2])
         shown = {
             "sensors": in_whole_steps(every["sensors"], parts, self.touch),
             "force": every["force"][:, ::parts],
+            "torque": torque.mean(axis=2),
             "depth": every["depth"].reshape(len(ids), -1, parts).max(axis=2),
             "after": every["after"][:, parts - 1 :: parts],
         }

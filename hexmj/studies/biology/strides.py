@@ -103,13 +103,11 @@ def strides_between(
     """
     model, columns = settled.compiled.model, settled.compiled.columns
     h, m, rows = model.opt.timestep, settled.substeps, slice(begun[0], begun[-1])
-    qpos, sensors, force, standing = (
+    qpos, sensors, force, torque, standing = (
         np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
-        for name in ("qpos", "sensors", "force", "standing")
+        for name in ("qpos", "sensors", "force", "torque", "standing")
     )
     moved = np.diff(qpos, axis=0) / h  # row t is the velocity at row t + 1
-    turning, damping = moved[:, columns.qpos], -model.actuator_biasprm[columns.ctrl, 2]
-    torques = force[1:-1] - damping * np.diff(turning, axis=0)
     ground = []
     for row in range(begun[0], begun[-1], m):
         qvel = np.zeros(model.nv)
@@ -121,8 +119,8 @@ def strides_between(
         hop=rows_of_a_hop(settled),
         qpos=qpos[rows],
         velocity=moved[begun[0] - 1 : begun[-1] - 1, :3],
-        turning=turning[begun[0] - 1 : begun[-1] - 1],
-        torques=torques[begun[0] - 2 : begun[-1] - 2],
+        turning=moved[begun[0] - 1 : begun[-1] - 1, columns.qpos],
+        torques=torque[begun[0] - 1 : begun[-1] - 1],
         standing=standing[rows],
         centre=sensors[rows, columns.centre_of_mass],
         every=m,
