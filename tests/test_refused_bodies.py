@@ -170,6 +170,12 @@ def root_joint(attribute: str) -> dict[str, str]:
         (root_joint('frictionloss="300"'), r"frictionloss = 300\.0 of the root; expected 0"),
         (root_joint('armature="5"'), r"armature = 5\.0 of the root; expected 0"),
         (root_joint('stiffness="5000"'), r"stiffness = 5000\.0 of the root; expected 0"),
+        (
+            {JOINT: f'{JOINT}damping="-1000" '},
+            r"damping = -1000\.0 of a leg's joint; expected 0 or more: a joint takes",
+        ),
+        ({JOINT: f'{JOINT}damping="0 -5" '}, r"damping = \[-5\.0, .* of a leg's joint; expected 0 or more"),
+        ({JOINT: f'{JOINT}frictionloss="-1" '}, r"frictionloss = -1\.0 of a leg's joint; expected 0 or more"),
         ({WORLD: SKY, TRUNK: f'<site name="top"/>{TRUNK}'}, "number of tendons = 1; expected"),
         ({WORLD: FLEX + WORLD}, "number of flexes = 1; expected none"),
         ({"<asset>": PLUGIN, "</sensor>": f"{GRID}</sensor>"}, "number of plugins = 1; expected none"),

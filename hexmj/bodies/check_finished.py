@@ -38,6 +38,7 @@ class Owner(NamedTuple):
 
 _ALL, _OBJECT = slice(None), mujoco.mjtObj
 MODEL, ROOT, ROOT_DOFS = Owner("", _ALL), Owner(" of the root", slice(1)), Owner(" of the root", slice(ROOT_QVEL))
+LEG_DOFS = Owner(" of a leg's joint", slice(ROOT_QVEL, None))
 JOINT = Owner(" of the joint", _ALL, _OBJECT.mjOBJ_JOINT)
 BODY = Owner(" of the body", _ALL, _OBJECT.mjOBJ_BODY)
 ACTUATOR = Owner(" of the actuator", _ALL, _OBJECT.mjOBJ_ACTUATOR)
@@ -60,6 +61,7 @@ class Rule(NamedTuple):
 
 
 HOLDS, FREE, SERVO = "none: it might hold the body up", "0: the root is free", "0: a servo is no more than its gains"
+TAKES = "0 or more: a joint takes energy, and gives none"
 
 RULES = (
     Rule("number of equality constraints", "neq", MODEL, 0, 0, HOLDS),
@@ -73,6 +75,10 @@ RULES = (
     Rule("damping", "dof_dampingpoly", ROOT_DOFS, 0, 0, FREE),
     Rule("frictionloss", "dof_frictionloss", ROOT_DOFS, 0, 0, FREE),
     Rule("armature", "dof_armature", ROOT_DOFS, 0, 0, FREE),
+    Rule("damping", "dof_damping", LEG_DOFS, 0, inf, TAKES),
+    Rule("damping", "dof_dampingpoly", LEG_DOFS, 0, inf, TAKES),
+    Rule("frictionloss", "dof_frictionloss", LEG_DOFS, 0, inf, TAKES),
+    Rule("armature", "dof_armature", LEG_DOFS, 0, inf, TAKES),
     Rule("stiffness", "jnt_stiffness", ROOT, 0, 0, FREE),
     Rule("stiffness", "jnt_stiffnesspoly", ROOT, 0, 0, FREE),
     Rule("margin", "jnt_margin", JOINT, 0, 0, "0: a joint is free up to the ends of its range"),
