@@ -86,8 +86,18 @@ def test_starts_that_cannot_stand_are_left_out_everywhere():
     assert 0 < animal.sizes["start"] < 8
     assert np.array_equal(animal.fall.sel(value=0.0), paper.fall.sel(start=animal.start, value=0.0))
     assert animal.static.sel(value=-9.4).item() > animal.kinematic.sel(value=-9.4).item()
-    with pytest.raises(InputError, match="load = 10; none of 8 starts stands on six feet there"):
+    with pytest.raises(
+        InputError, match="load = 10; none of 8 starts stands on six feet there and reaches its tips at V = "
+    ):
         conduct(StabilityMap(LDVS, "load", [10.0], **few))
+
+
+def test_starts_whose_tips_are_out_of_reach_are_left_out_everywhere():
+    few: dict[str, Any] = {"velocities": [0.5, 0.7], "n_starts": 9}
+    low = conduct(StabilityMap(LDVS, "standing_height", [6.0, 10.0], **few))
+    usual = conduct(StabilityMap(LDVS, "standing_height", [10.0], **few))
+    assert low.stand.values.tolist() == [low.sizes["start"], 9] and 0 < low.sizes["start"] < 9
+    assert np.array_equal(low.fall.sel(value=10.0), usual.fall.sel(start=low.start, value=10.0))
 
 
 def test_the_body_as_it_is_now_decides_which_starts_stand(tmp_path):

@@ -13,10 +13,11 @@ a stance while the foot is loaded, and hastens transitions otherwise, is from me
 How it maps: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where
 the tip is between PEP_0 and AEP_0; a leg is lifted as y becomes negative.  Ours, since the source is about quadrupeds
 and its marks of load were not found: a period lasts 1 s of the source's time; all legs are coupled, k_ij = 1 within a
-tripod and -1 between the two, after the source's trot; a leg at the end of its stance waits while it carries more than
-a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three; a transition is
-hastened in the second half of a stance when a foot carries nothing, and of a swing when it carries anything.  Fitted
-to a measure: nothing.  Sensed: the load on each foot.
+tripod and -1 between the two, after the source's trot; a leg at the end of its stance waits while it carries more
+than a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three, and at the
+end of its swing while its foot carries nothing; a transition is hastened in the second half of a stance when a foot
+carries nothing, and of a swing when it carries anything.  Fitted to a measure: nothing.  Sensed: the load on each
+foot.
 
 Periods come out 6 to 19 % shorter than a single leg's.
 """

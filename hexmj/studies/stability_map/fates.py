@@ -1,12 +1,13 @@
 """What happens to every start at one velocity and one value of a condition: a cell of a stability map."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import InputError, OutOfReach, SimulationError
 from hexmj.measures.frequency import over_start
 from hexmj.measures.outcome_table import UNITS
 from hexmj.measures.physical import PhysicalWalk, walk_of_settings
@@ -28,22 +29,26 @@ BLOCK = 100
 def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
     """Every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad], over start.
 
-    Starts that cannot stand on six feet are left out; `over` is the condition that the map varies.
+    Starts that cannot stand on six feet, or whose tips are out of reach, are left out; `over` is the condition that the
+    map varies.
 
     Raises:
-        InputError, SimulationError: no start that stands; see `measures.physical.physical_walk`.
+        InputError, SimulationError: no start is left; see `measures.physical.physical_walk`.
     """
     n_starts, conditions = walks.n_starts, walks.conditions
     files = content(conditions.body.mjcf)
     stands = standing_starts(n_starts, walks.seed, conditions, walks.stride, threads, files)
-    if not stands.size:
+    blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
+    parts = [part for block in blocks for part in _within_reach(walks, block, threads)]
+    if not parts:
         value = conditions.flat()[over]
-        raise InputError(f"{over} = {value:g}; none of {n_starts} starts stands on six feet there")
-    starts = walks.starts[stands]
-    blocks = np.split(starts, range(BLOCK, len(starts), BLOCK))
-    parts = [_fates_of(walk_of_settings(walks, block, threads), threads) for block in blocks]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(start=stands)
+        raise InputError(
+            f"{over} = {value:g}; none of {n_starts} starts stands on six feet there and reaches its tips"
+            f" at V = {walks.velocity:g}"
+        )
+    columns = {name: np.concatenate([part[name] for _, part in parts]) for name in parts[0][1]}
+    within = np.concatenate([which for which, _ in parts])
+    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(start=within)
 
 
 @lru_cache(maxsize=1)
@@ -67,6 +72,18 @@ def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads:
         halves = np.array_split(starts, 2)
         return np.concatenate([_stands(half, conditions, stride, threads) for half in halves])
     return np.ones(len(starts), dtype=bool)
+
+
+def _within_reach(
+    walks: WalkSettings, which: np.ndarray, threads: int | None
+) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """Some of the starts, (n,), in parts with their fates; those whose tips are out of reach are left out."""
+    try:
+        yield which, _fates_of(walk_of_settings(walks, walks.starts[which], threads), threads)
+    except OutOfReach:
+        if len(which) > 1:
+            for half in np.array_split(which, 2):
+                yield from _within_reach(walks, half, threads)
 
 
 def _fates_of(walk: PhysicalWalk, threads: int | None) -> dict[str, np.ndarray]:

@@ -49,7 +49,7 @@ class StabilityMap(SameStarts):
     """The same starts at every value of a condition and every velocity.
 
     No controller that reads the legs: mechanisms are told from the plan alone.  Starts that cannot stand on six feet at
-    every value are left out of the result.
+    every value, or do not reach their tips at every value and velocity, are left out of the result.
     """
 
     over: Over = "vp"
@@ -136,11 +136,15 @@ class StabilityMap(SameStarts):
         table = over_axes(sizes, data, join="inner", combine_attrs="override")
         if not table.sizes["start"]:
             raise InputError(
-                f"{self.over} = {self.chosen}; none of {self.n_starts} starts stands on six feet at all of them"
+                f"{self.over} = {self.chosen}; none of {self.n_starts} starts stands on six feet and reaches its"
+                " tips at all of them"
             )
-        stand = [one.sizes["start"] for one in data[:: sizes["velocity"]]]
+        left, v = [{*one.start.values.tolist()} for one in data], sizes["velocity"]
+        stand = [len(set.intersection(*left[i : i + v])) for i in range(0, len(left), v)]
         return table.assign_coords(
             **velocity_axis(*self.observed),
             value=("value", self.chosen, {"units": condition.unit, "long_name": condition.name}),
             mechanism_name=("mechanism_name", list(MECHANISMS)),
-        ).assign(stand=("value", stand, {"units": "1", "long_name": "starts that stand on six feet"}))
+        ).assign(
+            stand=("value", stand, {"units": "1", "long_name": "starts that stand on six feet and reach their tips"})
+        )
