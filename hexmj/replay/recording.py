@@ -29,8 +29,8 @@ from hexmj.walks import PlannedWalk, one_start
 def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
     """What the physical insect did from one start, and what was planned; NaN after a fall.
 
-    What is called planned is the plan on paper, whose loss is the kinematic one; but `planned_tip` is where the tips were
-    told to be, which differs where the plan reads the legs.
+    What is called planned is the plan on paper, whose loss is the kinematic one; but `planned_tip` is where the tips
+    were told to be, which differs where the plan reads the legs.
 
     Args:
         walk: physical walks kept whole.
