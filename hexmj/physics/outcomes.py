@@ -56,8 +56,8 @@ class Outcomes:
     slip: np.ndarray
     """(start,) mean sliding speed of a foot in contact [mm/s]."""
     tracking: np.ndarray
-    """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], to
-    0.01 mm; inf beyond 20 mm."""
+    """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], in bins
+    of `Lengths.tracking_bin`: to 0.01 mm, and inf beyond 20 mm, of the stick insect."""
     depth: np.ndarray
     """(start,) how deep the deepest foot was in the ground until the fall [mm]."""
     saturation: np.ndarray
