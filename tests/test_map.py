@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexmj import LDVS, Conditions, InputError, ReadsLegs, compare
+from hexmj import LDVS, Conditions, InputError, ReadsLegs, Stride, compare
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
@@ -90,6 +90,12 @@ def test_starts_that_cannot_stand_are_left_out_everywhere():
         InputError, match="load = 10; none of 8 starts stands on six feet there and reaches its tips at V = "
     ):
         conduct(StabilityMap(LDVS, "load", [10.0], **few))
+
+
+def test_starts_whose_tips_are_out_of_reach_at_rest_are_left_out():
+    wide: dict[str, Any] = {"n_starts": 8, "window": 5.0, "stride": Stride(pep_min=-30.0, pep0=-25.0)}
+    result = conduct(StabilityMap(LDVS, "vp", [80.0], [0.5], **wide))
+    assert 0 < result.stand.item() == result.sizes["start"] < 8
 
 
 def test_starts_whose_tips_are_out_of_reach_are_left_out_everywhere():

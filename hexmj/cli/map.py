@@ -80,7 +80,7 @@ class Map(StudyCommand):
         yield _reasons(result)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         starts = f"{result.sizes['start']} of {starts_in_words(self.starts)}"
-        yield f"{starts}, which stand on six feet and reach their tips at every value ({', '.join(stand)})"
+        yield f"{starts}, which stand on six feet and reach nine of ten tips at every value ({', '.join(stand)})"
         yield self.conditions_line(varied=[self.over])
 
 

@@ -12,7 +12,7 @@ from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import check_home, compile_body
 from hexmj.checks import given
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import InputError, OutOfReach, SimulationError
 from hexmj.physics.backend import STATE, Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import SINK
@@ -101,7 +101,7 @@ class Settling:
         joints, reachable = compiled.inverse(tips)
         if not reachable.all():
             start, leg = np.argwhere(~reachable)[0]
-            raise InputError(
+            raise OutOfReach(
                 f"start {names[start]}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
                 f" at a standing height of {height:g} mm"
             )
@@ -167,7 +167,7 @@ def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:
         InputError: it does.
     """
     if conditions.contact.grasp > 0:
-        with suppress(SimulationError):  # whether this start comes to rest is asked where it walks
+        with suppress(OutOfReach, SimulationError):  # whether this start comes to rest is asked where it walks
             settle(draw_starts(1, seed, stride), conditions, stride, threads=1)
 
 

@@ -84,7 +84,7 @@ def last_strides(
     for start in walked:
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, hop)
-        begun = begun[begun > 1]  # before the first row no velocity is known
+        begun = begun[begun > 1]  # not the strides that begin from rest
         if len(begun) > 1:
             yield int(start), strides_between(settled, chunks, start, begun, forces)
 

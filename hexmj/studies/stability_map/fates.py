@@ -29,8 +29,8 @@ BLOCK = 100
 def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
     """Every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad], over start.
 
-    Starts that cannot stand on six feet, or whose tips are out of reach, are left out; `over` is the condition that the
-    map varies.
+    Starts that cannot stand on six feet, or more than a tenth of whose tips is out of reach, are left out; `over` is
+    the condition that the map varies.
 
     Raises:
         InputError, SimulationError: no start is left; see `measures.physical.physical_walk`.
@@ -64,8 +64,8 @@ def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads:
     """Which starts come to rest on six feet, (start,); one that diverges is an error."""
     try:
         settle(starts, conditions, stride, threads)
-    except SimulationError as error:
-        if error.state:
+    except (OutOfReach, SimulationError) as error:
+        if isinstance(error, SimulationError) and error.state:
             raise
         if len(starts) == 1:
             return np.array([False])
@@ -77,7 +77,7 @@ def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads:
 def _within_reach(
     walks: WalkSettings, which: np.ndarray, threads: int | None
 ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
-    """Some of the starts, (n,), in parts with their fates; those whose tips are out of reach are left out."""
+    """Some of the starts, (n,), in parts with their fates; those are left out that do not reach nine of ten tips."""
     try:
         yield which, _fates_of(walk_of_settings(walks, walks.starts[which], threads), threads)
     except OutOfReach:

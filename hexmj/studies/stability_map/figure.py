@@ -113,7 +113,8 @@ def _drawn(result: "xr.Dataset") -> "xr.Dataset":
 def _told(result: "xr.Dataset") -> str:
     """Who walked, and how many of the starts count."""
     count, drawn = result.sizes["start"], result.attrs["starts"]
-    return caption(result) + (f"; {count} of them stand and reach their tips at every value" if count < drawn else "")
+    left = f"; {count} of them stand and reach nine of ten tips at every value" if count < drawn else ""
+    return caption(result) + left
 
 
 def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:

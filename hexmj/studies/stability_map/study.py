@@ -49,7 +49,7 @@ class StabilityMap(SameStarts):
     """The same starts at every value of a condition and every velocity.
 
     No controller that reads the legs: mechanisms are told from the plan alone.  Starts that cannot stand on six feet at
-    every value, or do not reach their tips at every value and velocity, are left out of the result.
+    every value, or do not reach nine of ten tips at every value and velocity, are left out of the result.
     """
 
     over: Over = "vp"
@@ -145,6 +145,4 @@ class StabilityMap(SameStarts):
             **velocity_axis(*self.observed),
             value=("value", self.chosen, {"units": condition.unit, "long_name": condition.name}),
             mechanism_name=("mechanism_name", list(MECHANISMS)),
-        ).assign(
-            stand=("value", stand, {"units": "1", "long_name": "starts that stand on six feet and reach their tips"})
-        )
+        ).assign(stand=("value", stand, {"units": "1", "long_name": "starts that stand and reach nine of ten tips"}))
