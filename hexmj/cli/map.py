@@ -63,7 +63,7 @@ class Map(StudyCommand):
         return Outputs(f"walking over {self.over}", f"{self.over}.nc", figures, f"{self.over}-manifest.json")
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """Everything over values and velocities, and how many starts stand at all of them."""
+        """Everything over values and velocities, and how many starts are left."""
         return super().summary(result) | {"starts": result.sizes["start"]}
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:

@@ -114,10 +114,10 @@ class StabilityMap(SameStarts):
             less static, and `change` of physical from the value in `attrs["reference"]`, with 95 % intervals; the
             Froude number `froude`; over mechanism too the numbers of starts, `count`.  Over (value, velocity, start):
             every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad].  Over
-            value: how many starts `stand`.
+            value: how many starts `stand`, and reach nine of ten tips at every velocity.
 
         Raises:
-            InputError: no start stands at every value.
+            InputError: no start is left.
         """
         from hexmj.studies.stability_map.differences import froude, with_differences
 
@@ -129,7 +129,7 @@ class StabilityMap(SameStarts):
         return self.labelled(table, "map", over=self.over, reference=reference)
 
     def _over_values(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """What happened to the starts that stand at every value, over (value, velocity, start)."""
+        """What happened to the starts that are left, over (value, velocity, start)."""
         from hexmj.studies.stability_map.mechanisms import MECHANISMS
 
         sizes, condition = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
