@@ -37,5 +37,5 @@ def test_a_map_tells_how_many_starts_stand_at_every_value() -> None:
     study = StabilityMap(LDVS, "centre_of_mass", (0.0, 15.0), (0.3,), n_starts=12, window=20.0)
     result = conduct(study, threads=1)
     for draw in (map_figure, mechanisms_figure):
-        assert draw(result).get_suptitle().endswith("; 11 of them stand on six feet at every value")
+        assert draw(result).get_suptitle().endswith("; 11 of them stand and reach nine of ten tips at every value")
         assert "of them" not in draw(conduct(replace(study, values=(0.0,)), threads=1)).get_suptitle()
