@@ -77,6 +77,9 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'.  'tripod': so do those
     along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
     'negative metachrony': both between 0 and 0.5, front, middle, hind.
+
+    Raises:
+        InputError: phases that are no numbers.
     """
     along = typed("phase_12", phase_12, float), typed("phase_23", phase_23, float)
     typed("contralateral", contralateral, float)
