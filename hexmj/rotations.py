@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z) of a root: vectors turned, its heading, and how far its vertical leans."""
+"""Unit quaternions (w, x, y, z) of a root: vectors turned, its heading, and how far it leans."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def turned(points: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far the root's vertical leans ahead and to the left, (..., 2) [sine], and its tilt, (...) [rad]."""
+    """How far a root's axes ahead and to the left dip below the level, (..., 2) [sine], and its tilt, (...) [rad]."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     leans = np.stack([2.0 * (w * y - x * z), -2.0 * (w * x + y * z)], axis=-1)
     return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))

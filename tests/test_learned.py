@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -209,6 +210,61 @@ def test_what_all_insects_share_is_not_asked_of_some_or_set():
     insects.set_options({"reset_mask": None})
     with pytest.raises(InputError, match=r"options = .*; expected none"):
         insects.reset()
+
+
+@pytest.mark.slow
+def test_held_actions_without_sense_are_refused():
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    face = importlib.import_module("hexmj.environments.stable_baselines")
+    insects, told = face.FeltInsects(2, duration=1.0), list[Any]([np.ones(2)])
+
+    def held(numbers: object = 1, steps: object = 2) -> Any:
+        return face.HeldInsects(insects, numbers, steps, lambda *_: np.zeros((2, 18)), lambda *_: told[0])
+
+    for steps in (0, -1, 2.5, True, "2"):
+        with pytest.raises(InputError, match=r"steps = .*; expected a whole number of at least 1"):
+            held(steps=steps)
+    with pytest.raises(InputError, match=r"numbers = 0; expected a whole number"):
+        held(numbers=0)
+    walked = held()
+    with pytest.raises(InputError, match="a step before the first reset"):
+        walked.step(np.zeros((2, 1)))
+    walked.reset()
+    with pytest.raises(InputError, match="or without an action"):
+        walked.step_wait()
+    for actions, sentence in (
+        (np.zeros((2, 7)), r"an action has the shape \(2, 7\); expected \(2, 1\)"),
+        ([[0.0], [5.0]], "an action has 5.0; expected -1 to 1"),
+        ([[0.0], [np.nan]], "an action has nan; expected -1 to 1"),
+        ("ab", "action = 'ab'; expected numbers"),
+        (1j * np.ones((2, 1)), "action = .*; expected numbers"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            walked.step(actions)
+    for reward in (np.ones((2, 1)), np.array([0.0, np.nan]), 1.0, "no"):
+        told[0] = reward
+        with pytest.raises(InputError, match=r"reward = .*; expected"):
+            walked.step(np.zeros((2, 1)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("actions", "sentence"),
+    [("abc", "expected numbers"), (np.full((2, 18), 1j), "expected numbers"), (np.zeros((1, 18)), "has the shape")],
+)
+def test_actions_that_are_none_are_refused_by_felt_insects(actions, sentence):
+    pytest.importorskip("stable_baselines3", exc_type=ImportError)
+    face = importlib.import_module("hexmj.environments.stable_baselines")
+    insects = face.FeltInsects(2, duration=1.0)
+    insects.reset()
+    with pytest.raises(InputError, match=sentence):
+        insects.step(actions)
+    with pytest.raises(InputError, match="action = None; expected numbers"):
+        insects.step_wait()
+    with pytest.raises(InputError, match="index = 9; expected a whole number of at least 0 and at most 1"):
+        insects.get_attr("task", 9)
+    with pytest.raises(InputError, match="actions = 'joints'; expected none: it is settled here"):
+        face.FeltInsects(2, actions="joints")
 
 
 @pytest.mark.slow

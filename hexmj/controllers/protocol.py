@@ -67,7 +67,7 @@ class Sensed:
     torques: np.ndarray
     """(n, leg, joint) of the servos [g mm^2/s^2]."""
     tilt: np.ndarray
-    """(n, 2) how far the root's vertical leans ahead and to the left [rad]."""
+    """(n, 2) by how much the axes of the root that point ahead and to the left dip below the level [rad]."""
     velocity: np.ndarray
     """(n, 3) of the root, ahead, to the left and up as seen from its heading [mm/s]."""
     turning: np.ndarray

@@ -17,8 +17,13 @@ try:
 except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
+from hexmj import checks
 from hexmj.environments.learned import FELT, MOST, felt_in
+from hexmj.environments.task import checked_actions
 from hexmj.environments.vector import StickInsects
+
+MANY = 10**6
+"""Most numbers of an action, and most steps of one."""
 
 Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Offsets of the tips, (n, leg * axis), of actions, (n, number), and what is felt, (n, `FELT`)."""
@@ -32,10 +37,17 @@ class FeltInsects(VecEnv):
     """Insects whose actions are offsets to the tips; episodes begin anew in the step in which they end."""
 
     def __init__(self, num_envs: int, **task: Any) -> None:
-        """Its settings are those of `vector.StickInsects`, but for the actions and when episodes begin."""
+        """Its settings are those of `vector.StickInsects`, but for the actions and when episodes begin.
+
+        Raises:
+            InputError: a value that makes no sense.
+        """
+        if settled := sorted({"actions", "autoreset_mode"} & task.keys()):
+            raise InputError(f"{settled[0]} = {task[settled[0]]!r:.80}; expected none: it is settled here")
         self._insects = StickInsects(num_envs, actions="tips", autoreset_mode="SameStep", **task)
         felt = spaces.Box(-MOST, MOST, (FELT,), np.float32)
         super().__init__(num_envs, felt, self._insects.single_action_space)  # pyright: ignore[reportArgumentType]
+        self._actions: Any = None
 
     def reset(self) -> np.ndarray:
         """Begin all episodes, by the seeds of `seed` if there are some.
@@ -51,11 +63,17 @@ class FeltInsects(VecEnv):
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions that `step_wait` will carry out."""
-        self._actions = np.asarray(actions, dtype=float)
+        self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """One step of all insects."""
-        observed, reward, fell, over, last = self._insects.step(self._actions)
+        """One step of all insects, with the actions that were taken for it.
+
+        Raises:
+            InputError: none were, or some are out of bounds.
+            SimulationError: an insect that diverged.
+        """
+        actions, self._actions = self._actions, None
+        observed, reward, fell, over, last = self._insects.step(actions)
         done, infos = fell | over, [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(done).tolist():
             final = {name: values[np.newaxis] for name, values in last["final_obs"][i].items()}
@@ -72,7 +90,7 @@ class FeltInsects(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute that all insects share."""
-        return [getattr(self._insects, attr_name)] * len([*self._get_indices(indices)])
+        return [getattr(self._insects, attr_name)] * len(self._some(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: all that an insect is made with is settled.
@@ -92,13 +110,16 @@ class FeltInsects(VecEnv):
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No insect is wrapped by itself."""
-        return [False] * len([*self._get_indices(indices)])
+        return [False] * len(self._some(indices))
 
     def _seen(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
-    def _all(self, indices: int | Sequence[int] | None) -> int:
-        if {*self._get_indices(indices)} != {*range(self.num_envs)}:
+    def _some(self, indices: Any) -> list[int]:
+        return [checks.whole("index", one, 0, self.num_envs - 1) for one in self._get_indices(indices)]
+
+    def _all(self, indices: Any) -> int:
+        if {*self._some(indices)} != {*range(self.num_envs)}:
             raise InputError(
                 f"indices = {indices!r:.80}; expected all {self.num_envs} insects, which are one environment"
             )
@@ -113,10 +134,17 @@ class HeldInsects(VecEnvWrapper):
     """
 
     def __init__(self, insects: FeltInsects, numbers: int, steps: int, moves: Moves, reward: Reward) -> None:
-        """Actions of so many numbers, -1 to 1, each held for so many steps."""
+        """Actions of so many numbers, -1 to 1, each held for so many steps.
+
+        Raises:
+            InputError: no numbers or steps.
+        """
+        self._shape = (checks.whole("numbers", numbers, 1, MANY),)
         nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
-        super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, (numbers,), np.float32))
-        self._insects, self._steps, self._moves, self._reward = insects, steps, moves, reward
+        super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, self._shape, np.float32))
+        self._steps = checks.whole("steps", steps, 1, MANY)
+        self._insects, self._moves, self._reward = insects, moves, reward
+        self._actions = self._felt = None
         self._constant = np.ones((self.num_envs, 1), np.float32)
 
     def reset(self) -> np.ndarray:
@@ -125,22 +153,43 @@ class HeldInsects(VecEnvWrapper):
         return self._constant
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take the actions that `step_wait` will carry out."""
+        """Take the actions that `step_wait` will carry out.
+
+        Raises:
+            InputError: something else, or numbers beyond -1 to 1.
+        """
+        actions = checked_actions(actions, (self.num_envs, *self._shape))
+        if not (within := np.abs(actions) <= 1.0).all():
+            raise InputError(f"an action has {actions[~within][0]}; expected -1 to 1")
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """All steps of one action."""
+        """All steps of one action.
+
+        Raises:
+            InputError: there is none, no episode has begun, or rewards that are no finite numbers.
+            SimulationError: an insect that diverged.
+        """
+        actions, self._actions = self._actions, None
+        if self._felt is None or actions is None:
+            raise InputError("a step before the first reset, or without an action; expected a reset, then an action")
         reward, done = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for _ in range(self._steps):
-            self._insects.step_async(self._moves(self._actions, self._felt))
+            self._insects.step_async(self._moves(actions, self._felt))
             self._felt, gained, ends, told = self._insects.step_wait()
             fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in told])
             last = self._felt.copy()
             for i in np.flatnonzero(ends).tolist():
                 last[i] = told[i]["terminal_observation"]
-            reward += ~done * self._reward(gained, last, fell)
+            reward += ~done * self._rewarded(gained, last, fell)
             for i in np.flatnonzero(ends & ~done).tolist():
                 infos[i] = told[i] | {"terminal_observation": self._constant[i]}
             done |= ends
         return self._constant, (reward / self._steps).astype(np.float32), done, infos
+
+    def _rewarded(self, gained: np.ndarray, last: np.ndarray, fell: np.ndarray) -> np.ndarray:
+        reward = checks.numbers("reward", self._reward(gained, last, fell))
+        if reward.shape != (self.num_envs,) or not np.isfinite(reward).all():
+            raise InputError(f"reward = {checks.short(reward)}; expected {self.num_envs} finite numbers")
+        return reward
