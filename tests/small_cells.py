@@ -1,4 +1,4 @@
-"""Small cells for the tests of sweeps, and what is left of them; a user's file, and where processes find both."""
+"""Small cells for the tests of sweeps; a user's file, and where processes find both."""
 
 import os
 import time
@@ -100,14 +100,6 @@ def odd_cells(n: int = 6) -> list[Cell]:
 
 def counted_cells(log: Path, n: int = 6, **settings: object) -> list[Cell]:
     return [Cell(f"number {i}", counted, {"log": str(log), "number": i} | settings) for i in range(n)]
-
-
-def calls(log: Path) -> list[str]:
-    return (log / "calls").read_text().split("\n")[:-1] if (log / "calls").exists() else []
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def assert_same_bits(these: Sequence[xr.Dataset], those: Sequence[xr.Dataset]) -> None:

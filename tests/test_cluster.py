@@ -24,7 +24,8 @@ from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import flss
 from hexmj.sweeps import Cell, run
 from hexmj.sweeps.cluster import workers_of
-from small_cells import ENVIRONMENT, calls, contents, counted_cells, odd_cells
+from left_by_cells import calls, contents
+from small_cells import ENVIRONMENT, counted_cells, odd_cells
 
 DASK = [sys.executable, "-m", "dask"]
 WORKERS = ("--nworkers", "2", "--nthreads", "1", "--no-dashboard", "--death-timeout", "60")

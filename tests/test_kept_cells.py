@@ -16,16 +16,8 @@ import xarray as xr
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, finish, run
 from hexmj.user_code.loaded import importable
-from small_cells import (
-    ENVIRONMENT,
-    MINE,
-    assert_same_bits,
-    calls,
-    contents,
-    counted_cells,
-    odd_cells,
-    of_object,
-)
+from left_by_cells import calls, contents
+from small_cells import ENVIRONMENT, MINE, assert_same_bits, counted_cells, odd_cells, of_object
 
 
 def test_a_kept_cell_is_netcdf_that_tells_what_it_depends_on(tmp_path: Path) -> None:

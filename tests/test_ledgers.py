@@ -7,7 +7,7 @@ import pytest
 
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, KeptValues
-from small_cells import calls
+from left_by_cells import calls
 
 
 def squares(rows: np.ndarray, log: str) -> np.ndarray:

@@ -125,6 +125,20 @@ def test_what_a_field_names_counts(
     assert len(list(Path("kept").glob("*.nc"))) == 2
 
 
+@pytest.mark.parametrize(
+    "gain",
+    [
+        '[it := Path(at, "gain"), gain := float(it.read_text()), it.write_text(str(gain))][1]',
+        '[it := Path(at, "gain"), it.open("a").close(), float(it.read_text())][2]',
+        '[os.replace(at + "/gain", "held"), float(Path("held").read_text()), os.replace("held", at + "/gain")][1]',
+    ],
+)
+def test_what_it_writes_once_it_has_read_it_counts(computed: Callable[..., tuple[float, int]], gain: str) -> None:
+    for calls in (1, 2):
+        with pytest.warns(UserWarning, match=r"^reader is not kept: its code opens or runs"):
+            assert computed(gain) == (1.0, calls)
+
+
 def test_what_it_remembers_of_an_earlier_call_is_not_forgotten(computed: Callable[..., tuple[float, int]]) -> None:
     gain = 'remembered(f"{at}/gain")'
     with pytest.warns(UserWarning, match="not kept"):
@@ -182,6 +196,8 @@ def test_a_file_that_is_missing_counts_too(
         "[Path('a').write_text(str(np.random.random())), float(Path('a').read_text() > '')][1]",
         "[hexmj.save(xr.Dataset({'a': np.random.random()}), 'a.nc'), hexmj.load('a.nc'), 1.0][2]",
         "[Path('a').write_text(str(np.random.random())), os.replace('a', 'b'), Path('b').read_text(), 1.0][3]",
+        "[Path('it.part').write_text('1.0'), os.replace('it.part', 'it'), float(Path('it').read_text())][2]",
+        "[it := open('log', 'a'), it.write('1.0'), it.close(), open('log', 'a').close(), 1.0][4]",
         "[(it := tempfile.mkstemp()), os.write(it[0], b'1.0'), os.close(it[0]), float(Path(it[1]).read_text())][3]",
         "len(list(Path(at).rglob('*.json')))",
         "len(hexmj.load_controller('graham').name) / 6",

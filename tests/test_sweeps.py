@@ -14,18 +14,8 @@ import xarray as xr
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, conduct, over_axes, run
 from hexmj.user_code.loaded import importable
-from small_cells import (
-    MINE,
-    Wave,
-    assert_same_bits,
-    calls,
-    contents,
-    counted_cells,
-    odd_bits,
-    odd_cells,
-    of_object,
-    told_how,
-)
+from left_by_cells import calls, contents
+from small_cells import MINE, Wave, assert_same_bits, counted_cells, odd_bits, odd_cells, of_object, told_how
 
 
 @pytest.fixture(scope="module")

@@ -47,6 +47,9 @@ _COMPUTING: dict[int, set[str]] = {}
 WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
+_ANEW: set[str] = set()
+"""What of it the code knows, since nothing was left of what it held before."""
+
 _WRITTEN_EVER: set[str] = set()
 """What this program has written itself at any time."""
 
@@ -80,7 +83,7 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
     known = {os.path.realpath(file) for file in (*sources, *told)}
 
     def beyond(files: set[str]) -> set[str]:
-        return {file for file in files - WRITTEN if os.path.realpath(file) not in known}
+        return {file for file in files if os.path.realpath(file) not in known}
 
     found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
     for file in sources:
@@ -114,26 +117,34 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = os.path.abspath(name)
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            _note(file, event == "os.rename" or (event == "open" and _only_writes(arguments[2])), event == "open")
+            if event == "os.rename":
+                source = os.path.abspath(os.fsdecode(arguments[0]))
+                writes, anew = True, source in _ANEW or not _is_data(source)
+            else:
+                writes, anew = _writes(file, arguments[2]) if event == "open" else (False, False)
+            if not writes:
+                return _note(file, event == "open")
+            _WRITTEN_EVER.add(file)
+            if _COMPUTING:
+                WRITTEN.add(file)
+                _ANEW.update([file] if anew else [])
 
 
-def _note(file: str, written: bool, read: bool) -> None:
+def _note(file: str, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     main = threading.main_thread()
     in_main = threading.current_thread() is main
-    if written:
-        WRITTEN.update([file] if _COMPUTING else [])
-        _WRITTEN_EVER.add(file)
-        return
     if read and not opener.f_code.co_filename.startswith(_OURS):
         _AT_FIRST.setdefault(file, _stamp(file))
+    if file in _ANEW:
+        return
     if by is not None:
         by.add(file)
         return
     if in_main or not _COMPUTING:
-        found = _openers(opener, file)
+        found = _openers(opener)
         if not (found or in_main):
-            found = _openers(sys._current_frames().get(main.ident or 0), file)
+            found = _openers(sys._current_frames().get(main.ident or 0))
         for one in found:
             _OPENED.setdefault(one, set()).add(file)
     if _COMPUTING and not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
@@ -158,14 +169,15 @@ def _reads_a_source(file: str, by: FrameType) -> bool:
     return file.endswith(".py") and by.f_code.co_filename.endswith(_READS_SOURCES)
 
 
-def _only_writes(flags: int) -> bool:
-    """Whether a file is opened to be written, or made, without regard to what it holds."""
-    return flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY or bool(flags & (os.O_TRUNC | os.O_EXCL))
+def _writes(file: str, flags: int) -> tuple[bool, bool]:
+    """Whether a file is opened to be written or made, not to be read, and whether nothing is left of what it held."""
+    anew = bool(flags & (os.O_TRUNC | os.O_EXCL)) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
+    return anew or flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY, anew
 
 
-def _openers(frame: FrameType | None, file: str) -> set[str]:
+def _openers(frame: FrameType | None) -> set[str]:
     """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
-    Where this package opens it for them, that module alone, and no script for a controller that it loads."""
+    Where this package opens it for them, that module alone."""
     found, ours = set[str](), False
     while frame:
         by = frame.f_code.co_filename
@@ -175,8 +187,7 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
             if frame.f_code.co_name == "<module>":
-                loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith((".py", ".toml"))
-                return set() if loads else {plain(os.path.abspath(by)), *found}
+                return {plain(os.path.abspath(by)), *found}
             if not (ours or found):
                 found.add(plain(os.path.abspath(by)))
         frame = frame.f_back
