@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
@@ -272,10 +271,11 @@ class Elsewhere(Executor):
         self.here, self.there = here, there
 
     def submit(self, fn, /, *args, **kwargs):  # pyright: ignore[reportIncompatibleMethodOverride]
-        parcel, future = cast(Any, fn).__self__, Future[xr.Dataset]()
-        path, mark = (self.there / one.relative_to(self.here) for one in (parcel.path, parcel.mark))
+        parcel, future = cast(Any, fn), Future[xr.Dataset]()
+        given = *parcel.args, *args
+        moved = [self.there / one.relative_to(self.here) if isinstance(one, Path) else one for one in given]
         try:
-            future.set_result(replace(parcel, path=path, mark=mark).compute())
+            future.set_result(parcel.func(*moved))
         except InputError as error:
             future.set_exception(error)
         return future

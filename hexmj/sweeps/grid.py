@@ -4,10 +4,9 @@ import math
 import os
 import pickle
 import socket
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
@@ -28,6 +27,12 @@ if TYPE_CHECKING:
 
     Made = tuple[xr.Dataset, str]
     """The data of a cell, and why it is not kept; see `Cell.not_kept`."""
+
+_Task = tuple[Cell, str, Path | None]
+"""A cell, its record and its file; nothing of these where nothing is kept."""
+
+_Parcel = Callable[[Path | None], "Made"]
+"""A cell on its way to a worker, who calls it with the mark of the folder."""
 
 
 class Study(Protocol):
@@ -99,25 +104,30 @@ def finish(
     thread_count(threads := how.get("threads"))
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
     records = [cell.record() if folder else "" for cell in cells]
-    paths = [
-        folder / f"{cell.stem(record)}.nc" if folder else None for cell, record in zip(cells, records, strict=True)
+    tasks: list[_Task] = [
+        (cell, record, folder / f"{cell.stem(record)}.nc" if folder else None)
+        for cell, record in zip(cells, records, strict=True)
     ]
     if folder:
-        finished_all = all(path and os.path.exists(path) for path in paths)
+        finished_all = all(path and os.path.exists(path) for _, _, path in tasks)
         (remove_leftovers if finished_all else prepare)(folder)
-    share, warned = _Share(cells, progress), False
+    work, done, warned = sum(cell.work for cell in cells), [0.0] * len(cells), False
+
+    def tell(i: int, more: float) -> None:
+        """So much more of a cell is done."""
+        done[i] += more
+        if progress:
+            progress(more * (cells[i].work / work))
+
     if executor is None:
-        made = (
-            (i, _made(cell, paths[i], records[i], threads=threads, progress=partial(share.tell, i)))
-            for i, cell in enumerate(cells)
-        )
+        made = ((i, _made(*task, threads=threads, progress=partial(tell, i))) for i, task in enumerate(tasks))
     else:
-        made = _elsewhere(executor, cells, records, paths, folder, threads or 1)
+        made = _elsewhere(executor, tasks, folder, threads or 1)
     for i, (data, not_kept) in made:
         if not_kept and not warned:
             warned = True
             warn(not_kept, stacklevel=2)
-        share.finish(i)
+        tell(i, 1.0 - done[i])
         yield i, data
     if folder:
         remove_leftovers(folder)  # once more: workers of one that was killed may have outlived its begin
@@ -142,25 +152,7 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     return whole
 
 
-class _Share:
-    """Tells progress of what of all work each cell has done."""
-
-    def __init__(self, cells: Sequence[Cell], progress: Progress | None) -> None:
-        whole = sum(cell.work for cell in cells)
-        self._parts, self._done, self._progress = [one.work / whole for one in cells], [0.0] * len(cells), progress
-
-    def tell(self, i: int, done: float) -> None:
-        """So much more of a cell is done."""
-        self._done[i] += done
-        if self._progress:
-            self._progress(done * self._parts[i])
-
-    def finish(self, i: int) -> None:
-        """All of it."""
-        self.tell(i, 1.0 - self._done[i])
-
-
-def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made":
+def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
@@ -175,56 +167,37 @@ def _made(cell: Cell, path: Path | None, record: str, **execution: Any) -> "Made
     return (write(path, record, data), "") if path and not not_kept else (data, not_kept if path else "")
 
 
-@dataclass(frozen=True)
-class _Parcel:
-    """A cell on its way to a worker."""
-
-    pickled: bytes
-    record: str
-    path: Path | None
-    threads: int
-    mark: Path | None = None
-    """A file of the folder, which is there as long as somebody waits for the cell."""
-
-    def compute(self) -> "Made":
-        """The cell, by a worker that sees what the cell was sent from: files, code, packages and folder."""
-        here = f"a worker on {socket.gethostname()}"
-        try:
-            cell = pickle.loads(self.pickled)
-            record = cell.record()
-        except InputError as error:
-            raise InputError(f"{here}: {error}") from None
-        except Exception as error:
-            raise InputError(
-                f"{here} cannot load a cell: {error}; expected the files and packages of the sender"
-            ) from None
-        if record != self.record:
-            other = difference(self.record, record)
-            raise InputError(
-                f"{cell.name}: {here} has another {other} than the sender; start the worker again, in the same folder"
-            )
-        if self.mark and not self.mark.exists():
-            raise InputError(
-                f"{cell.name}: {here} does not see the folder {self.mark.parent}; expected it to be shared"
-            )
-        return _made(cell, self.path, record, threads=self.threads)
+def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
+    """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
+    long as somebody waits."""
+    here = f"a worker on {socket.gethostname()}"
+    try:
+        cell = pickle.loads(pickled)
+        its_record = cell.record()
+    except InputError as error:
+        raise InputError(f"{here}: {error}") from None
+    except Exception as error:
+        raise InputError(f"{here} cannot load a cell: {error}; expected the files and packages of the sender") from None
+    if its_record != record:
+        other = difference(record, its_record)
+        raise InputError(
+            f"{cell.name}: {here} has another {other} than the sender; start the worker again, in the same folder"
+        )
+    if mark and not mark.exists():
+        raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
+    return _made(cell, record, path, threads=threads)
 
 
 def _elsewhere(
-    executor: Executor,
-    cells: Sequence[Cell],
-    records: Sequence[str],
-    paths: Sequence[Path | None],
-    folder: Path | None,
-    threads: int,
+    executor: Executor, tasks: Sequence[_Task], folder: Path | None, threads: int
 ) -> Iterator[tuple[int, "Made"]]:
     """What is kept, and then what an executor's workers make of the rest."""
     parcels = dict[int, _Parcel]()
-    for i, (cell, record, path) in enumerate(zip(cells, records, paths, strict=True)):
+    for i, (cell, record, path) in enumerate(tasks):
         if path and (kept := find(path, record)) is not None:
             yield i, (kept, "")
         else:
-            parcels[i] = _Parcel(_pickled(cell), record or cell.record(), path, threads)
+            parcels[i] = partial(_made_by_a_worker, _pickled(cell), record or cell.record(), path, threads)
     yield from _by_others(executor, parcels, folder)
 
 
@@ -234,7 +207,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
     with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in parcels.items():
-                futures[_submitted(executor, replace(parcel, mark=mark))] = i
+                futures[_submitted(executor, parcel, mark)] = i
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenExecutor:
@@ -252,11 +225,11 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.cancel()
 
 
-def _submitted(executor: Executor, parcel: _Parcel) -> "Future[Made]":
+def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Future[Made]":
     if has_given_up(executor):
         raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:
-        return executor.submit(parcel.compute)
+        return executor.submit(parcel, mark)
     except BrokenExecutor:
         raise
     except RuntimeError as error:  # it was shut down
