@@ -59,16 +59,7 @@ def encode(data: "xr.Dataset") -> bytes:
 
 
 def _check_attributes(of: str, attributes: Mapping[Any, Any], taken: set[str]) -> None:
-    """Refuse attributes that would not be read as they are.
-
-    Args:
-        of: whose they are.
-        attributes: by name.
-        taken: names that are not read as attributes.
-
-    Raises:
-        InputError: with the name of the first one.
-    """
+    """Refuse attributes that would not be read as they are, by their names in `taken` or by their values."""
     for name, value in attributes.items():
         if name in taken:
             raise InputError(f"NetCDF would be read otherwise: {of} has the attribute {name}; expected none")
