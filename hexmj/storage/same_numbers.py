@@ -12,7 +12,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.storage import netcdf
-from hexmj.storage.files import opened, read_text, read_toml, unsealed
+from hexmj.storage.files import read_bytes, read_text, read_toml, unsealed
 
 ATTRIBUTES = "(attributes)"
 """Stands for all attributes of a NetCDF file and of its variables."""
@@ -51,22 +51,13 @@ def compared(then: Path, now: Path) -> list[Compared]:
     Raises:
         InputError: one cannot be read.
     """
-    before, after = variables(then), variables(now)
+    before, after = (_READERS[path.suffix](path) for path in (then, now))
     lone = [(name, one.size, "not there now") for name, one in before.items() if name not in after]
     lone += [(name, one.size, "not there then") for name, one in after.items() if name not in before]
     return [
         *(_beside(name, one, after[name]) for name, one in before.items() if name in after),
         *(Compared(name, size, size, None, misfit) for name, size, misfit in lone),
     ]
-
-
-def variables(path: Path) -> dict[str, np.ndarray]:
-    """All that a NetCDF, JSON or TOML file holds, by name.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    return _READERS[path.suffix](path)
 
 
 def _beside(name: str, then: np.ndarray, now: np.ndarray) -> Compared:
@@ -96,8 +87,7 @@ def _distance(a: Any, b: Any) -> float:
 def _of_netcdf(path: Path) -> dict[str, np.ndarray]:
     """Variables, all attributes as one, and all axes as one text; with the seal or without it, since a number may have
     been changed."""
-    with opened(path) as file:
-        content = file.read()
+    content = read_bytes(path)
     data = netcdf.decode(unsealed(content) or content, f"{path} cannot be read as NetCDF")
     variables = {str(name): one for name, one in sorted(data.variables.items())}
     owners: dict[tuple[str, ...], Any] = {(): data} | {(name,): one for name, one in variables.items()}
@@ -159,4 +149,4 @@ def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:
 
 
 _READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": lambda path: _gathered(read_toml(path))}
-"""End of a file's name -> what reads it."""
+"""End of a file's name -> what reads all that it holds, by name."""
