@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import os
 from collections.abc import Sequence
 from contextlib import suppress
@@ -67,7 +66,10 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
         missing = path.absolute().relative_to(nearest.absolute()).parts
         if os.pardir in missing:
             raise InputError(f"--out {path} leads through {missing[0]}, which is not there; expected a folder")
-        _try(nearest, missing)
+        for name in missing:  # that the system may not take
+            with suppress(FileNotFoundError):
+                os.lstat(nearest / name)
+        try_writing(nearest)
         taken = [name for name in names if (path / name).exists() and not (path / name).is_file()]
     except OSError as error:
         raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None
@@ -76,14 +78,6 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
         raise InputError(f"--out {path}: {taken[0]} is a {what} there; expected a file or nothing")
     remove_leftovers(path)
     return path
-
-
-def _try(folder: Path, missing: Sequence[str]) -> None:
-    """Write a file into a folder and remove it; look up the names of folders that are still to be made in it."""
-    for name in missing:
-        with suppress(FileNotFoundError):
-            os.lstat(folder / name)
-    try_writing(folder)
 
 
 def save_dataset(data: "xr.Dataset", path: Path) -> Path:
@@ -107,14 +101,5 @@ def save_text(text: str, path: Path) -> Path:
 
 def json_text(value: Any) -> str:
     """JSON with null for numbers that are not finite."""
-    return json.dumps(_finite(value), indent=2, default=str)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
+    finite = json.loads(json.dumps(value, default=str), parse_constant=lambda _: None)
+    return json.dumps(finite, indent=2)
