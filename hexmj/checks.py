@@ -45,7 +45,9 @@ def typed(name: str, value: Any, wanted: Any) -> Any:
     try:
         return _fitted(value, wanted)
     except TypeError:
-        raise InputError(f"{name} = {short(value)}; {_expected(wanted)}") from None
+        names = _names(wanted)
+        expected = f"valid names: {', '.join(names)}" if names else f"expected {_kind(wanted)}"
+        raise InputError(f"{name} = {short(value)}; {expected}") from None
 
 
 def given(name: str, value: Of | None, usual: Callable[[], Of]) -> Of:
@@ -176,12 +178,6 @@ def _is_of_any_length(wanted: Any) -> bool:
     return get_origin(wanted) is Sequence or Ellipsis in get_args(wanted)
 
 
-def _expected(wanted: Any) -> str:
-    if names := _names(wanted):
-        return f"valid names: {', '.join(names)}"
-    return f"expected {_kind(wanted)}"
-
-
 def _names(wanted: Any) -> list[str]:
     """Of a `Literal` or an enumeration; none of anything else."""
     if get_origin(wanted) is Literal:
@@ -195,12 +191,8 @@ def _kind(wanted: Any) -> str:
         return f"one of {', '.join(names)}"
     if origin in (tuple, Sequence):
         count = "some" if _is_of_any_length(wanted) else len(inner)
-        kinds = dict.fromkeys(_kind(one) for one in inner if one is not Ellipsis)
-        return (
-            f"{count} values, each {next(iter(kinds))}"
-            if len(kinds) == 1
-            else f"{count} values: {', '.join(map(_kind, inner))}"
-        )
+        kinds = [_kind(one) for one in inner if one is not Ellipsis]
+        return f"{count} values" + (f", each {kinds[0]}" if len({*kinds}) == 1 else f": {', '.join(kinds)}")
     if origin in (Union, UnionType):
         return " or ".join(map(_kind, inner))
     name = (origin or wanted).__name__
