@@ -24,9 +24,6 @@ The paper's contralateral pairs (1-3), (2-4), (5-6) are taken for a misprint of 
 IPSILATERAL, CONTRALATERAL = slice(0, 4), slice(4, 7)
 """Where the two kinds lie on a ``pair`` axis."""
 
-TRIPOD_PHASE = 0.5
-"""Tripod gait: all neighbouring legs move in anti-phase."""
-
 NEAR = 0.05
 """Phases that differ by no more than this count as equal where a gait is named."""
 
@@ -85,7 +82,7 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     typed("contralateral", contralateral, float)
     if not abs(contralateral - 0.5) <= NEAR:
         return "other"
-    if all(abs(phase - TRIPOD_PHASE) <= NEAR for phase in along):
+    if all(abs(phase - 0.5) <= NEAR for phase in along):
         return "tripod"
     if all(0.5 < phase < 1.0 for phase in along):
         return "positive metachrony"
