@@ -1,7 +1,7 @@
 """The figure that belongs to a result, fresh or read from its file."""
 
 from collections.abc import Callable
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from hexmj.checks import typed
@@ -63,8 +63,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     chosen = next(iter(figures)) if typed("which", which, str | None) is None else which
     if chosen not in figures:
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
-    module, _, name = figures[chosen].partition(":")
-    draw: Callable[[xr.Dataset], Picture] = getattr(import_module(f"hexmj.{module}"), name)
+    draw: Callable[[xr.Dataset], Picture] = resolve_name(f"hexmj.{figures[chosen]}")
     with what_parts_may_lack(result, f"the figure {chosen!r} cannot be drawn"):
         if _study(result) != RECORDING:
             check_axes(result)
