@@ -101,7 +101,7 @@ def code(modules: frozenset[str]) -> Code:
     """
     needed, data = _needed(modules), dict[str, list[str]]()
     for name, file, paths in needed.modules:
-        source = sources_as_run.as_run(file, _stamp(name)) or (file.read_bytes() if file not in _AT_FIRST else None)
+        source = sources_as_run.as_run(file, name) or (file.read_bytes() if file not in _AT_FIRST else None)
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         for path in paths:
@@ -221,7 +221,7 @@ def _is_installed(file: Path) -> bool:
 @cache
 def _read(name: str, file: Path) -> _Module:
     try:
-        changed, held = file.stat().st_mtime_ns, sources_as_run.as_run(file, _stamp(name)) or file.read_bytes()
+        changed, held = file.stat().st_mtime_ns, sources_as_run.as_run(file, name) or file.read_bytes()
     except OSError as error:  # as of one in an archive
         raise InputError(f"{file} cannot be read: {error.strerror}; expected sources as files") from None
     if _AT_FIRST.get(file, changed) != changed:
@@ -276,8 +276,3 @@ def _called(one: ast.AST, package: str) -> Iterator[_Wanted]:
             case [ast.Constant(value=str(name)), *_] if name.strip("."):
                 with suppress(ImportError):
                     yield resolve_name(name, package), ""
-
-
-def _stamp(module: str) -> str:
-    """The version of a loaded file that is meant."""
-    return module.partition("@")[2]

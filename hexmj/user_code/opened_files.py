@@ -16,7 +16,7 @@ from traceback import walk_stack
 from types import FrameType
 from typing import Any
 
-from hexmj.user_code.sources_as_run import is_users, plain
+from hexmj.user_code.sources_as_run import is_users
 
 _PATH = {"open": 0, "exec": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
@@ -187,9 +187,9 @@ def _openers(frame: FrameType | None) -> set[str]:
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
             if frame.f_code.co_name == "<module>":
-                return {plain(os.path.abspath(by)), *found}
+                return {os.path.abspath(by), *found}
             if not (ours or found):
-                found.add(plain(os.path.abspath(by)))
+                found.add(os.path.abspath(by))
         frame = frame.f_back
     return found
 

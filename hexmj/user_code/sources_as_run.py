@@ -38,12 +38,12 @@ _STALE: set[str] = set()
 """Files of which bytecode ran that is not of their source, which Python knows by its time and size alone."""
 
 
-def as_run(file: Path, stamp: str = "") -> bytes | None:
+def as_run(file: Path, module: str) -> bytes | None:
     """The source of a file as it ran; None of one that did not.
 
     Args:
         file: of Python.
-        stamp: the first digits of the digest of the version that is meant.
+        module: its name; that of a loaded file tells by a digest which version is meant.
 
     Raises:
         InputError: it ran in several versions, and none or more than one is meant; or as none that it has.
@@ -52,7 +52,7 @@ def as_run(file: Path, stamp: str = "") -> bytes | None:
         raise InputError(f"{file} ran as {cache_from_source(file)} keeps it, not as it is; delete that and start again")
     if (versions := RUN.get(str(file))) is None:
         return None
-    meant = [one for one in versions if digest(one).startswith(stamp)]
+    meant = [one for one in versions if digest(one).startswith(module.partition("@")[2])]
     if len(meant) != 1:
         raise InputError(f"{file} was edited while this program used it; start it again")
     return meant[0]
@@ -63,16 +63,11 @@ def is_users(file: str) -> bool:
     return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
 
 
-def plain(file: str) -> str:
-    """A file's name as `Path` writes it, without ``./`` and ``//``, which a path of modules may have."""
-    return str(Path(file))
-
-
 def _note(file: Any, runs: CodeType | None = None) -> None:
     """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
     if not isinstance(file, str) or file.endswith(COMPILED) or not is_users(file):
         return
-    file = plain(file)
+    file = str(Path(file))  # without ./ and //, which a path of modules may have
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
         if (source := Path(file).read_bytes()) not in (versions := RUN.setdefault(file, [])):
             versions.append(source)
