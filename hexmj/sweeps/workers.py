@@ -31,7 +31,7 @@ def _leave_later(*_: object) -> None:
     _leave()
 
 
-def _leave(*_: object) -> None:
+def _leave() -> None:
     """End at once, without what is half written."""
     for part in list(WRITING):
         with suppress(OSError):
