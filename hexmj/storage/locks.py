@@ -56,15 +56,13 @@ def among_writers(folder: Path, alone: bool = False) -> Iterator[bool]:
     Yields:
         Whether this is sure: not where the system has no such locks.
     """
-    file = None
+    file, sure = None, False
     try:
-        try:
+        with suppress(OSError):
             file = os.open(folder, os.O_RDONLY)
             if fcntl:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
-            sure = fcntl is not None
-        except OSError:
-            sure = False
+                sure = True
         yield sure
     finally:
         if file is not None:
