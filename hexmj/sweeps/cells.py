@@ -57,7 +57,7 @@ class Cell:
             InputError: a setting, or the function, is nothing that can be written down.
         """
         told = self._told()
-        made = code(frozenset(self._modules()))
+        made = code(self._modules())
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
     def settings_now(self) -> str:
@@ -73,7 +73,7 @@ class Cell:
             opened: while it was computed.
         """
         try:
-            sources, data = needed_files(frozenset(self._modules()))
+            sources, data = needed_files(self._modules())
         except InputError:  # it has no source, so that it is named by nothing
             return ""
         if not sources:
@@ -93,10 +93,10 @@ class Cell:
 
     def data(self) -> list[Path]:
         """Files of data that texts of its code name."""
-        return needed_files(frozenset(self._modules()))[1]
+        return needed_files(self._modules())[1]
 
-    def _modules(self) -> list[str]:
-        return [one.__module__ for one in (self.function, *classes([self.settings, self._owner]))]
+    def _modules(self) -> frozenset[str]:
+        return frozenset(one.__module__ for one in (self.function, *classes([self.settings, self._owner])))
 
     def _told(self) -> dict[str, Any]:
         if not hasattr(self.function, "__qualname__"):
