@@ -54,7 +54,8 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
             f"result is of the type {type(result).__name__}; expected a Dataset: a result, what hexmj.load reads, or"
             " what hexmj.record makes of a walk"
         )
-    figures = FIGURES.get(_study(result))
+    study = RECORDING if "planned_stance" in result else str(result.attrs.get("study", ""))
+    figures = FIGURES.get(study)
     if figures is None:
         raise InputError(
             f"a dataset of {', '.join(map(str, result.data_vars)) or 'nothing':.80}; expected a result, or what"
@@ -65,12 +66,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
         raise InputError(f"which = {which!r:.80}; valid names: {', '.join(figures)}")
     draw: Callable[[xr.Dataset], Picture] = resolve_name(f"hexmj.{figures[chosen]}")
     with what_parts_may_lack(result, f"the figure {chosen!r} cannot be drawn"):
-        if _study(result) != RECORDING:
+        if study != RECORDING:
             check_axes(result)
             check_window(result)
         return draw(result)
-
-
-def _study(result: "xr.Dataset") -> str:
-    """What a dataset is of, a key of `FIGURES` if it is a result."""
-    return RECORDING if "planned_stance" in result else str(result.attrs.get("study", ""))
