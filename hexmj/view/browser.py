@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import asdict, replace
+from itertools import takewhile
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -70,7 +71,6 @@ class BrowserView:
         server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         server.initial_camera.position, server.initial_camera.look_at = (-45.0, -85.0, 55.0), (5.0, 0.0, 0.0)
         self._recent: deque[Moment] = deque()
-        self._laid = None
         self._lay()
         self._make_controls()
         self._make_charts()
@@ -78,9 +78,7 @@ class BrowserView:
     def run(self, go_on: Callable[[], bool] = lambda: True) -> None:
         """Walk and show until `go_on` says no."""
         try:
-            for n, passed in enumerate(ticks()):
-                if not go_on():
-                    return
+            for n, passed in enumerate(takewhile(lambda _: go_on(), ticks())):
                 self.step(passed, n % CHARTS == 0)
         finally:
             with redirect_stdout(io.StringIO()):

@@ -5,6 +5,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from functools import partial
+from itertools import takewhile
 from queue import SimpleQueue
 from textwrap import fill
 from typing import Any
@@ -26,7 +27,6 @@ REMEDY = "--browser shows it in a browser"
 
 PAUSE = "space pauses"
 KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
-
 """What the keyboard does, while a recording plays and while an insect walks."""
 
 SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
@@ -42,9 +42,7 @@ def view_live(session: LiveSession) -> None:
     """Walk until the window is closed."""
     walk, wishes = session.walk, SimpleQueue[int]()
     with _window(walk.conditions, wishes.put) as window:
-        for passed in ticks():
-            if not window.is_running():
-                return
+        for passed in takewhile(lambda _: window.is_running(), ticks()):
             while not wishes.empty():
                 session.attempt(partial(_obey, session, wishes.get()))
             moment = session.tick(passed)
@@ -58,9 +56,7 @@ def view_recording(session: ReplaySession) -> None:
     """Play until the window is closed."""
     take, wishes = session.take, SimpleQueue[int]()
     with _window(take.conditions, wishes.put) as window:
-        for passed in ticks():
-            if not window.is_running():
-                return
+        for passed in takewhile(lambda _: window.is_running(), ticks()):
             while not wishes.empty():
                 session.paused ^= wishes.get() == SPACE
             row = session.tick(passed)

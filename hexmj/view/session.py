@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from hexmj.bodies.loading import compile_body
 from hexmj.errors import InputError, SimulationError
 from hexmj.replay.take import Take
 from hexmj.view.live import LiveWalk, Moment
@@ -27,11 +26,11 @@ RECENT = 60
 """Pictures over which the factor is measured."""
 
 
-def ticks(hz: float = HZ) -> Iterator[float]:
+def ticks() -> Iterator[float]:
     """Seconds since the last picture, whenever one is due, for ever."""
     last = time.perf_counter()
     while True:
-        time.sleep(max(0.0, last + 1.0 / hz - time.perf_counter()))
+        time.sleep(max(0.0, last + 1.0 / HZ - time.perf_counter()))
         now = time.perf_counter()
         yield now - last
         last = now
@@ -98,15 +97,14 @@ class LiveSession:
 
 
 class ReplaySession:
-    """A recording in the time on the wall, again and again."""
+    """A recording, again and again, at half the speed of the time on the wall."""
 
-    def __init__(self, take: Take, slow_motion: float = 2.0) -> None:
-        """Play a take `slow_motion` times as slowly as it was."""
-        self.take, self._slow, self._seconds, self.paused = take, slow_motion, 0.0, False
-        self.compiled = compile_body(take.conditions)
+    def __init__(self, take: Take) -> None:
+        """About to begin."""
+        self.take, self._seconds, self.paused = take, 0.0, False
 
     def tick(self, passed: float) -> int:
         """Let so much time pass [s]; tells the step that is seen."""
         if not self.paused:
-            self._seconds = (self._seconds + passed / self._slow) % (self.take.end - self.take.begin + LIES)
+            self._seconds = (self._seconds + passed / 2) % (self.take.end - self.take.begin + LIES)
         return self.take.row(self.take.begin + self._seconds)
