@@ -194,17 +194,12 @@ class LiveWalk:
 
     def _ordered(self, steps: int) -> Iterator[Orders]:
         """Orders for the next steps; to a plan that reads, one by one, from what the last has brought about."""
-        if not self._plan.reads:
-            yield self._orders_for(steps)
-            return
-        for _ in range(steps):
-            self._plan.sense(self._insects.sensed(ONLY))
-            yield self._orders_for(1)
-
-    def _orders_for(self, steps: int) -> Orders:
-        orders = self._orders.ahead(ONLY, steps)
-        assert orders, "a walk of MOST_STEPS outlives who looks at it"
-        return orders
+        for part in [1] * steps if self._plan.reads else [steps]:
+            if self._plan.reads:
+                self._plan.sense(self._insects.sensed(ONLY))
+            orders = self._orders.ahead(ONLY, part)
+            assert orders, "a walk of MOST_STEPS outlives who looks at it"
+            yield orders
 
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:
         """What a chunk shows: the insect, and what was planned, as each but the first step begins, until it falls."""
