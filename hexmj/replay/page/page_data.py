@@ -20,18 +20,23 @@ APART = 0.005
 MOST_POSES = 4000
 """In one page; those of a longer walk are farther apart."""
 
+PLANNED = {"seconds": "f8", "velocity": "f4", "planned_margin": "f8", "planned_stance": "u1"}
+MEASURED = {"measured_margin": "f8", "measured_stance": "u1"}
+SHAPE = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
+"""What is told as it is of a recording, of a physical insect's, and of a shape -> its type."""
+
 
 def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
     """A recording and its take as JSON can hold them.
 
     Margins and times are float64, as the recording has them; places and poses are float32.
     """
-    compiled = compile_body(take.conditions)
+    compiled, body = compile_body(take.conditions), take.conditions.body
     every = max(1, round(APART / take.step), -(-len(take.qpos) // MOST_POSES))
     rows = np.unique(np.append(np.arange(0, len(take.qpos), every), len(take.qpos) - 1))
     poses, tips = _poses(compiled, take.qpos[rows])
     corners, level = _polygons(take, rows)
-    told = {
+    return {
         "title": take.title,
         "physical": take.physical,
         "conditions": told_conditions(take.conditions, take.physical),
@@ -42,14 +47,10 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "lost": _or_none(take.lost),
         "fell": _or_none(take.fell),
         "part": take.part,
-        "plane": float(compiled.model.geom(take.conditions.body.ground).pos[2]),
+        "plane": float(compiled.model.geom(body.ground).pos[2]),
         "gap": take.conditions.ground.ground == "gap",
-        "marks": {"tip": take.conditions.body.marks.tip, "outline": take.conditions.body.marks.outline}
-        | {"centre": take.conditions.body.marks.rim[0]},
-        "seconds": packed(recording["seconds"], "f8"),
-        "velocity": packed(recording["velocity"], "f4"),
-        "planned_margin": packed(recording["planned_margin"], "f8"),
-        "planned_stance": packed(recording["planned_stance"], "u1"),
+        "marks": {"tip": body.marks.tip, "outline": body.marks.outline, "centre": body.marks.rim[0]},
+        **_packed_parts(recording, PLANNED),
         "rows": packed(rows, "i4"),
         "poses": packed(poses, "f4"),
         "tips": packed(tips, "f4"),
@@ -57,13 +58,9 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "centre_of_mass": packed(take.centre_of_mass[rows], "f4"),
         "polygon": packed(corners, "f4"),
         "level": packed(level, "f4"),
-        "body": _packed_shape(body_shape(compiled.model)),
-        "ground": _packed_shape(ground_shape(compiled)),
-    }
-    if take.physical:
-        told["measured_margin"] = packed(recording["measured_margin"], "f8")
-        told["measured_stance"] = packed(recording["measured_stance"], "u1")
-    return told
+        "body": _packed_parts(body_shape(compiled.model), SHAPE),
+        "ground": _packed_parts(ground_shape(compiled), SHAPE),
+    } | (_packed_parts(recording, MEASURED) if take.physical else {})
 
 
 def told_conditions(conditions: Conditions, physical: bool) -> str:
@@ -111,9 +108,8 @@ def _polygons(take: Take, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners, level
 
 
-def _packed_shape(shape: Any) -> dict[str, Any]:
-    kinds = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
-    return {name: packed(getattr(shape, name), kind) for name, kind in kinds.items()}
+def _packed_parts(whole: Any, kinds: dict[str, str]) -> dict[str, Any]:
+    return {name: packed(getattr(whole, name), kind) for name, kind in kinds.items()}
 
 
 def _or_none(seconds: float) -> float | None:
