@@ -53,9 +53,7 @@ class Ablate(StudyCommand):
             self.velocities,
             self.starts,
             usual if self.physical_starts is None else self.physical_starts,
-            seed=self.walks.seed,
-            conditions=self.conditions,
-            stride=self.walks.stride,
+            **self.steady,
         )
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:

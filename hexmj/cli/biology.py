@@ -42,9 +42,7 @@ class Biology(StudyCommand):
             self.controlled.controller(self.model),
             self.periods,
             n_starts=self.starts,
-            seed=self.walks.seed,
-            conditions=self.conditions,
-            stride=self.walks.stride,
+            **self.steady,
         )
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:

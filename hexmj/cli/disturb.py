@@ -78,9 +78,7 @@ class Disturb(StudyCommand):
             not self.kinematic,
             n_starts=self.starts,
             window=self.walks.time,
-            seed=self.walks.seed,
-            conditions=self.conditions,
-            stride=self.walks.stride,
+            **self.steady,
         )
         met, usual = {*study.disturbances, *study.strategies}, Disturb()
         for name, needed in NEEDS.items():

@@ -94,9 +94,7 @@ class League(StudyCommand):
             **sizes,
             tried_at=self.trial_velocity,
             window=self.walks.time,
-            seed=self.walks.seed,
-            conditions=self.conditions,
-            stride=self.walks.stride,
+            **self.steady,
         )
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:

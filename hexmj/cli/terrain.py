@@ -68,9 +68,7 @@ class Terrain(StudyCommand):
             self.lengths,
             self.grasps,
             n_starts=self.starts,
-            seed=self.walks.seed,
-            conditions=self.conditions,
-            stride=self.walks.stride,
+            **self.steady,
         )
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:

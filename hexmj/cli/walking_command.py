@@ -41,6 +41,11 @@ class WalkingCommand:
         }
 
     @property
+    def steady(self) -> dict[str, Any]:
+        """How walks go that do not accelerate, as studies are told: seed, conditions and stride."""
+        return {"seed": self.walks.seed, "conditions": self.conditions, "stride": self.walks.stride}
+
+    @property
     def names(self) -> Sequence[str]:
         """Of the controllers that walk, as they were asked for."""
         own = vars(self)
