@@ -13,7 +13,6 @@ from hexmj.cli.tables import physical_report, print_json, report_line, save_figu
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.process.progress import progress_bar
 from hexmj.starts import SAMPLE
 from hexmj.storage.attributes import attributes, settings
 from hexmj.storage.results import results_folder, save_dataset
@@ -70,9 +69,9 @@ class Flss(WalkingCommand):
         self._print(result, self._write(result, self.out) if self.out else [])
 
     def _measured(self, controller: Controller) -> "xr.Dataset":
-        how: Any = self.walked | {"n_starts": self.n_starts, "threads": self.sweepers.threads_each}
-        with self.sweepers.executor() as executor, progress_bar(f"{self.kind} FLSS") as progress:
-            how |= {"folder": self.out and self.out / FINISHED, "executor": executor, "progress": progress}
+        how: Any = self.walked | {"n_starts": self.n_starts, "folder": self.out and self.out / FINISHED}
+        with self.sweepers.at_work(f"{self.kind} FLSS") as execution:
+            how |= execution
             if self.physical:
                 from hexmj.measures.compare import physical_flss
 

@@ -11,7 +11,6 @@ from hexmj.cli.study_command import lists_of
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show, table
 from hexmj.errors import InputError
-from hexmj.process.progress import progress_bar
 from hexmj.starts import MOST_DRAWN, check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.storage.results import results_folder, save_dataset, save_text
@@ -62,9 +61,8 @@ class Readings:
         if not 1 <= best <= len(readings):
             raise InputError(f"--best = {best}; expected 1 to {len(readings)}, as many readings as are tried")
         out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
-        with self.sweepers.executor() as executor, progress_bar("reading") as progress:
-            how = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
-            scores = compare_readings(readings, best, out / "scores", **how)  # pyright: ignore[reportArgumentType]
+        with self.sweepers.at_work("reading") as how:
+            scores = compare_readings(readings, best, out / "scores", **how)
         scores.attrs |= attributes({"only": self.only or ()})
         files = [
             save_text(readings_markdown(scores, readings), out / "readings.md"),

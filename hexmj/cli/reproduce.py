@@ -2,7 +2,6 @@
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
@@ -10,7 +9,6 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, show, table
 from hexmj.errors import InputError
-from hexmj.process.progress import progress_bar
 from hexmj.storage.results import results_folder
 
 
@@ -43,8 +41,7 @@ class Reproduce:
             raise InputError("--only without keys; expected at least one, or no --only for all")
         results_folder(self.out, (MANIFEST,))
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
-        with self.sweepers.executor() as executor, progress_bar("reproducing") as progress, as_shipped():
-            how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
+        with self.sweepers.at_work("reproducing") as how, as_shipped():
             rows, files = reproduce(self.out, protocol, self.only or (), self.beside, **how)
         settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": self.beside}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))

@@ -12,7 +12,6 @@ from hexmj.cli.options import Figures
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.cli.walking_command import WalkingCommand
-from hexmj.process.progress import progress_bar
 from hexmj.storage.attributes import settings
 from hexmj.storage.results import results_folder, save_dataset
 from hexmj.sweeps import Study, conduct
@@ -70,8 +69,7 @@ class StudyCommand(WalkingCommand):
         study, outputs = self.study(), self.outputs
         figures = {self.drawn.named(name): draw for name, draw in outputs.figures.items()}
         folder = results_folder(self.out, [outputs.data, *figures, outputs.manifest, *outputs.others])
-        with self.sweepers.executor() as executor, progress_bar(outputs.doing) as progress:
-            how: Any = {"executor": executor, "progress": progress, "threads": self.sweepers.threads_each}
+        with self.sweepers.at_work(outputs.doing) as how:
             result = conduct(study, folder / "walks", **how)
         files = [
             save_dataset(result, folder / outputs.data),

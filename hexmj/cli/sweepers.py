@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from typing import Any
 
 from hexmj.errors import InputError
+from hexmj.process.progress import progress_bar
 from hexmj.process.signals import STOPS, of_stop, stops_wait, unheard_by_children
 
 MOST_PROCESSES = 1000
@@ -34,6 +36,12 @@ class Sweepers:
         if self.threads is not None:
             return thread_count(self.threads)
         return max(1, thread_count() // max(1, self.processes)) if self.processes != 1 else None
+
+    @contextmanager
+    def at_work(self, label: str) -> Iterator[dict[str, Any]]:
+        """How cells are computed under a progress bar, as what conducts them is told; errors as of `executor`."""
+        with self.executor() as executor, progress_bar(label) as progress:
+            yield {"executor": executor, "progress": progress, "threads": self.threads_each}
 
     @contextmanager
     def executor(self) -> Iterator[Executor | None]:
