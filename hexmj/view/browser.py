@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from itertools import takewhile
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Any
 
 import mujoco
@@ -86,11 +86,8 @@ class BrowserView:
 
     def step(self, passed: float, charts: bool = True) -> None:
         """Do what was wished for, let so many seconds pass, and show what is seen then."""
-        while True:
-            try:
-                self.session.attempt(self._wishes.get_nowait())
-            except Empty:
-                break
+        while not self._wishes.empty():
+            self.session.attempt(self._wishes.get())
         moment = self.session.tick(passed)
         if self.session.walk.conditions != self._laid:
             self._lay()

@@ -32,13 +32,7 @@ def readout(session: LiveSession, moment: Moment) -> str:
     """What is said of a moment, in Markdown."""
     walk = session.walk
     margin = f"margin {moment.margin:+.1f} mm" if np.isfinite(moment.margin) else "no foot stands"
-    state = (
-        f"fell on {walk.fell_on}"
-        if walk.fell_on
-        else "within the polygon"
-        if moment.margin > 0
-        else "outside the polygon"
-    )
+    state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if moment.margin > 0 else 'outside'} the polygon"
     sign = "\N{HEAVY CHECK MARK}" if moment.margin > 0 and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
     lines = [
         f"**{margin}** {sign} {state}",
