@@ -45,5 +45,3 @@ class Page:
         else:
             size = files[0].stat().st_size / 1e6
             show(f"{size:.1f} MB; opens in any browser, without a network", *map(str, files))
-        for one in shown:
-            one.close()

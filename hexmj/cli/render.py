@@ -83,8 +83,6 @@ class Render(WalkingCommand):
             print_json(summary | {"recordings": [walk_summary(one) for one in shown]})
         else:
             show(f"{frames} frames at {self.film.fps:g} per second", *map(str, files))
-        for one in shown:
-            one.close()
 
     def _check(self) -> None:
         """Refuse options that would not be obeyed."""

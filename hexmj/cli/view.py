@@ -84,17 +84,16 @@ class View:
         if names := list(changed(self, obeyed)):
             name = names[0].replace("_", "-")
             raise InputError(f"--{name} was given with a recording; expected it only where an insect walks")
-        with load_recording(path) as recording:
-            if on_screen:
-                from hexmj.view.desktop import PAUSE, view_recording
-                from hexmj.view.session import ReplaySession
+        recording = load_recording(path)
+        if on_screen:
+            from hexmj.view.desktop import PAUSE, view_recording
+            from hexmj.view.session import ReplaySession
 
-                show(PAUSE, END)
-                view_recording(ReplaySession(Take.of(recording)))
-                return
-            text = page_text([recording])
+            show(PAUSE, END)
+            view_recording(ReplaySession(Take.of(recording)))
+            return
         from hexmj.view.served import page_server
 
-        with page_server(text, self.host, self.port) as server:
+        with page_server(page_text([recording]), self.host, self.port) as server:
             show(f"{path} plays at http://{self.host}:{server.server_port}", END)
             server.serve_forever(poll_interval=0.1)
