@@ -1,7 +1,7 @@
 """`hexmj map`."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,8 +38,8 @@ class Map(StudyCommand):
     """Number of random starts, the same for every value and velocity."""
     out: Path = Path("results/map")
     """Folder for figures, NetCDF, manifest and finished walks."""
-    controlled: OmitArgPrefixes[Controlled] = field(
-        default_factory=lambda: hiding(Controlled(), ["feedback"], "A map refuses controllers that read the legs.")
+    controlled: OmitArgPrefixes[Controlled] = hiding(
+        Controlled(), ["feedback"], "A map refuses controllers that read the legs."
     )
 
     def study(self) -> StabilityMap:
