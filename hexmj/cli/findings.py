@@ -9,13 +9,8 @@ from hexmj.cli.tables import print_json
 
 
 def report(findings: Iterable[Any], json: bool, **beside: Any) -> NoReturn:
-    """One line for each finding, or one JSON object; ends the program, with exit code 1 if one is not well.
-
-    Args:
-        findings: frozen dataclasses with `name`, `well` and `found`, and perhaps a `remedy` or `note`.
-        json: print the JSON object.
-        beside: what stands beside the findings there.
-    """
+    """One line for each finding, or one JSON object with what is `beside`; ends the program, with exit code 1 if one is
+    not well.  Findings are frozen dataclasses with `name`, `well` and `found`, and perhaps a `remedy` or `note`."""
     told = []
     for finding in findings:
         told.append(finding)

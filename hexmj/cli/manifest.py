@@ -66,13 +66,9 @@ class Manifest:
 
 
 def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path], path: Path) -> Path:
-    """Write what is needed to make a result again.
+    """Write what is needed to make a result again, whose files are `written` to the manifest's folder or to one in it.
 
-    Args:
-        command: the options of the command, whose module is where the code is followed from.
-        settings: of the result.
-        written: its files, in the manifest's folder or in one of that.
-        path: of the manifest.
+    The code is followed from the module of the command's options.
 
     Raises:
         InputError: the code, or what a controller names, was edited meanwhile, or a file cannot be written or read.

@@ -63,12 +63,8 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
 
 
 def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iterator[Table]":
-    """A table as one or several below each other, each with the first column and as many others as the screen is wide.
-
-    Args:
-        head: of the columns.
-        rows: cells as texts; no cell is broken, unless it is wider than the screen.
-    """
+    """A table as one or several below each other, each with the first column and as many others as the screen is wide;
+    no cell is broken, unless it is wider than the screen."""
     from rich.console import Console
 
     wide = Console().width

@@ -91,11 +91,8 @@ class WalkingCommand:
         return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
 
     def refuse_physical(self, reason: str, obeyed: Collection[str] = ()) -> None:
-        """Refuse what only a body obeys, where none walks.
-
-        Args:
-            reason: why no body walks, such as 'without --physical'.
-            obeyed: names of conditions that are obeyed nevertheless.
+        """Refuse what only a body obeys, where none walks for a reason such as 'without --physical'; what is `obeyed`
+        nevertheless may be given.
 
         Raises:
             InputError: a condition that is not the usual one, or feedback.

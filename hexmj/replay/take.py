@@ -108,16 +108,10 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> lis
 def support_on_ground(
     conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """The support polygon, and the height at which it is drawn: that of the highest ground below it.
+    """Corners of the support polygon, (corner, 2), none without a foot, and the height at which it is drawn: that of
+    the highest ground below it.
 
-    Args:
-        conditions: of the walk.
-        feet: in the world, (leg, 2) [mm].
-        stance: which of them stand, (leg,).
-        centre: of mass, (3,) [mm].
-
-    Returns:
-        Its corners, (corner, 2), none without a foot, and the height, both [mm].
+    Of feet, (leg, 2), as far as they stand, (leg,), and a centre of mass, (3,), in the world; all [mm].
     """
     corners = support_polygon(feet, stance)
     below = np.vstack([corners, centre[:2]])

@@ -183,7 +183,6 @@ class LiveWalk:
         return self.moment
 
     def _walk(self, steps: int) -> None:
-        """A few steps."""
         chunk = self._insects.carry_out(self._ordered(steps))
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]

@@ -30,13 +30,9 @@ def missing() -> str | None:
 
 @contextmanager
 def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callable[[np.ndarray], None]]:
-    """What takes the frames of a film, (height, width, 3) of bytes, one after the other.
+    """What takes the frames of a film one after the other, (height, width, 3) of bytes; height and width are even.
 
-    Args:
-        path: of the film, with an ending of `HOW`; what stands there is overwritten.
-        height: of a frame [pixels], even.
-        width: of a frame [pixels], even.
-        fps: frames per second.
+    The path has an ending of `HOW`; what stands there is overwritten.
 
     Raises:
         OSError: the film cannot be written; with what ffmpeg says of it.

@@ -29,14 +29,7 @@ class Overlay:
     """Caption and diagram of one take, for frames of one size."""
 
     def __init__(self, take: Take, film: Film, begin: float, end: float) -> None:
-        """Draw the whole diagram once.
-
-        Args:
-            take: what is shown.
-            film: tells the size of the frames and the speed of play.
-            begin: of the diagram's axis [s].
-            end: of it [s].
-        """
+        """Draw the whole diagram once, on an axis from `begin` to `end` [s]."""
         self._take, self._begin, self._end, width, height = take, begin, end, film.width, film.height
         self._speed = "in real time" if film.slow_motion == 1 else f"at {1 / film.slow_motion:.2g} {TIMES} speed"
         self._scale = min(width / 640, height / 480)
@@ -46,14 +39,8 @@ class Overlay:
         self._full = self._bars(self._blank.copy())
 
     def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
-        """Draw on a frame, (height, width, 3), the state at the end of step `row` and the clock.
-
-        Args:
-            frame: with the scene in it.
-            row: of the take.
-            seconds: on the clock [s].
-            scale: of the scene at the centre of mass [pixels/mm]; 0 where it is not ahead of the camera.
-        """
+        """Draw on a frame of the scene, (height, width, 3), the state at the end of step `row`, the clock [s] and the
+        scale at the centre of mass [pixels/mm], 0 where that is not ahead of the camera."""
         now = self._column(seconds)
         diagram = frame[self._bottom :]
         diagram[:] = self._blank
