@@ -37,9 +37,8 @@ class Page:
         shown = [load_recording(path) for path in self.recordings]
         out = results_folder(self.out, (NAME, MANIFEST))
         files = [page(shown, out / NAME)]
-        files.append(
-            save_manifest(self, {"recordings": [str(path) for path in self.recordings]}, files, out / MANIFEST)
-        )
+        settings = {"recordings": [str(path) for path in self.recordings]}
+        files.append(save_manifest(self, settings, files, out / MANIFEST))
         if self.json:
             print_json({"files": files, "recordings": [walk_summary(one) for one in shown]})
         else:
