@@ -149,23 +149,11 @@ def _stable(x, s, k):
     u0, u1, u2 = (k[6] + x[0]) * k[12], (k[7] + x[1]) * k[13], (k[8] + x[2]) * k[14]
     u3, u4, u5 = (k[9] + x[3]) * k[15], (k[10] + x[4]) * k[16], (k[11] + x[5]) * k[17]
     none = np.inf
-    front = _greatest(u0 if s[0] == 1.0 else -none, u1 if s[1] == 1.0 else -none, u2 if s[2] == 1.0 else -none)
-    front += _greatest(u3 if s[3] == 1.0 else -none, u4 if s[4] == 1.0 else -none, u5 if s[5] == 1.0 else -none)
-    rear = _least(u0 if s[0] == 1.0 else none, u1 if s[1] == 1.0 else none, u2 if s[2] == 1.0 else none)
-    rear += _least(u3 if s[3] == 1.0 else none, u4 if s[4] == 1.0 else none, u5 if s[5] == 1.0 else none)
+    front = max(u0 if s[0] == 1.0 else -none, u1 if s[1] == 1.0 else -none, u2 if s[2] == 1.0 else -none)
+    front += max(u3 if s[3] == 1.0 else -none, u4 if s[4] == 1.0 else -none, u5 if s[5] == 1.0 else -none)
+    rear = min(u0 if s[0] == 1.0 else none, u1 if s[1] == 1.0 else none, u2 if s[2] == 1.0 else none)
+    rear += min(u3 if s[3] == 1.0 else none, u4 if s[4] == 1.0 else none, u5 if s[5] == 1.0 else none)
     return (front > 0.0) & (rear < 0.0)
-
-
-@njit(nogil=True, forceinline=True)
-def _greatest(a, b, c):
-    a = a if a > b else b
-    return a if a > c else c
-
-
-@njit(nogil=True, forceinline=True)
-def _least(a, b, c):
-    a = a if a < b else b
-    return a if a < c else c
 
 
 @njit(nogil=True, forceinline=True)
