@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
 from hexmj.storage.files import read_toml
 
@@ -34,9 +34,6 @@ GAIN = 8.0
 
 TAU = 2.0
 """Unit of the time constant [time units]; a swing from PEP_0 to AEP_0 takes 20."""
-
-BEHIND, AHEAD = ([near[0] if near else 6 for near in table] for table in (N2, N4))
-"""Ipsilateral neighbours, (leg,); 6 where there is none."""
 
 
 class Potentials(NamedTuple):
@@ -80,11 +77,10 @@ class Evolved(Lifted):
         """The equation, solved exactly for outputs and inputs that last for the step."""
         before = state.y
         sent = 1.0 / (1.0 + np.exp(-GAIN * (before + self.theta)))
-        ipsilateral = np.pad(sent, ((0, 0), (0, 1)))  # a seventh leg that is silent
         told = (
             self.own * sent
-            + self.behind * ipsilateral[:, BEHIND]
-            + self.ahead * ipsilateral[:, AHEAD]
+            + self.behind * from_neighbour(N2, sent)
+            + self.ahead * from_neighbour(N4, sent)
             + self.across * sent[:, MIRROR]
             + self.position * legs.travel
             + self.velocity * legs.v

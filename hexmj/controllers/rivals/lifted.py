@@ -212,6 +212,20 @@ class Lifted:
         return kind(self, *asked)  # pyright: ignore[reportArgumentType]
 
 
+def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np.ndarray:
+    """(start, leg) the value of each leg's only neighbour in a table, `legs.N2` or `legs.N4`; 0 without one."""
+    heard = np.zeros(values.shape)
+    for leg, near in enumerate(table):
+        for neighbour in near:
+            heard[:, leg] = values[:, neighbour]
+    return heard
+
+
+def sum_of_legs(values: np.ndarray) -> np.ndarray:
+    """Sum over (..., leg), (...); each side by itself, so that mirrored starts give mirrored bits."""
+    return (values[..., 0] + values[..., 1] + values[..., 2]) + (values[..., 3] + values[..., 4] + values[..., 5])
+
+
 def _equal_parts(stands: np.ndarray) -> np.ndarray:
     """Share of the weight on each foot if all that stand carry the same; none where none stands."""
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
@@ -222,8 +236,7 @@ def _checked(method: str, state: Any, count: int) -> Any:
     named = isinstance(state, tuple) and hasattr(state, "_fields")
     if not (named and all(isinstance(one, np.ndarray) and one.shape[:1] == (count,) for one in state)):
         raise InputError(
-            f"{method} gave {' '.join(repr(state).split()):.80}; expected a named tuple of arrays whose first axis is"
-            f" the start, {count}"
+            f"{method} gave {short(state)}; expected a named tuple of arrays whose first axis is the start, {count}"
         )
     return state
 

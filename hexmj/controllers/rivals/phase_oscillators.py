@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, sum_of_legs
 
 NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
@@ -77,8 +77,7 @@ class PhaseOscillators(Lifted):
         return Oscillators(after, r), np.ceil(after) > np.ceil(phase)
 
     def _pulls(self, phase: np.ndarray) -> np.ndarray:
-        """(start, leg) sum of the sines of Eq. 1; each side by itself, so that mirrored starts give mirrored bits."""
+        """(start, leg) sum of the sines of Eq. 1."""
         bias = BIASES[self.gait]
         ahead = phase[:, None, :] - phase[:, :, None] - bias  # (start, leg i, leg j)
-        sines = np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0)
-        return (sines[..., 0] + sines[..., 1] + sines[..., 2]) + (sines[..., 3] + sines[..., 4] + sines[..., 5])
+        return sum_of_legs(np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0))

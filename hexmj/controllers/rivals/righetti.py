@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, sum_of_legs
 from hexmj.errors import InputError
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
@@ -114,7 +114,7 @@ class Righetti(Lifted):
         rise = 1.0 / (1.0 + np.exp(-self.sharpness * y))
         turn = swing * (legs.v * rise + (1.0 - rise))  # Eq. 3, omega dt
         back = (self.mu - (x * x + y * y)) * seconds
-        others = self.coupling * seconds * (TRIPOD * _sum(TRIPOD * y) - y)
+        others = self.coupling * seconds * (TRIPOD * sum_of_legs(TRIPOD * y)[:, None] - y)
         stop, hasten = self.feedback(state, legs.load)
         u = np.where(stop, -turn * x - others, np.where(hasten, -np.sign(y) * self.push * seconds, 0.0))  # Eq. 4
         return Hopf(
@@ -129,9 +129,3 @@ class Righetti(Lifted):
         ends_stance, ends_swing = (y > 0) & (x < 0), (y < 0) & (x > 0)
         stop = close & (ends_stance & (load > self.loaded) | ends_swing & (load <= 0))
         return stop, ends_stance & (load <= 0) | ends_swing & (load > 0)
-
-
-def _sum(values: np.ndarray) -> np.ndarray:
-    """(start, 1) of (start, leg); each side by itself, so that mirrored starts give mirrored bits."""
-    sides = (values[:, 0] + values[:, 1] + values[:, 2]) + (values[:, 3] + values[:, 4] + values[:, 5])
-    return sides[:, None]

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
 
 
@@ -65,16 +65,7 @@ class Scores(Lifted):
         late = np.where(in_stance, legs.travel, 0.0)
         early = np.where(in_stance, 1.0 - legs.travel, 0.0)
         return (
-            self.rule1 * _from(N2, ~legs.stands)
-            + (self.rule2_ipsilateral * _from(N2, early) + self.rule2_contralateral * early[:, MIRROR])
-            + (self.rule3_ipsilateral * _from(N4, late) + self.rule3_contralateral * late[:, MIRROR])
+            self.rule1 * from_neighbour(N2, ~legs.stands)
+            + (self.rule2_ipsilateral * from_neighbour(N2, early) + self.rule2_contralateral * early[:, MIRROR])
+            + (self.rule3_ipsilateral * from_neighbour(N4, late) + self.rule3_contralateral * late[:, MIRROR])
         )
-
-
-def _from(senders: tuple[tuple[int, ...], ...], signal: np.ndarray) -> np.ndarray:
-    """(start, leg) the signal of each leg's only sender, 0 without one."""
-    heard = np.zeros(signal.shape)
-    for leg, near in enumerate(senders):
-        for sender in near:
-            heard[:, leg] = signal[:, sender]
-    return heard

@@ -22,7 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.legs import MIRROR, N2, N4
 
 
 class Phases(NamedTuple):
@@ -64,8 +65,5 @@ class Tegotae(Lifted):
 
 def _mean_of_neighbours(load: np.ndarray) -> np.ndarray:
     """(start, leg) of the legs in front, behind and across."""
-    side = load.reshape(-1, 2, 3)
-    front, middle, hind = side[..., 0], side[..., 1], side[..., 2]
-    ipsilateral = np.stack([middle, front + hind, middle], axis=-1)
-    total = ipsilateral + side[:, ::-1]
-    return (total / np.array([2.0, 3.0, 2.0])).reshape(load.shape)
+    total = from_neighbour(N2, load) + from_neighbour(N4, load) + load[:, MIRROR]
+    return total / np.array(2 * [2.0, 3.0, 2.0])
