@@ -39,7 +39,6 @@ from typing import Any, Literal
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
@@ -171,11 +170,6 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
     return actions
-
-
-def at_the_end(feet: np.ndarray, task: Task) -> np.ndarray:
-    """Whether a foot, (..., leg, axis) in the world [mm], has come to the end of the ground that was laid, (...)."""
-    return np.any(beyond_the_ground(task.conditions.ground, task.conditions.body.lengths, feet), axis=-1)
 
 
 def drawn(rng: np.random.Generator, task: Task) -> np.ndarray:

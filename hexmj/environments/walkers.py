@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.grounds import beyond_the_ground
 from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
 from hexmj.environments.observing import Observer, Places, Planned
 from hexmj.environments.single_body import Alone
-from hexmj.environments.task import Task, action_bounds, action_names, at_the_end
+from hexmj.environments.task import Task, action_bounds, action_names
 from hexmj.errors import InputError
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
@@ -197,7 +198,9 @@ class Walkers:
         time, said = (self._done, self._steps), tuple(acted)
         any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, said)
         if self._ends:
-            acted.truncated[ids] |= at_the_end(self._feet(), self._task)[ids] & ~acted.terminated[ids]
+            feet, conditions = self.places.sensors[ids, self._compiled.columns.foot], self._task.conditions
+            beyond = beyond_the_ground(conditions.ground, conditions.body.lengths, feet.reshape(-1, 6, 3)).any(axis=1)
+            acted.truncated[ids] |= beyond & ~acted.terminated[ids]
             any_over |= bool(acted.truncated.any())
         if any_over:
             self._leave(np.flatnonzero(acted.terminated | acted.truncated))
@@ -257,7 +260,3 @@ class Walkers:
         row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
         name = action_names(self._compiled, self._task)[i]
         return InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
-
-    def _feet(self) -> np.ndarray:
-        """Of all insects in the world, (insect, leg, axis) [mm]."""
-        return self.places.sensors[:, self._compiled.columns.foot].reshape(-1, 6, 3)
