@@ -52,10 +52,7 @@ def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel,
     Raises:
         InputError: it cannot be read, is damaged, or is of another body.
     """
-    saved, compiled = _read(path, body)
-    data = mujoco.MjData(compiled.model)
-    for name in STATE:
-        getattr(data, name)[:] = saved[name]
+    _, compiled, data = _read(path, body)
     return compiled.model, data
 
 
@@ -69,7 +66,7 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
         Diverged: it does so again.
         InputError: it cannot be read, is damaged, or is of another body.
     """
-    saved, compiled = _read(path, body)
+    saved, compiled, _ = _read(path, body)
     only, control = np.array([0]), saved["ctrl"][np.newaxis]
     batch = MujocoBatch(compiled, 1, threads=1)
     batch.put_back(saved)
@@ -80,8 +77,8 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
     return after[0, :, : compiled.model.nq]
 
 
-def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody]:
-    """A written state, and the body with its conditions, time step and contacts."""
+def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody, mujoco.MjData]:
+    """A written state, the body with its conditions, time step and contacts, and its data in that state."""
     if (content := read_sealed(Path(path))) is None:
         raise InputError(f"{path} is damaged, or no state that a simulation left; expected one of this version")
     try:
@@ -95,7 +92,7 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
             getattr(data, name)[:] = saved[name]
     except (KeyError, ValueError) as error:
         raise InputError(f"{path} is no state of the body {body.name!r}: {error}") from None
-    return saved, compiled
+    return saved, compiled, data
 
 
 def main(path: str) -> None:
