@@ -90,7 +90,8 @@ class CompiledBody:
         """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].
 
         Returns:
-            The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether it can, (..., leg).
+            The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether it can within the legs'
+            lengths and the joints' ranges, (..., leg).
         """
         return self.kinematics.inverse(tips)
 

@@ -65,15 +65,9 @@ def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.nda
 
 
 def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.ndarray:
-    """Whether spheres are beyond the ends of the pieces that were laid, where the ground is another than it is told.
+    """Whether feet, spheres around (..., 3) in the world [mm], are beyond the ends of the pieces that were laid, (...).
 
-    Args:
-        ground: what lies ahead; bumps end on the plane, as anybody can see.
-        lengths: of the body that walks there.
-        feet: the spheres' centres in the world, (..., 3) [mm].
-
-    Returns:
-        (...,)
+    There the ground is another than it is told; but bumps end on the plane, as anybody can see.
     """
     x, y, near, far = feet[..., 0], feet[..., 1], ground.ground_at, lengths.ground_reach
     past = {"hurdle": near + ground.ground_length, "gap": near + ground.ground_length + far, "step": near + far}
@@ -85,16 +79,9 @@ def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.
 
 
 def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
-    """How deep spheres are in the ground, as MuJoCo measures it along the normal; negative above it.
+    """How deep feet, spheres of a radius around (..., 3) in the world [mm], are in the ground, (...) [mm].
 
-    Args:
-        ground: what lies ahead.
-        lengths: of the body that walks there.
-        feet: the spheres' centres in the world, (..., 3) [mm].
-        radius: of the spheres [mm].
-
-    Returns:
-        (...,) [mm].
+    It is what MuJoCo measures along the normal; negative above the ground.
     """
     z = feet[..., 2]
     if ground.ground == "flat":

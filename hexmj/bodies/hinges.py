@@ -40,19 +40,11 @@ class ThreeHinges(NamedTuple):
     """Least and greatest angle of each joint, (leg, joint, 2) [rad]."""
 
     def inverse(self, tips: ArrayLike) -> tuple[Floats, Bools]:
-        """Joint angles that put the tips where they are wanted.
-
-        Args:
-            tips: wanted tips in the root frame, (..., leg, axis) [mm].
-
-        Returns:
-            The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
-            tip can be reached within the leg's length and the joints' ranges, (..., leg).
-        """
+        """See `compiled.CompiledBody.inverse`."""
         return over_tips(_solve, tips, tuple(self))
 
     def forward(self, joints: ArrayLike) -> Floats:
-        """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
+        """See `compiled.CompiledBody.forward`."""
         protraction, levation, knee = np.moveaxis(np.asarray(joints, dtype=np.float64), -1, 0)
         pitch = levation + knee - np.pi  # of the tibia above the horizontal
         outward = self.coxa + self.femur * np.cos(levation) + self.tibia * np.cos(pitch)

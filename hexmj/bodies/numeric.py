@@ -44,19 +44,11 @@ class HingeChains(NamedTuple):
     """Greatest angles, (leg, joint) [rad]."""
 
     def inverse(self, tips: ArrayLike) -> tuple[Floats, Bools]:
-        """Joint angles that put the tips where they are wanted.
-
-        Args:
-            tips: wanted tips in the root frame, (..., leg, axis) [mm].
-
-        Returns:
-            The angles, (..., leg, joint) [rad], NaN where a tip cannot be reached, and whether each
-            tip can be reached within the joints' ranges, (..., leg).
-        """
+        """See `compiled.CompiledBody.inverse`."""
         return over_tips(reach, tips, self)
 
     def forward(self, joints: ArrayLike) -> Floats:
-        """Tips in the root frame, (..., leg, axis) [mm], at the joint angles, (..., leg, joint) [rad]."""
+        """See `compiled.CompiledBody.forward`."""
         turns = np.asarray(joints, dtype=np.float64)[..., np.newaxis] - self.zero[..., np.newaxis]
         place = np.broadcast_to(self.foot, (*turns.shape[:-2], 3))
         for j in reversed(range(turns.shape[-2])):  # the outermost first

@@ -169,13 +169,8 @@ def check_repeats(
 ) -> None:
     """Refuse a controller whose first steps are others when it begins again, as by random numbers without a seed.
 
-    Args:
-        controller: plans the walks.
-        starts: tips at time 0, (start, leg) [mm].
-        velocity: V_r, or its final value; one number or (start,).
-        steps: of the walk, which may be shorter than `REPEATED`.
-        stride: of the plan.
-        acceleration: Eq. 11.
+    Starts, (start, leg) [mm], and V_r, one number or (start,), are those of a walk of `steps`, which may be fewer than
+    `REPEATED`.
 
     Raises:
         InputError: it is one.
@@ -188,11 +183,7 @@ def check_repeats(
 def check_same(one: PlannedWalk, other: PlannedWalk, whose: str, before: int = 0) -> None:
     """Refuse two plans that ought to be the same and are not: what is told of one is not of the other.
 
-    Args:
-        one: some steps of starts.
-        other: the same steps of the same starts.
-        whose: plans them, for a sentence.
-        before: number of steps of the plan before these.
+    They are of the same starts and steps; a sentence says `whose`, and counts the steps of the plan `before` these.
 
     Raises:
         InputError: they differ.

@@ -73,13 +73,7 @@ def mixed(walk: PlannedWalk, which: np.ndarray, other: PlannedWalk) -> PlannedWa
 
 
 def same(one: PlannedWalk, other: PlannedWalk, what: str, before: int = 0) -> None:
-    """Refuse two walks of the same starts that differ.
-
-    Args:
-        one: the first.
-        other: the second.
-        what: they are, in the sentence.
-        before: steps before both.
+    """Refuse two walks of the same starts that differ; a sentence says `what` they are, and counts steps `before` both.
 
     Raises:
         InputError: they differ.

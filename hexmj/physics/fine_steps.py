@@ -144,16 +144,8 @@ def strikes(depth: Any, substeps: int, allowed: float) -> Any:
 
 
 def in_whole_steps(sensors: np.ndarray, fine: int, touch: slice) -> np.ndarray:
-    """What sensors show as each step begins that was taken in `fine` parts; forces are the means over its parts.
-
-    Args:
-        sensors: before each part, (..., step * part, column).
-        fine: parts in a step.
-        touch: columns of the forces.
-
-    Returns:
-        (..., step, column)
-    """
+    """What sensors show as each step begins that was taken in `fine` parts, (..., step, column), from what they show as
+    each part does, (..., step * part, column); forces, in the columns `touch`, are the means over its parts."""
     parts = sensors.reshape(*sensors.shape[:-2], -1, fine, sensors.shape[-1])
     whole = parts[..., 0, :].copy()
     whole[..., touch] = parts[..., touch].mean(axis=-2)

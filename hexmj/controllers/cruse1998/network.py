@@ -213,31 +213,28 @@ class NetworkPlan:
 
     @property
     def tips(self) -> np.ndarray:
-        """Where the tips are now, (start, leg) [mm]."""
+        """See `protocol.SteerablePlan`."""
         return self._read(kernel.X)
 
     @property
     def standing(self) -> np.ndarray:
-        """Which legs retract now, (start, leg)."""
+        """See `protocol.SteerablePlan`."""
         return self._read(kernel.S) == 1.0
 
     def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
-        """Go on from other tips and states than the network's own, both (start, leg): as measured, or disturbed."""
+        """See `protocol.SteerablePlan`."""
         self._write(kernel.X, tips)
         self._write(kernel.S, standing)
 
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
-
-        With an acceleration they begin at its V_r(0) again.
-        """
+        """See `protocol.SteerablePlan`."""
         legs = {kernel.X: tips, kernel.S: 1.0, kernel.S_OLD: 1.0, kernel.AEP: self.stride.aep0}
         for row, values in (legs | {kernel.PEP_SHIFT: 0.0, kernel.AEP_SHIFT: 0.0}).items():
             self._write(row, np.where(which[:, None], values, self._read(row)))
         self.slow_down(which)
 
     def slow_down(self, which: np.ndarray) -> None:
-        """Let some starts, (start,) of bool, begin at V_r(0) of the acceleration again, their legs as they are."""
+        """See `protocol.SteerablePlan`."""
         for row, values in {kernel.V: self.slow, kernel.DONE: 0.0}.items():
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 
