@@ -63,12 +63,7 @@ def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gain
     """Make a spec walk: servos with these gains at the joints, nothing that touches but feet and trunk the ground.
 
     Where the integrator is Euler's, which is MuJoCo's own if none is told, damping is integrated implicitly instead.
-
-    Args:
-        spec: the body's, as its MJCF says.
-        plain: the same, compiled.
-        body: its description.
-        gains: of the servos.
+    The spec is as the body's MJCF says, and `plain` is the same, compiled.
     """
     if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -73,16 +73,7 @@ class Walkers:
     def __init__(
         self, task: Task, compiled: CompiledBody, bodies: Bodies, take: Take, count: int, threads: int | None
     ) -> None:
-        """As many insects, none of which has begun.
-
-        Args:
-            task: what an episode is.
-            compiled: the body.
-            bodies: as many of it.
-            take: one step of some of them.
-            count: how many.
-            threads: settle them, one per core unless given.
-        """
+        """As many insects as `count`, none of which has begun; `threads` settle them, one per core unless given."""
         self._task, self._compiled, self._threads = task, compiled, threads
         self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps

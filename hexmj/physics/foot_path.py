@@ -38,14 +38,9 @@ class TipTargets:
         self._origin = np.array(stride.geometry.origin)
 
     def follow(self, plan: PlannedWalk, ids: np.ndarray) -> np.ndarray:
-        """Tips in the root frame at the end of each substep of the plan's steps.
+        """Tips in the root frame, (n, substep, leg, 3) forward, left and up [mm], at the end of each substep.
 
-        Args:
-            plan: the next steps of the walk, of all starts.
-            ids: the starts that are still wanted, (n,).
-
-        Returns:
-            (n, substep, leg, 3) [mm]: forward, left, up.
+        They are those of some starts, (n,), in the next steps of their plan, which is of all starts.
         """
         m, path = self._substeps, self._conditions.path
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))

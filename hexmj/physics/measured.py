@@ -42,10 +42,7 @@ def measured_walk(
 def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How high the feet are above the ground [mm], and what it carries them with [g mm/s^2], both (step, n, leg).
 
-    Args:
-        chunk: of `drive.drive`.
-        settled: what it began with.
-        columns: of the chunk's substeps, (step,); NaN is shown after a fall.
+    They are those in some columns of a chunk's substeps, (step,); NaN after a fall.
     """
     sensors, compiled = chunk.sensors[:, columns], settled.compiled
     feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)

@@ -53,13 +53,9 @@ class OrdersFromPlan:
     """(start, leg, 3) where the tips shall be now, in the root frame [mm]."""
 
     def __init__(self, settled: Settled, plan: Plan, duration: float, multiple: int = 0) -> None:
-        """All legs hold their starts.
+        """All legs hold their starts, at time 0 of a plan that ends after a duration [time units].
 
-        Args:
-            settled: the starts.
-            plan: of them, at time 0.
-            duration: at which it ends [time units].
-            multiple: steps that are a whole number of chunks, see `Push.divisor`.
+        As many steps as `multiple` are a whole number of chunks, see `Push.divisor`.
 
         Raises:
             InputError: a plan of other starts, with another stride, not at time 0, or made for other conditions.
@@ -77,13 +73,9 @@ class OrdersFromPlan:
         return min(self._chunk, self._steps - self._plan.done)
 
     def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
-        """The orders of some starts for the next steps, none where the walk has ended.
+        """The orders of some starts, (n,), for the next steps, a chunk unless told; none where the walk has ended.
 
         A leg whose tip is out of reach keeps its last angles.
-
-        Args:
-            ids: of the starts, (n,).
-            steps: of the plan; a chunk unless given.
         """
         done, m = self._plan.done, self._settled.substeps
         if done == self._steps:

@@ -46,12 +46,9 @@ class Senses:
         return self._unloaded[ids] <= self._longest_gap
 
     def sensed(self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> Sensed:
-        """What some starts know of themselves; contacts gained and lost are those since they were last asked.
+        """What some starts, (n,), know of themselves, at `qpos`, (n, position), and with `qvel`, (n, velocity).
 
-        Args:
-            ids: of the starts, (n,).
-            qpos: where they are now, (n, position).
-            qvel: how fast, (n, velocity).
+        Contacts gained and lost are those since they were last asked.
         """
         before, contact = self._before[ids], self.standing(ids)
         self._before[ids] = contact
