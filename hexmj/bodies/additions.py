@@ -18,6 +18,9 @@ _SENSOR, _OBJECT = mujoco.mjtSensor, mujoco.mjtObj
 _COUNTS = (1 << mujoco.mjtConDataField.mjCONDATA_FOUND.value, 0, 1)
 """Of a contact sensor that counts contacts, in one number."""
 
+_NET_FORCE = (1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3, 1)
+"""Of one that adds up the forces of all contacts, in the world."""
+
 
 @dataclass(frozen=True)
 class SensorGroup:
@@ -30,6 +33,8 @@ class SensorGroup:
     """Names of that, one for each sensor."""
     names: tuple[str, ...]
     """Of the sensors where they are added."""
+    contact: tuple[int, int, int] | None = None
+    """What contact sensors tell, see MuJoCo's `intprm`."""
 
     def find(self, model: mujoco.MjModel) -> slice | None:
         """Their columns of `sensordata`; none where the model lacks them, has them in another order, or alters what
@@ -38,8 +43,8 @@ class SensorGroup:
         fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.of) & (model.sensor_refid < 0)
         for altered in (model.sensor_cutoff, model.sensor_noise, model.sensor_delay, model.sensor_interval[:, 0]):
             fits &= altered == 0
-        if self.kind == _SENSOR.mjSENS_CONTACT:
-            fits &= (model.sensor_intprm[:, :3] == _COUNTS).all(axis=1)
+        if self.contact:
+            fits &= (model.sensor_intprm[:, :3] == self.contact).all(axis=1)
         there = np.where(fits, model.sensor_objid, -1)
         for first in range(model.nsensor - len(wanted) + 1):
             last = first + len(wanted) - 1
@@ -49,17 +54,19 @@ class SensorGroup:
 
 
 def sensor_groups(body: Body) -> dict[str, SensorGroup]:
-    """The sensors that walks are measured with, by what they measure."""
+    """The sensors that walks are measured with, by what they measure; `feet_push` where that is asked for."""
     touches, grounds = tuple(f"{leg}_touch" for leg in LEGS), tuple(f"{part}_ground" for part in body.trunk)
+    contact, geom, pushes = _SENSOR.mjSENS_CONTACT, _OBJECT.mjOBJ_GEOM, tuple(f"{leg}_push" for leg in LEGS)
     return {
         "foot": SensorGroup(_SENSOR.mjSENS_FRAMEPOS, _OBJECT.mjOBJ_SITE, body.feet, body.feet),
         "touch": SensorGroup(_SENSOR.mjSENS_TOUCH, _OBJECT.mjOBJ_SITE, body.feet, touches),
-        "trunk": SensorGroup(_SENSOR.mjSENS_CONTACT, _OBJECT.mjOBJ_GEOM, body.trunk, grounds),
+        "trunk": SensorGroup(contact, geom, body.trunk, grounds, _COUNTS),
         "centre_of_mass": SensorGroup(_SENSOR.mjSENS_SUBTREECOM, _OBJECT.mjOBJ_BODY, (body.root,), ("centre_of_mass",)),
+        "feet_push": SensorGroup(contact, geom, body.feet, pushes, _NET_FORCE),
     }
 
 
-def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gains) -> None:
+def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gains, pushes: bool) -> None:
     """Make a spec walk: servos with these gains at the joints, nothing that touches but feet and trunk the ground.
 
     Where the integrator is Euler's, which is MuJoCo's own if none is told, damping is integrated implicitly instead.
@@ -81,8 +88,8 @@ def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gain
         servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
         servo.forcelimited = servo.ctrllimited = True
         servo.actrange, servo.actlimited = [0.0, 0.0], False
-    for group in sensor_groups(body).values():
-        if group.find(plain) is None:
+    for name, group in sensor_groups(body).items():
+        if group.find(plain) is None and (pushes or name != "feet_push"):
             _add_sensors(spec, group)
 
 
@@ -100,5 +107,5 @@ def _add_sensors(spec: mujoco.MjSpec, group: SensorGroup) -> None:
     for name, of in zip(group.names, group.objects, strict=True):
         name = f"{name}_measured" if name in taken else name
         sensor = spec.add_sensor(name=name, type=group.kind, objtype=group.of, objname=of)
-        if group.kind == _SENSOR.mjSENS_CONTACT:
-            sensor.intprm[:3] = _COUNTS
+        if group.contact:
+            sensor.intprm[:3] = group.contact

@@ -37,6 +37,9 @@ class Columns:
     """Of `sensordata`: number of contacts of each part of the trunk, (..., part)."""
     centre_of_mass: slice
     """Of `sensordata`: centre of mass of the whole body in the world, (..., axis) [mm]."""
+    feet_push: slice
+    """Of `sensordata`: force of each foot on the ground in the world, (..., leg * axis) [g mm/s^2]; empty where that
+    is not measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +127,8 @@ def columns(model: mujoco.MjModel, body: Body) -> Columns:
     """Where a compiled body has its joints and sensors."""
     found = {}
     for name, group in sensor_groups(body).items():
-        if (here := group.find(model)) is None:
+        here = group.find(model) or (slice(0, 0) if name == "feet_push" else None)
+        if here is None:
             raise InputError(f"body {body.name!r}: its sensors {', '.join(group.names)} do not measure {name}")
         found[name] = here
     joints = len(body.joints)

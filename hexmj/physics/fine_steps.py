@@ -44,13 +44,15 @@ class FineSteps:
     """How deep feet in the world are in the ground, (..., 3) -> (...) [mm]."""
     allowed: float
     """How deep a foot may be [mm]."""
-    touch: slice
-    """Columns of the sensors that hold forces."""
+    forces: np.ndarray
+    """Columns of the sensors that hold forces, (column,)."""
 
     @classmethod
     def of(cls, engine: Engine, substeps: int, compiled: CompiledBody) -> "FineSteps":
         """Of an engine that steps such a body."""
-        return cls(engine, substeps, compiled.depth, allowed_depth(compiled), compiled.columns.touch)
+        columns = compiled.columns
+        forces = np.r_[columns.touch, columns.feet_push]
+        return cls(engine, substeps, compiled.depth, allowed_depth(compiled), forces)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """What some bodies show while they take the substeps of these controls, (n, substep, actuator).
@@ -94,7 +96,7 @@ class FineSteps:
         before, every, struck = self._roll(ids, control, begin, end, parts)
         torque = every["torque"].reshape(len(ids), end - begin, parts, every["torque"].shape[2])
         shown = {
-            "sensors": in_whole_steps(every["sensors"], parts, self.touch),
+            "sensors": in_whole_steps(every["sensors"], parts, self.forces),
             "force": every["force"][:, ::parts],
             "torque": torque.mean(axis=2),
             "depth": every["depth"].reshape(len(ids), -1, parts).max(axis=2),
@@ -143,10 +145,10 @@ def strikes(depth: Any, substeps: int, allowed: float) -> Any:
     return struck
 
 
-def in_whole_steps(sensors: np.ndarray, fine: int, touch: slice) -> np.ndarray:
+def in_whole_steps(sensors: np.ndarray, fine: int, forces: np.ndarray) -> np.ndarray:
     """What sensors show as each step begins that was taken in `fine` parts, (..., step, column), from what they show as
-    each part does, (..., step * part, column); forces, in the columns `touch`, are the means over its parts."""
+    each part does, (..., step * part, column); `forces`, in these columns, are the means over its parts."""
     parts = sensors.reshape(*sensors.shape[:-2], -1, fine, sensors.shape[-1])
     whole = parts[..., 0, :].copy()
-    whole[..., touch] = parts[..., touch].mean(axis=-2)
+    whole[..., forces] = parts[..., forces].mean(axis=-2)
     return whole

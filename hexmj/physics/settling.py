@@ -74,14 +74,17 @@ class Settled:
 class Settling:
     """A body that comes to rest at some starts after others; to the same bits, whatever it did before."""
 
-    def __init__(self, conditions: Conditions, stride: Stride, threads: int | None) -> None:
-        """Under some conditions of the walk; `threads` step it, one per core unless given.
+    def __init__(
+        self, conditions: Conditions, stride: Stride, threads: int | None = None, *, pushes: bool = False
+    ) -> None:
+        """Under some conditions of the walk; `threads` step it, one per core unless given, and `pushes` measures what
+        its feet push the ground with.
 
         Raises:
             InputError: a home that is not as described.
         """
         self._conditions, self._stride, self._threads = conditions, stride, threads
-        self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
+        self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False, pushes=pushes)
         check_home(self._compiled)
         self._batch: MujocoBatch | None = None
 

@@ -4,14 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import mujoco
 import numpy as np
 
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.physics.drive import Chunk, drive
 from hexmj.physics.settling import Settled
-from hexmj.studies.biology.ground_forces import GroundForces
 
 HOP = 0.12
 """A foot that is off the ground for a smaller part of the time from PEP_0 to AEP_0 does not swing."""
@@ -69,7 +67,7 @@ def last_strides(
     """The whole strides within the last part of every walk, start by start; those that fall have none.
 
     Args:
-        settled: starts at rest.
+        settled: starts at rest, whose feet's pushes are measured.
         controller: plans the walks.
         velocity: V_r.
         duration: of the walks [time units].
@@ -80,39 +78,31 @@ def last_strides(
     first = (duration - measured) / settled.stride.dt * settled.substeps
     chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
     walked = chunks[-1].ids[~chunks[-1].fell] if chunks else ()
-    forces, hop = GroundForces(settled.compiled), rows_of_a_hop(settled)
+    hop = rows_of_a_hop(settled)
     for start in walked:
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, hop)
         begun = begun[begun > 1]  # not the strides that begin from rest
         if len(begun) > 1:
-            yield int(start), strides_between(settled, chunks, start, begun, forces)
+            yield int(start), strides_between(settled, chunks, start, begun)
 
 
-def strides_between(
-    settled: Settled, chunks: Sequence[Chunk], start: int, begun: np.ndarray, forces: GroundForces
-) -> Strides:
+def strides_between(settled: Settled, chunks: Sequence[Chunk], start: int, begun: np.ndarray) -> Strides:
     """What a start did from the first to the last of some rows.
 
     Args:
-        settled: what the walk began with.
+        settled: what the walk began with, whose feet's pushes are measured.
         chunks: that follow each other.
         start: which.
         begun: rows of the chunks in which strides begin, at least two, none among the first two rows.
-        forces: of the ground.
     """
-    model, columns = settled.compiled.model, settled.compiled.columns
-    h, m, rows = model.opt.timestep, settled.substeps, slice(begun[0], begun[-1])
-    qpos, sensors, force, torque, standing = (
+    columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
+    m, rows = settled.substeps, slice(begun[0], begun[-1])
+    qpos, sensors, torque, standing = (
         np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
-        for name in ("qpos", "sensors", "force", "torque", "standing")
+        for name in ("qpos", "sensors", "torque", "standing")
     )
     moved = np.diff(qpos, axis=0) / h  # row t is the velocity at row t + 1
-    ground = []
-    for row in range(begun[0], begun[-1], m):
-        qvel = np.zeros(model.nv)
-        mujoco.mj_differentiatePos(model, qvel, h, qpos[row - 1], qpos[row])
-        ground.append(forces.on_feet(qpos[row], qvel, force[row]))
     return Strides(
         count=len(begun) - 1,
         step=h,
@@ -124,7 +114,7 @@ def strides_between(
         standing=standing[rows],
         centre=sensors[rows, columns.centre_of_mass],
         every=m,
-        ground=np.array(ground),
+        ground=-sensors[rows][::m, columns.feet_push].reshape(-1, 6, 3),
     )
 
 
