@@ -1,7 +1,7 @@
 """What is minimised (paper, Section 3): Problem 1, a fixed velocity, and Problem 2, velocities drawn from a range."""
 
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from hexmj.starts import checked_velocities
 from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
 from hexmj.variants import variants, varied
-
-if TYPE_CHECKING:
-    pass
 
 FARTHEST = 1e6
 """Greatest reach of a first population."""
