@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 import hexmj
 from hexmj.errors import InputError
 from hexmj.plots import FIGURES
-from hexmj.search.history import History
+from hexmj.search.history import history
 from hexmj.studies.ablation.study import Ablation
 from hexmj.studies.biology.study import Biology
 from hexmj.studies.biology.table import biology_markdown
@@ -36,10 +36,8 @@ TWO = {"ldvs": [hexmj.LDVS] * 2, "hws": [hexmj.HWS] * 2}
 
 
 def searched() -> xr.Dataset:
-    history = History()
-    for stage, costs in (("population", [0.9, 0.5, 0.7]), ("simplex", [0.6, 0.4, 0.5])):
-        history.add(stage, np.zeros((3, 1)), np.array(costs))
-    return history.dataset(["a"], "FLSS")
+    asked = {"population": [0.9, 0.5, 0.7], "simplex": [0.6, 0.4, 0.5]}
+    return history([(stage, np.zeros((3, 1)), np.array(costs)) for stage, costs in asked.items()], ["a"], "FLSS")
 
 
 MADE: dict[str, Callable[[], xr.Dataset]] = {

@@ -17,7 +17,7 @@ STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 
 def convergence_figure(history: "xr.Dataset") -> "Picture":
-    """Every candidate's cost and the least so far against the number of evaluations, from `History.dataset`."""
+    """Every candidate's cost and the least so far against the number of evaluations, from `history.history`."""
     from hexmj.pictures import picture
 
     figure = picture(6.8, 4.2)

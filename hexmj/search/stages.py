@@ -17,7 +17,7 @@ from hexmj.errors import InputError, without_extra
 from hexmj.process.progress import Progress, shown
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
-from hexmj.search.history import History
+from hexmj.search.history import Asked, history
 from hexmj.search.problems import Problem
 from hexmj.search.samples import REFUSED, Sample
 from hexmj.starts import check_draw
@@ -89,7 +89,7 @@ class Found:
     starts: int
     """Number of these starts."""
     history: "xr.Dataset"
-    """Every candidate and cost, see `History.dataset`."""
+    """Every candidate and cost, see `history.history`."""
     replayed: int
     """Different candidates whose cost an earlier run had kept."""
     refused: list[str]
@@ -133,7 +133,7 @@ def search(
 def _search(
     problem: Problem, effort: Effort, folder: Path | None, threads: int | None, progress: Progress | None
 ) -> Found:
-    domain, history = problem.domain(effort.domain, effort.begin), History()
+    domain, asked = problem.domain(effort.domain, effort.begin), list[Asked]()
     refine_budget = 0 if domain.binary.all() else effort.refine_budget  # which leaves binary ones as they are
     work = effort.budget * effort.starts + refine_budget * effort.refine_starts
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if refine_budget else {})
@@ -150,24 +150,24 @@ def _search(
             result[i : i + together] = kept[stage](candidates[i : i + together])
             if progress:
                 progress(together * sizes[stage] / work)
-        history.add(stage, candidates, result)
+        asked.append((stage, candidates.copy(), result))
         return result
 
     best, cost = run(searcher, partial(costs, "population"), effort.budget)
     if refine_budget:
         best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), refine_budget, domain.unit)
-    asked = history.dataset(problem.form.names, problem.minimised)
+    course = history(asked, problem.form.names, problem.minimised)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     replayed = sum(one.replayed for one in kept.values())
-    refused = list(filter(None, map(problem.refusal, asked.candidate.values)))
+    refused = list(filter(None, map(problem.refusal, course.candidate.values)))
     if why := problem.refusal(best):
         raise InputError(
-            f"{len(refused)} of {asked.sizes['evaluation']} candidates were refused, the best one by: {why}"
+            f"{len(refused)} of {course.sizes['evaluation']} candidates were refused, the best one by: {why}"
         )
     last = [*samples.values()][-1]
     if cost >= REFUSED:
         last.check_reach(best, threads)
-    told = asked.assign_attrs(settings=settings, refused=len(refused))
+    told = course.assign_attrs(settings=settings, refused=len(refused))
     return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
 
 
