@@ -1,6 +1,6 @@
 """How a claim of the paper is judged: a quantity, velocities, and a band, a count or a trend."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -31,11 +31,31 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Band:
-    """Agrees if, at every velocity of a range, the interval of a quantity reaches into a band."""
+class _OverRange:
+    """Base of the rules: a quantity over a range of velocities, whose ends have to be met."""
 
     quantity: Quantity
     velocities: tuple[float, float]
+
+    def answer(self, measured: Measured, window: str) -> Answer | None:
+        """None where a set has not been searched yet."""
+        low, high = self.velocities
+        points = self.quantity.points(measured, window)
+        inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
+        met = [point.velocity for point in inside]
+        if not met or min(met) > low + END + 1e-9 or max(met) < high - END - 1e-9:
+            return None
+        return self.judged(inside)
+
+    def judged(self, points: list[Point]) -> Answer:
+        """From the points of the range."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Band(_OverRange):
+    """Agrees if, at every velocity of a range, the interval of a quantity reaches into a band."""
+
     least: float = -np.inf
     most: float = np.inf
     averaged: bool = False
@@ -55,11 +75,7 @@ class Band:
         at = f"averaged over {_range(self.velocities)}," if self.averaged else f"at {_range(self.velocities)}"
         return f"{at} the 95 % interval of {self.quantity.words} {band}"
 
-    def answer(self, measured: Measured, window: str) -> Answer | None:
-        """None where a set has not been searched yet."""
-        points = _within(self.quantity.points(measured, window), self.velocities)
-        if points is None:
-            return None
+    def judged(self, points: list[Point]) -> Answer:
         if self.averaged:
             of_each_start = np.mean([point.values for point in points], axis=0)
             points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", of_each_start)]
@@ -70,14 +86,12 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Seen(_OverRange):
     """Agrees if, at every velocity of a range, a count here and in the paper's own sample may be of one frequency.
 
     Fisher's exact test, two-sided, at 5 %: it holds for rare events and small samples too.
     """
 
-    quantity: Quantity
-    velocities: tuple[float, float]
     count: int
     """How often the paper saw it ..."""
     of: int
@@ -91,11 +105,7 @@ class Seen:
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
         )
 
-    def answer(self, measured: Measured, window: str) -> Answer | None:
-        """None where a set has not been searched yet."""
-        points = _within(self.quantity.points(measured, window), self.velocities)
-        if points is None:
-            return None
+    def judged(self, points: list[Point]) -> Answer:
         p = [fisher(int(one.values.sum()), len(one.values), self.count, self.of) for one in points]
         estimates = [(point.estimate, _where(point)) for point in points]
         strain = [
@@ -106,11 +116,9 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Trend:
+class Trend(_OverRange):
     """Agrees if, from each velocity of a range to the next, the interval of the change reaches the right side of 0."""
 
-    quantity: Quantity
-    velocities: tuple[float, float]
     sign: Literal[1, -1]
 
     @property
@@ -122,11 +130,8 @@ class Trend:
             f" {self.quantity.words} reaches {side} 0"
         )
 
-    def answer(self, measured: Measured, window: str) -> Answer | None:
-        """None where a set has not been searched yet; the change shown is the one that fits least."""
-        points = _within(self.quantity.points(measured, window), self.velocities)
-        if points is None:
-            return None
+    def judged(self, points: list[Point]) -> Answer:
+        """The change shown is the one that fits least."""
         steps = [
             (_difference(one, following), f"{_where(one)} to {following.velocity:g}")
             for name in dict.fromkeys(point.of for point in points)
@@ -152,16 +157,6 @@ def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], a
     """The answer at the first of the estimates, each with its place, that strains the rule most."""
     (value, low, high), where = estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))]
     return Answer(value, low, high, where, agrees)
-
-
-def _within(points: Iterator[Point], velocities: tuple[float, float]) -> list[Point] | None:
-    """The points of a range, if its ends are met."""
-    low, high = velocities
-    inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
-    if not inside:
-        return None
-    met = [point.velocity for point in inside]
-    return inside if min(met) <= low + END + 1e-9 and max(met) >= high - END - 1e-9 else None
 
 
 def _difference(one: Point, other: Point) -> Estimate:
