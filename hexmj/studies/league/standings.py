@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.intervals import paired_difference
 from hexmj.phases import circular_mean
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.ranks import ranks
 from hexmj.studies.league.trials import TRIALS
 
 if TYPE_CHECKING:
@@ -80,6 +80,24 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     for name, values in result.items():
         values.attrs["units"] = UNITS.get(str(name), "1")
     return result
+
+
+def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Best and worst rank that each may have, (entrant,), from 1 on; equal only where intervals separate it from all.
+
+    Args:
+        values: of the same starts, (entrant, start), less is better; an entrant that is NaN throughout has no rank,
+            which is 0.
+
+    Returns:
+        1 and how many are better for sure; the number of those that are ranked less how many are worse for sure.
+    """
+    ranked = np.isfinite(values).any(axis=1)
+    best, worst = np.zeros(len(values), dtype=int), np.zeros(len(values), dtype=int)
+    for i in np.flatnonzero(ranked):
+        _, low, high = paired_difference(values[i], values[ranked])  # of itself the interval holds 0
+        best[i], worst[i] = 1 + (low > 0).sum(), ranked.sum() - (high < 0).sum()
+    return best, worst
 
 
 LOST = attrgetter("lost")
