@@ -21,9 +21,6 @@ COUNTED = "start", "case", "row", "evaluation"
 def check_axes(result: "xr.Dataset") -> None:
     """Refuse a result without one of its axes, or with one that has lost its values.
 
-    Args:
-        result: of `compare`, `flss` or any study.
-
     Raises:
         InputError: with the name of the first one.
     """
@@ -39,9 +36,6 @@ def check_window(result: "xr.Dataset") -> None:
     """Refuse observation times that are not those of the window in the settings, as of results that were joined.
 
     Nothing is said of a result without such times, nor of variants, whose strides are their own.
-
-    Args:
-        result: of `compare`, `flss` or any study, over velocity.
 
     Raises:
         InputError: with the first time that differs.
@@ -100,13 +94,8 @@ def check_starts(result: "xr.Dataset", told: int | None = None) -> None:
 def check_whole(result: "xr.Dataset", axis: str, size: int) -> None:
     """Refuse a part along an axis over which numbers were taken; nothing is said of a result without it.
 
-    Args:
-        result: of any study.
-        axis: name of the axis.
-        size: how many values it had then.
-
     Raises:
-        InputError: it has fewer now, or more.
+        InputError: it has fewer values than it had then, or more.
     """
     if (found := result.sizes.get(axis, size)) != size:
         raise InputError(f"{found} of {size} along the axis {axis}; expected all, since the numbers are those of all")

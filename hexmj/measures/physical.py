@@ -75,13 +75,8 @@ def physical_outcomes(
     The planned loss is always that on paper, where a plan that reads the legs is told nothing: it stays the paper's
     measure, and the same with and without feedback.
 
-    Args:
+    Args, beside those of `physical_walk`:
         settled: starts at rest, see `settling.settle`.
-        controller: plans the walks.
-        velocity: V_r, or its final value; one number or (start,).
-        duration: observation time [time units].
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the result does not depend on it.
         progress: told the fraction done since it was last called.
 
     Raises:

@@ -22,14 +22,9 @@ def lost_after(
 
     What happens before does not count.
 
-    Args:
-        starts: tips at time 0, all standing, (start, leg) [mm].
-        controller: the network.
-        velocity: V_r, 0 <= V < 1.
+    Args, beside those of `kinematic.walk`:
         wait: time that passes unseen [time units].
         durations: observation times after it, (duration,) [time units].
-        stride: step range, lines of the tips and time step.
-        threads: one per core unless given.
 
     Returns:
         (duration, start)

@@ -49,17 +49,11 @@ def losses(
 ) -> "xr.Dataset":
     """Which starts lose static stability under both windows, (window, start): 1 lost, 0 not, -1 where there is no set.
 
-    Args:
-        velocity: V_r.
+    Args, beside those of `WalkSettings`:
         sets: the network for each of `WINDOWS`.
-        n_starts: number of starts.
-        seed: of the starts.
-        stride: of the walks.
-        acceleration: Eq. 11.
         late: look only after `LATE_PERIODS`.
         looks: at every step, or once a period only.
         margin: by how much S is narrower than ]PEP_0, AEP_0[ at either end [mm].
-        threads: one per core unless given.
     """
     import xarray as xr
 

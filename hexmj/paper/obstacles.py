@@ -38,15 +38,11 @@ def losses_after(
 
     A window begins when the walk is at its velocity again.
 
-    Args:
-        velocity: V_r.
-        controller: plans before and afterwards.
+    Args, beside those of `WalkSettings`:
         answer: to the obstacle.
         n_starts: starts that reach it, the first of the seed's that are stable until then.
         seed: of the starts and of the times of the obstacle.
-        stride: of the walks.
         acceleration: Eq. 11, of the answer 'slow down'; None with any other.
-        threads: one per core unless given.
 
     Raises:
         InputError: too few starts are stable so long, or none comes to a stable gait whose postures could be taken.

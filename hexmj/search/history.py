@@ -15,13 +15,8 @@ Asked = tuple[str, np.ndarray, np.ndarray]
 
 
 def history(asked: Sequence[Asked], names: Sequence[str], minimised: str) -> "xr.Dataset":
-    """Over `evaluation`, counted from 0: stage, candidate, cost, the best so far, begun anew with each stage.
-
-    Args:
-        asked: what a search has asked for, one after another.
-        names: of the parameters.
-        minimised: what a cost is, in words.
-    """
+    """Over `evaluation`, counted from 0: stage, candidate, cost (in words what is `minimised`), and the best so far,
+    begun anew with each stage."""
     import xarray as xr
 
     stage = np.repeat([STAGES.index(name) for name, *_ in asked], [len(costs) for *_, costs in asked])

@@ -41,14 +41,8 @@ def frequency(name: str, happened: np.ndarray, dims: tuple[str, ...]) -> dict[st
 
 
 def differences(name: str, happened: np.ndarray, other: np.ndarray, dims: tuple[str, ...]) -> dict[str, Any]:
-    """How far the frequency is above another of the same starts, `name`, with its 95 % interval `_low`, `_high`.
-
-    Args:
-        name: of the difference.
-        happened: (..., start).
-        other: what broadcasts to it.
-        dims: of the frequency.
-    """
+    """How far the frequency, from (..., start), is above that of another on the same starts, which broadcasts to it:
+    `name`, with its 95 % interval `_low`, `_high`."""
     return columns(name, dims, *paired_difference(happened, np.broadcast_to(other, happened.shape)))
 
 

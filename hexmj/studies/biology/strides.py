@@ -66,13 +66,9 @@ def last_strides(
 ) -> Iterator[tuple[int, Strides]]:
     """The whole strides within the last part of every walk, start by start; those that fall have none.
 
-    Args:
+    Args, beside those of `WalkSettings`:
         settled: starts at rest, whose feet's pushes are measured.
-        controller: plans the walks.
-        velocity: V_r.
-        duration: of the walks [time units].
-        measured: how much of it counts [time units].
-        threads: that step; one per core unless given.
+        measured: how much of the duration counts [time units].
     """
     plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
     first = (duration - measured) / settled.stride.dt * settled.substeps
@@ -88,14 +84,8 @@ def last_strides(
 
 
 def strides_between(settled: Settled, chunks: Sequence[Chunk], start: int, begun: np.ndarray) -> Strides:
-    """What a start did from the first to the last of some rows.
-
-    Args:
-        settled: what the walk began with, whose feet's pushes are measured.
-        chunks: that follow each other.
-        start: which.
-        begun: rows of the chunks in which strides begin, at least two, none among the first two rows.
-    """
+    """What a start did from the first to the last of the rows in which strides have `begun`: at least two, none among
+    the first two rows of the chunks, which follow each other and show what feet push."""
     columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
     m, rows = settled.substeps, slice(begun[0], begun[-1])
     qpos, sensors, torque, standing = (

@@ -90,12 +90,9 @@ def find_stable_starts(
 ) -> StableStarts:
     """The first starts whose plan has not lost stability when a disturbance comes; the rest are passed over.
 
-    Args:
-        controller: plans the walks.
-        velocity: V_r, 0 < V < 1.
+    Args, beside those of `WalkSettings`:
         n_starts: number of starts to find.
         seed: of starts, times and legs.
-        stride: step range, lines of the tips and time step.
         grid: steps of which every time is a multiple.  Times are uniform within one period of a single leg, after
             `SETTLED` of them.
 

@@ -78,14 +78,7 @@ def crossed(conditions: Conditions) -> float:
 
 def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride) -> Walking | None:
     """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs, or not so
-    late, since its steps are longer.
-
-    Args:
-        name: of the trial.
-        entrant: whose controller it is.
-        conditions: all others.
-        stride: with the time step.
-    """
+    late, since its steps are longer."""
     controller, reading = entrant.controller, entrant.reading if name in READING else None
     body = conditions.body
     if name in GROUNDS:

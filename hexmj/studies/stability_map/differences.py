@@ -19,12 +19,8 @@ FLSS = MEASURES | BESIDE | {"static": "static_loss"}
 
 
 def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
-    """The frequencies, differences and counts of `StabilityMap.result` beside what happened to every start.
-
-    Args:
-        data: over (value, velocity, start).
-        reference: value of the condition from which `change` is counted.
-    """
+    """The frequencies, differences and counts of `StabilityMap.result` beside what happened, over (value, velocity,
+    start); `change` is counted from a reference, a value of the condition."""
     cells = ("value", "velocity")
     happened = {
         measure: np.isfinite(data[outcome].transpose(*cells, "start").values) for measure, outcome in FLSS.items()
