@@ -14,6 +14,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type, settin
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
 from hexmj.legs import LEGS
+from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
 from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw, draw_starts
@@ -88,8 +89,6 @@ class Comparison:
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """As `compare` gives it."""
-        from hexmj.measures.frequency import settings
-
         starts = draw_starts(self.n_starts, self.seed, self.stride)
         table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
             **velocity_axis(*self.observed),
@@ -167,8 +166,6 @@ def physical_flss(
         The table of `kinematic.flss`, the frequency of `BESIDE` with its interval; the times of the fall and of
         `BESIDE`, and the outcomes `REPORTED`, of every start.
     """
-    from hexmj.measures.frequency import frequency_table, losses_by_sample
-
     check_controller_type(controller)
     result = compare(
         controller, velocities, n_starts=n_starts, window=window, seed=seed, conditions=conditions, stride=stride,

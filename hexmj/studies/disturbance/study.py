@@ -17,6 +17,7 @@ from hexmj.physics.pushes import steps_pushed
 from hexmj.starts import checked_list
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
+from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Acceleration, check_reached
@@ -115,8 +116,6 @@ class DisturbedWalks(SameStarts):
             `strategy`, the first is undisturbed.  Over velocity the observation time `duration` [time units] and the
             number of starts `drawn` to find these.  And the frequencies of `frequencies.with_flss_after`.
         """
-        from hexmj.studies.disturbance.frequencies import with_flss_after
-
         table = over_axes({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
             **velocity_axis(*self.observed),
             disturbance=("case", [case.disturbance for case in self.cases]),

@@ -13,10 +13,13 @@ from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed
+from hexmj.physics.pushes import can_push
 from hexmj.starts import check_draw
 from hexmj.storage.attributes import attributes
+from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
+from hexmj.studies.league.standings import standings
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, LOAD, TRIALS, crossed, walking
 from hexmj.sweeps import Cell
 from hexmj.sweeps.plain_settings import plain
@@ -116,8 +119,6 @@ class League:
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """All that the table, the figures and the ranks are made of; see `standings.standings`."""
-        from hexmj.studies.league.standings import standings
-
         told = ("velocities", "n_starts", "n_physical", "n_tried", "tried_at", "window", "periods", "seed")
         told += ("accelerating",)
         settings: dict[str, Any] = {"study": "league"} | {name: plain(getattr(self, name)) for name in told}
@@ -159,8 +160,6 @@ class League:
 
     def _tried(self, entrant: Entrant) -> Iterator[tuple[str, Callable[..., Any], float, dict[str, Any]]]:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
-        from hexmj.physics.pushes import can_push
-        from hexmj.studies.disturbance.disturbances import GRID
         from hexmj.studies.league import in_physics
 
         way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))

@@ -13,6 +13,7 @@ from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError, check_distinct
 from hexmj.starts import checked_list
 from hexmj.studies.same_starts import SameStarts
+from hexmj.studies.terrain.crossings import with_crossings
 from hexmj.sweeps import Cell, over_axes
 from hexmj.timing import Stride
 
@@ -129,8 +130,6 @@ class Terrain(SameStarts):
             are beyond, on rough ground wherever they stand.  Over starts too: `OUTCOMES`, the `distance` walked [mm],
             and `after`, whether the start fell after it had reached the obstacle.
         """
-        from hexmj.studies.terrain.crossings import with_crossings
-
         (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
         table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
         return self.labelled(table, "terrain", window=f"{self.distance:g} / V", distance=self.distance)
