@@ -56,11 +56,8 @@ def check_window(result: "xr.Dataset") -> None:
 
 @contextmanager
 def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
-    """Refuse in one sentence whatever the block does not find in a part of a result.
-
-    Args:
-        result: that the block reads.
-        cannot: what then cannot be done, such as "the figure cannot be drawn".
+    """Refuse in one sentence whatever the block does not find in a part of a result, and say what then `cannot` be
+    done, such as "the figure cannot be drawn".
 
     Raises:
         InputError: in place of the errors of Python, NumPy and xarray.
@@ -77,11 +74,8 @@ def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
 
 
 def check_starts(result: "xr.Dataset", told: int | None = None) -> None:
-    """Refuse a part of the starts, since frequencies and titles are those of all.
-
-    Args:
-        result: over start, or without that axis.
-        told: of how many starts its numbers are; as its settings say unless given.
+    """Refuse a part of the starts, since frequencies and titles are those of all: as many as `told`, or as its settings
+    say; nothing is said of a result without that axis.
 
     Raises:
         InputError: it holds fewer, or more.

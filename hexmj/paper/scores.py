@@ -68,13 +68,7 @@ def judged(
     known: "Mapping[str, xr.Dataset] | None" = None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Claims judged under a protocol.
-
-    Args:
-        claims: to be judged.
-        protocol: how much is simulated, and how the paper is read.
-        known: measurements that need not be taken.
-        threads: one per core unless given.
+    """Claims judged under a protocol; measurements that are `known` need not be taken.
 
     Returns:
         Over claim and window: `agrees`, 1, 0 or -1 where a set was not searched; and `miss`, by how much the point that

@@ -88,14 +88,8 @@ def static_plan(walk: PhysicalWalk) -> Walk:
 
 
 def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
-    """The mechanism of a fall.
-
-    Args:
-        tipping: how the trunk has leant where it was tipped, (step, 2).
-        last: how it leans as it falls, (2,).
-        least: least margin of the plan within the time constant before it tipped [mm].
-        narrow: see `NARROW` [mm].
-    """
+    """The mechanism of a fall, from how the trunk leant while it was tipped, (step, 2), and at last, (2,), and the
+    least margin of the plan within the time constant before [mm]."""
     if (tipping @ last < 0.0).any():
         return _NUMBER["thrown"]
     if least > 0.0:
