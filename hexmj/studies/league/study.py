@@ -132,31 +132,33 @@ class League:
         """Every cell of an entrant by what it is asked: random starts alone for regimes and in trials, too."""
         from hexmj.studies.league import in_physics
 
+        def cell(name: str, function: Callable[..., Any], time: float, own: Mapping[str, Any]) -> Cell:
+            """Its cost goes by the time walked, of all starts unless its own settings say how many."""
+            told = {"entrant": entrant, "n_starts": self.n_starts, "seed": self.seed, "stride": self.stride, **own}
+            return Cell(f"{entrant.controller.name}-{name}", function, told, float(time * told["n_starts"]))
+
         window = {"window": self.window}
-        walked = window | {"controller": entrant.controller, "conditions": self.conditions}
+        walked = window | {"controller": entrant.controller, "conditions": self.conditions, "n_starts": self.n_physical}
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         for v, time in at:
-            own = window | {"velocity": v}
-            yield f"paper {v}", self._cell(f"paper-V-{v:g}", on_paper.losses, time * PAPER, entrant, own)
+            yield f"paper {v}", cell(f"paper-V-{v:g}", on_paper.losses, time * PAPER, window | {"velocity": v})
         for v, time in at:
-            own = walked | {"velocity": v, "n_starts": self.n_physical}
-            yield f"physics {v}", self._cell(f"physics-V-{v:g}", in_physics.walks, time, entrant, own)
+            yield f"physics {v}", cell(f"physics-V-{v:g}", in_physics.walks, time, walked | {"velocity": v})
         if entrant.ideal:
             return
         for v, time in at:
             own = {"velocity": v, "n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-            yield f"regime {v}", self._cell(f"regime-V-{v:g}", on_paper.regimes, 20 * time * PAPER, entrant, own)
+            yield f"regime {v}", cell(f"regime-V-{v:g}", on_paper.regimes, 20 * time * PAPER, own)
         own = window | dict(zip(("low", "high"), RANGE, strict=True))
-        yield "range", self._cell("range", on_paper.losses_over_range, 600 * PAPER, entrant, own)
+        yield "range", cell("range", on_paper.losses_over_range, 600 * PAPER, own)
         if self.accelerating:
             own = window | {"velocity": FINAL, "acceleration": Acceleration()}
-            yield "accelerated", self._cell("accelerated", on_paper.losses, 10_000 * PAPER, entrant, own)
+            yield "accelerated", cell("accelerated", on_paper.losses, 10_000 * PAPER, own)
         tried = window | {"velocity": self.tried_at}
         for trial, leg in LEGS_LOST.items():
-            own = tried | {"leg_lost": leg}
-            yield f"paper, {trial}", self._cell(f"paper-{trial}", on_paper.losses, 200 * PAPER, entrant, own)
+            yield f"paper, {trial}", cell(f"paper-{trial}", on_paper.losses, 200 * PAPER, tried | {"leg_lost": leg})
         for trial, function, cost, own in self._tried(entrant):
-            yield trial, self._cell(trial, function, cost, entrant, tried | own | {"n_starts": self.n_tried})
+            yield trial, cell(trial, function, cost, tried | own | {"n_starts": self.n_tried})
 
     def _tried(self, entrant: Entrant) -> Iterator[tuple[str, Callable[..., Any], float, dict[str, Any]]]:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
@@ -174,10 +176,3 @@ class League:
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
                 yield trial, in_physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}
-
-    def _cell(
-        self, name: str, function: Callable[..., Any], time: float, entrant: Entrant, own: Mapping[str, Any]
-    ) -> Cell:
-        """A cell whose cost goes by the time walked, of all starts unless its own settings say how many."""
-        told = {"entrant": entrant, "n_starts": self.n_starts, "seed": self.seed, "stride": self.stride, **own}
-        return Cell(f"{entrant.controller.name}-{name}", function, told, float(time * told["n_starts"]))
