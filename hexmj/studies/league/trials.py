@@ -19,9 +19,6 @@ DELAY = 0.02
 NOISE = 0.1
 """Standard deviation of the error of sensed tips, as a part of AEP_0 - PEP_0."""
 
-LOST = (0, 1, 2)
-"""Legs that are lost, one at a time: front, middle, hind."""
-
 DISTURBED: dict[str, Case] = {
     "halt": Case("halt", "none"),
     "leg": Case("leg", "none"),
@@ -42,8 +39,8 @@ ground, however short the steps, until the body tips onto it."""
 LOAD = 1.0
 """What is carried, in weights of the body."""
 
-LEGS_LOST = {f"lost {leg + 1}": leg for leg in LOST}
-"""Name of a trial -> index of the lost leg."""
+LEGS_LOST = {f"lost {leg + 1}": leg for leg in (0, 1, 2)}
+"""Name of a trial -> index of the leg that is lost, one at a time: front, middle, hind."""
 
 READING: tuple[str, ...] = ("reads", "noise", "late")
 """Controllers that can read the legs do so, then inexactly, then late."""

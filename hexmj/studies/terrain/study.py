@@ -139,16 +139,13 @@ class Terrain(SameStarts):
         before = self.obstacles
         sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
         end = [_end(one) for one in before.values()]
+        grasp = {"units": "1", "long_name": "adhesion of a foot over the insect's weight"}
         table = over_axes(sizes, [one[list(OUTCOMES)] for one in data]).assign_coords(
             obstacle=list(before),
             ground=("obstacle", [one.ground.ground for one in before.values()]),
             size=("obstacle", [_size(one) for one in before.values()], {"units": "mm"}),
             end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
-            grasp=(
-                "grasp",
-                list(self.grasps),
-                {"units": "1", "long_name": "adhesion of a foot over the insect's weight"},
-            ),
+            grasp=("grasp", list(self.grasps), grasp),
             velocity=("velocity", checked_list(self.velocities), {"units": "V_p", "long_name": "velocity V_r"}),
         )
         for name, (units, long_name) in OUTCOMES.items():
