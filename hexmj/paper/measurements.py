@@ -60,20 +60,19 @@ def losses(
     inner = replace(stride, pep0=stride.pep0 + margin, aep0=stride.aep0 - margin)
     starts = draw_starts(n_starts, seed, inner)
     lost = np.full((len(WINDOWS), n_starts), NO_SET, dtype=np.int8)
-    for one in dict.fromkeys(sets):
-        if one is not None:
-            rows = [row for row, other in enumerate(sets) if other == one]
-            times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
-            durations = np.array(times)
-            wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
-            how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-            if looks == "periods":
-                lost[rows] = [lost_at_periods(starts, one, velocity, wait, time.item(), **how) for time in times]
-            elif late:
-                lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
-            else:
-                first = first_loss(starts, one, velocity, durations.max(), **how)
-                lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
+    for one in dict.fromkeys(filter(None, sets)):
+        rows = [row for row, other in enumerate(sets) if other == one]
+        times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
+        durations = np.array(times)
+        wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
+        how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+        if looks == "periods":
+            lost[rows] = [lost_at_periods(starts, one, velocity, wait, time.item(), **how) for time in times]
+        elif late:
+            lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
+        else:
+            first = first_loss(starts, one, velocity, durations.max(), **how)
+            lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
     return xr.Dataset({"lost": (("window", "start"), lost)}, {"window": list(WINDOWS)})
 
 
