@@ -31,7 +31,6 @@ GRID = 20
 CHUNK = 50
 """Steps planned at a time while a leg that protracts is looked for."""
 
-
 MOST_PERIODS = 100
 """Periods of a single leg for which one that protracts is looked for."""
 

@@ -37,10 +37,8 @@ OUTCOMES = {  # units, long_name
 FARTHER = Conditions.of(ground_at=80.0)
 """Walks have found their gait before they come to an obstacle."""
 
-
 SIZED = {"heights": {"step", "hurdle", "rough"}, "lengths": {"gap"}}
 """Name of a list of sizes -> the obstacles that have them."""
-
 
 TOLD = {"ground_length": "hurdle", "ground_seed": "rough"}
 """Condition that is the same for all obstacles -> the one that has it."""
