@@ -56,9 +56,9 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
             strategy = strategies[case]
             x = one.velocity + shifts[strategy]
             frequency_curve(axes, x, one.isel(case=case), measure, **STYLES[strategy])
-        axes.set(ylim=(-0.03, 1.03))
-        velocity_ticks(axes, one.velocity.values)
-        axes.set_xlim(one.velocity.values.min() - BESIDE, one.velocity.values.max() + BESIDE)
+        v = one.velocity.values
+        velocity_ticks(axes, v)
+        axes.set(xlim=(v.min() - BESIDE, v.max() + BESIDE), ylim=(-0.03, 1.03))
         tidy(axes)
     for column, kind in enumerate(kinds):
         panels[0, column].set_title(_title(kind), fontsize=10)
@@ -69,8 +69,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(one[f"{measure}_reached"].min()) for measure in measures)
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
-    told = caption_of_at_least(least, result)
-    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", told)
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption_of_at_least(least, result))
     return figure
 
 

@@ -1,7 +1,7 @@
 """The league as two figures with a row for each entrant: who loses stability, and how they walk and what they meet."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,6 @@ BAR_HEIGHT = 0.25
 NAMED = 6
 """Most entrants that a note names."""
 
-
 POINTS = {"range": ("#1b6ca8", "o", -0.14), "accelerated": ("#b3261e", "D", 0.14)}
 """What is told over all velocities -> its colour, its mark, and where it stands in its row."""
 
@@ -49,8 +48,8 @@ class Panel(NamedTuple):
     """Of matplotlib's colour maps."""
     levels: tuple[float, ...]
     """Between which a colour is the same."""
-    fewer: np.ndarray | None = None
-    """Where walks are missing, (entrant, column)."""
+    fewer: np.ndarray | Literal[False] = False
+    """Where walks are missing, (entrant, column), if any are."""
 
 
 def league_figure(result: "xr.Dataset") -> "Picture":
@@ -60,7 +59,7 @@ def league_figure(result: "xr.Dataset") -> "Picture":
     titles = dict(zip(MEASURES, ("on paper (kinematic)", "under the feet (measured)", "falls (physical)"), strict=True))
     panels = [
         Panel(f"{title}\n{starts_in_words(shown[f'{name}_starts'].max().item())}", shown[name].values, "YlOrRd", SHARES,
-              None if name == "kinematic" else missing)
+              name != "kinematic" and missing)
         for name, title in titles.items()
     ]  # fmt: skip
     figure, axes = _rows(shown, (1.0, 1.0, 1.0, 0.95))
@@ -79,9 +78,10 @@ def walks_figure(result: "xr.Dataset") -> "Picture":
     """Falls in trials, limit regimes and costs, the best in physics at the top, from `League`."""
     shown = by_rank(result)
     few = shown.fell_starts.values
+    some_are = (few > 0) & (few < few.max())
     trials = f"falls in trials at V = {result.attrs['tried_at']:g}\n{starts_in_words(few.max())}"
     panels = (
-        Panel(trials, shown.fell.values, "YlOrRd", SHARES, (few > 0) & (few < few.max())),
+        Panel(trials, shown.fell.values, "YlOrRd", SHARES, some_are),
         Panel("limit regimes that are\nstatically stable", shown.stable.values, "YlGn", SHARES),
         Panel("ipsilateral phase\nof the regimes", shown.ipsilateral.values, "twilight", PHASES),
         Panel("cost of transport\nof walks without a fall", shown.cost.values, "PuBu", _round_levels(shown.cost.values),
@@ -102,8 +102,7 @@ def walks_figure(result: "xr.Dataset") -> "Picture":
     axes[0].set_xlabel("")
     heading = "The league: what walks meet, their limit regimes, and their costs; best in physics first"
     unstable = f"{FEWER} among the trials: of fewer starts; plans not stable until halt, leg or push, or walks missing"
-    few_are = ((few > 0) & (few < few.max())).any()
-    _head(figure, heading, result, _nothing(panels), unstable if few_are else "", _missing(shown))
+    _head(figure, heading, result, _nothing(panels), unstable if some_are.any() else "", _missing(shown))
     return figure
 
 
@@ -169,8 +168,7 @@ def _heat(axes: "Axes", panel: Panel) -> Any:
     colours = matplotlib.colormaps[panel.colours].with_extremes(bad="0.93")
     how: dict[str, Any] = {"cmap": colours, "norm": BoundaryNorm(panel.levels, colours.N), "aspect": "auto"}
     image = axes.imshow(panel.values, **how)
-    fewer = np.zeros(panel.values.shape, dtype=bool) if panel.fewer is None else panel.fewer
-    for row, column in np.argwhere(~np.isfinite(panel.values) | fewer):
+    for row, column in np.argwhere(~np.isfinite(panel.values) | panel.fewer):
         known = np.isfinite(panel.values[row, column])
         shade = image.cmap(image.norm(panel.values[row, column])) if known else (1.0, 1.0, 1.0, 1.0)
         dark = np.dot(shade[:3], [0.3, 0.59, 0.11]) < 0.5

@@ -66,16 +66,15 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
                 values = one[name] if panel == "agreement" else one[name].mean("start")
                 style = {"color": colour, "marker": MARKERS.get(label, "o"), "markersize": 4.5, "linewidth": 1.6}
                 axes[panel].plot(one.vp, values, linestyle=line, label=label if first and label else None, **style)
-    axes["flss"].set(ylabel="FLSS", ylim=(-0.02, 1.02))
-    axes["agreement"].set(ylim=(-0.02, 1.02))
+    axes["flss"].set(ylabel="FLSS")
     for panel, (label, _) in PANELS.items():
         axes[panel].set(ylabel=label)
-    for panel in ("margin", "drift"):
-        axes[panel].set(ylim=(0.0, None))
     for panel, one in axes.items():
+        if panel in ("flss", "agreement"):
+            one.set(ylim=(-0.02, 1.02))
+        else:
+            one.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
         _v_axis(one, result)
-        if panel in ("margin", "drift"):
-            one.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
     masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
     axes["drift"].legend(handles=masses, frameon=False, fontsize=9)
     head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))

@@ -41,8 +41,7 @@ def terrain_figure(result: "xr.Dataset") -> "Picture":
 
     check_starts(result)
     kinds, grasps = list(dict.fromkeys(result.ground.values[result.ground.values != FLAT])), result.grasp.values
-    size = (max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
-    figure = picture(*size)
+    figure = picture(max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
     panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
     for row, grasp in zip(panels, grasps, strict=True):
         for axes, kind in zip(row, kinds, strict=True):

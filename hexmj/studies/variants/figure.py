@@ -36,8 +36,7 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
     check_starts(result)
     columns = min(2, result.sizes["velocity"])
     rows = -(-result.sizes["velocity"] // columns)
-    size = 1.4 + 4.6 * columns, 1.5 + rows * (0.9 + 0.36 * result.sizes["network"])
-    figure = picture(*size)
+    figure = picture(1.4 + 4.6 * columns, 1.5 + rows * (0.9 + 0.36 * result.sizes["network"]))
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for panel, velocity in zip(panels, result.velocity.values, strict=False):
         _panel(panel, result.sel(velocity=velocity))
