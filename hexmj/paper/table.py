@@ -43,7 +43,7 @@ class Row:
         if set(self.answers) == {""} or NOT_SEARCHED in self.verdicts.values():
             return ""
         agreeing = [window for window, verdict in self.verdicts.items() if verdict == "agrees"]
-        return {0: "neither", 1: agreeing[0] if agreeing else "", len(WINDOWS): "both"}[len(agreeing)]
+        return "both" if len(agreeing) == len(WINDOWS) else next(iter(agreeing), "neither")
 
     @property
     def kind(self) -> str:

@@ -29,8 +29,8 @@ def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
     the starts that reach it in both cases, with its 95 % interval.  The same of `physical` where there is one.
     """
     dims = ("window", "velocity", "case")
-    none = {name: n for n, name in reversed(list(enumerate(data.disturbance.values)))}
-    without = [none[name] for name in data.disturbance.values]
+    names = data.disturbance.values.tolist()
+    without = [names.index(name) for name in names]  # the first case of a disturbance has no strategy
     new: dict[str, Any] = {"window": list(WINDOWS)}
     time, back, duration = data.time.values, data.back.values, data.duration.values[:, None, None]
     ends = np.stack((back + duration, time + duration))

@@ -51,8 +51,8 @@ def map_figure(result: "xr.Dataset") -> "Picture":
     numbers = np.concatenate([result.kinematic.values[:1], result.physical.values])
     words = [[f"{number:.2f}" for number in row] for row in numbers]
     if result.attrs["over"] == "vp":
-        for row, numbers_of_row in zip(words[1:], result.froude.values, strict=True):
-            row[:] = [f"{word}\nFr {number:.2g}" for word, number in zip(row, numbers_of_row, strict=True)]
+        for (row, column), number in np.ndenumerate(result.froude.values):
+            words[1 + row][column] += f"\nFr {number:.2g}"
     _heat(physical, numbers, words, "YlOrRd")
     lost = np.isfinite(result.static_loss.values).sum(axis=-1)
     counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
