@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -208,6 +209,15 @@ def test_a_cell_that_kills_its_workers_is_a_sentence(tmp_path: Path, cluster: st
     with ThreadPoolExecutor(1) as pool:
         assert len(run(cells[:3], tmp_path / "kept", executor=pool)) == 3
     assert sorted({*calls(tmp_path)}) == ["0", "1", "2"]
+
+
+def test_an_executor_that_is_shut_down_meanwhile_is_a_sentence(tmp_path: Path) -> None:
+    cells = counted_cells(tmp_path, 6, wait=0.3)
+    with ThreadPoolExecutor(1) as pool:
+        threading.Timer(0.5, lambda: pool.shutdown(wait=False, cancel_futures=True)).start()
+        with pytest.raises(InputError, match="what computed cells has gone away"):
+            run(cells, tmp_path / "kept", executor=pool)
+    assert 1 <= len(contents(tmp_path / "kept")) < 6
 
 
 @pytest.mark.slow

@@ -179,7 +179,7 @@ def test_the_command_writes_the_page_of_the_function(run, fallen, plan, tmp_path
     paths = [save_recording(one, tmp_path / f"{name}.nc") for name, one in {"a": fallen, "b": plan}.items()]
     code, answer, error = run("page", *paths, "--out", tmp_path / "out", "--json")
     assert code == 0, error
-    assert [Path(name).name for name in json.loads(answer)["files"]] == ["walk.html", "manifest.json"]
+    assert [Path(name).name for name in json.loads(answer)["files"]] == ["walk.html", "walk.html-manifest.json"]
     assert (tmp_path / "out" / "walk.html").read_text(encoding="utf-8") == page_text([fallen, plan])
 
 

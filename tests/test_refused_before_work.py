@@ -1,6 +1,6 @@
 """What a later cell would refuse is refused before the first one, and nothing is kept."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ PRESSES = ": it presses feet"
         ("map --over load --values 0 10 --grasp 9 --velocities 0.3", PRESSES),
         ("converge --velocity 0.5 --grasp 9.9", PRESSES),
         ("league --grasp 50", PRESSES),
-        ("league --grasp 10", PRESSES),
+        ("league --grasp 10", "with a load of 1: it presses feet"),
         ("ablate --models ldvs --grasp 50", PRESSES),
         ("search --form hws --velocity 0.5 --physical --grasp 50", PRESSES),
     ],
@@ -152,3 +152,13 @@ def test_limits_of_walks_that_accelerate_are_told_as_they_go() -> None:
 def test_limits_are_told_whatever_the_controller_raises() -> None:
     with pytest.raises(hexmj.InputError, match=r"limited, check_velocity: ZeroDivisionError"):
         hexmj.flss(LIMITED, [0.0], window=10.0, n_starts=2)
+
+
+def test_a_load_that_nobody_carries_refuses_no_league() -> None:
+    """Entrants from ideal starts take no trials."""
+    ideal = Entrant(hexmj.load_controller("graham"), ideal=True)
+    league = League({"graham-ideal": ideal}, velocities=(0.5,), conditions=hexmj.Conditions.of(grasp=10.0))
+    assert len(league.cells()) == 2
+    tried = replace(league, entrants={"ldvs": Entrant(hexmj.LDVS)})
+    with pytest.raises(hexmj.InputError, match=r"grasp = 10; expected at most about 9\.\d with a load of 1"):
+        tried.cells()

@@ -93,7 +93,8 @@ class Disturb(StudyCommand):
                 yield from _tables(result, measure)
         found = (f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
         starts = f"{starts_in_words(self.starts)} whose plan is stable until it is disturbed"
-        yield "takes off: how much lower than without a strategy, on the same starts"
+        if {*result.strategy.values} - {"none"}:
+            yield "takes off: how much lower than without a strategy, on the same starts"
         yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
         told = {
             "slow_down": f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}",

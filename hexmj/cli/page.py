@@ -35,10 +35,10 @@ class Page:
                 f"{len(self.recordings)} recordings were given; expected 1 or {MOST}, as recording.nc of hexmj walk"
             )
         shown = [load_recording(path) for path in self.recordings]
-        out = results_folder(self.out, (NAME, MANIFEST))
+        out = results_folder(self.out, (NAME, manifest := f"{NAME}-{MANIFEST}"))
         files = [page(shown, out / NAME)]
         settings = {"recordings": [str(path) for path in self.recordings]}
-        files.append(save_manifest(self, settings, files, out / MANIFEST))
+        files.append(save_manifest(self, settings, files, out / manifest))
         if self.json:
             print_json({"files": files, "recordings": [walk_summary(one) for one in shown]})
         else:

@@ -23,7 +23,7 @@ def lost_after(
     What happens before does not count.
 
     Args, beside those of `kinematic.walk`:
-        wait: time that passes unseen [time units].
+        wait: time that passes unseen, a step at least [time units].
         durations: observation times after it, (duration,) [time units].
 
     Returns:

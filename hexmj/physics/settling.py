@@ -182,7 +182,9 @@ def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
     deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.contact.grasp
     allowed = RESTING * SINK * compiled.conditions.path.standing_height
     if deepest > allowed:
+        load = compiled.conditions.masses.load
         raise InputError(
-            f"grasp = {grasp:g}; expected at most about {grasp * allowed / deepest:.2g}: it presses feet"
+            f"grasp = {grasp:g}; expected at most about {grasp * allowed / deepest:.2g}"
+            f"{f' with a load of {load:g}' if load else ''}: it presses feet"
             f" {deepest:.3g} mm into the ground at rest, more than {allowed:.3g} mm"
         )

@@ -5,10 +5,11 @@ import os
 import pickle
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 from warnings import warn
 
@@ -204,11 +205,15 @@ def _elsewhere(
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
     futures: dict[Future[Made], int] = {}
+    done: SimpleQueue[Future[Made]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
     with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in parcels.items():
-                futures[_submitted(executor, parcel, mark)] = i
-            for future in as_completed(futures):
+                future = _submitted(executor, parcel, mark)
+                futures[future] = i
+                future.add_done_callback(done.put)
+            for _ in parcels:
+                future = done.get()
                 yield futures[future], future.result()
         except BrokenExecutor:
             raise InputError(

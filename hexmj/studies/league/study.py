@@ -113,7 +113,8 @@ class League:
         for entrant in self.entrants.values():
             random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
             check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
-        for load in (self.conditions.masses.load, LOAD):
+        tried = any(not entrant.ideal for entrant in self.entrants.values())
+        for load in (self.conditions.masses.load, *([LOAD] if tried else [])):
             check_adhesion(self.conditions.but(load=load), self.stride, self.seed)
         return [*self.named_cells().values()]
 

@@ -48,7 +48,9 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
         )
     columns = {name: np.concatenate([part[name] for _, part in parts]) for name in parts[0][1]}
     within = np.concatenate([which for which, _ in parts])
-    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(start=within)
+    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(
+        start=("start", within, {"units": "1"})
+    )
 
 
 @lru_cache(maxsize=1)
