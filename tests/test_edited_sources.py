@@ -21,7 +21,7 @@ from toy_project import write_toy
 
 def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     name, file = "hexmj.errors", sources.PACKAGE / "errors.py"
-    monkeypatch.setitem(sources._AT_FIRST, file, 0)
+    monkeypatch.setitem(sources._AT_FIRST, str(file), 0)
     with pytest.raises(InputError, match=r"errors\.py was edited since this program began; start it again"):
         sources._read.__wrapped__(name, file)
 

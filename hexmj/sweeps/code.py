@@ -53,8 +53,9 @@ _ASSETS = PACKAGE / "assets" if (PACKAGE / "assets").is_dir() else PACKAGE.paren
 
 _INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _STANDARD = sysconfig.get_path("stdlib")
-_AT_FIRST = {path: path.stat().st_mtime_ns for path in PACKAGE.rglob("*.py")}
-"""When the sources were changed last, as of this program's beginning."""
+_FILES_OF_OURS = (os.path.join(folder, name) for folder, _, names in os.walk(PACKAGE) for name in names)
+_AT_FIRST = {file: os.stat(file).st_mtime_ns for file in _FILES_OF_OURS if file.endswith(".py")}
+"""Source of this package -> when it was changed last, as of this program's beginning."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +102,11 @@ def code(modules: frozenset[str]) -> Code:
     """
     needed, data = _needed(modules), dict[str, list[str]]()
     for name, file, paths in needed.modules:
-        source = sources_as_run.as_run(file, name) or (file.read_bytes() if file not in _AT_FIRST else None)
+        source = sources_as_run.as_run(file, name) or (file.read_bytes() if str(file) not in _AT_FIRST else None)
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
         for path in paths:
-            data.setdefault(f"{module_label(name)}, {path.name}", []).append(_held(path, ours=file in _AT_FIRST))
+            data.setdefault(f"{module_label(name)}, {path.name}", []).append(_held(path, ours=str(file) in _AT_FIRST))
     sources = needed.sources | {name: ",".join(held) for name, held in data.items()}
     return Code(dict(sorted(sources.items())), needed.versions)
 
@@ -224,7 +225,7 @@ def _read(name: str, file: Path) -> _Module:
         changed, held = file.stat().st_mtime_ns, sources_as_run.as_run(file, name) or file.read_bytes()
     except OSError as error:  # as of one in an archive
         raise InputError(f"{file} cannot be read: {error.strerror}; expected sources as files") from None
-    if _AT_FIRST.get(file, changed) != changed:
+    if _AT_FIRST.get(str(file), changed) != changed:
         raise InputError(f"{file} was edited since this program began; start it again")
     python = b"" if file.name.endswith(sources_as_run.COMPILED) else held  # of a compiled module nothing is followed
     package = name if file.name == "__init__.py" else _package(name)
