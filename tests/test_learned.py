@@ -257,11 +257,12 @@ def test_actions_that_are_none_are_refused_by_felt_insects(actions, sentence):
     face = importlib.import_module("hexmj.environments.stable_baselines")
     insects = face.FeltInsects(2, duration=1.0)
     insects.reset()
+    assert len(insects.get_attr("num_envs", -1)) == 1
     with pytest.raises(InputError, match=sentence):
         insects.step(actions)
     with pytest.raises(InputError, match="action = None; expected numbers"):
         insects.step_wait()
-    with pytest.raises(InputError, match="index = 9; expected a whole number of at least 0 and at most 1"):
+    with pytest.raises(InputError, match="index = 9; expected a whole number of at least -2 and at most 1"):
         insects.get_attr("task", 9)
     with pytest.raises(InputError, match="actions = 'joints'; expected none: it is settled here"):
         face.FeltInsects(2, actions="joints")

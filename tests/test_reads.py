@@ -38,6 +38,13 @@ def tried(path):
     except OSError:
         return 0.0
 
+def made_or_read(memo):
+    try:
+        memo.open("x").close()
+    except FileExistsError:
+        pass
+    return float(memo.read_text())
+
 @dataclass(frozen=True)
 class Reader:
     at: str = "one"
@@ -131,6 +138,9 @@ def test_what_a_field_names_counts(
         '[it := Path(at, "gain"), gain := float(it.read_text()), it.write_text(str(gain))][1]',
         '[it := Path(at, "gain"), it.open("a").close(), float(it.read_text())][2]',
         '[os.replace(at + "/gain", "held"), float(Path("held").read_text()), os.replace("held", at + "/gain")][1]',
+        '[Path("held").write_text(""), os.replace(at + "/gain", "held"), float(Path("held").read_text()), '
+        'os.replace("held", at + "/gain")][2]',
+        'made_or_read(Path(at, "gain"))',
     ],
 )
 def test_what_it_writes_once_it_has_read_it_counts(computed: Callable[..., tuple[float, int]], gain: str) -> None:

@@ -147,13 +147,30 @@ def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) ->
     assert (gain, kept, complaint) == (2.0, 1, "")
 
 
+OTHER = (
+    "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Other:\n    name: str = 'other'\n"
+    "    gain = 2.0\n    def begin(self, starts, velocity, stride, acceleration=None, threads=None): ...\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"), [("'other.py:Other'", 1), ("'best.toml'", 1), ("__import__('glob').glob('best*')[0]", 0)]
+)
+def test_what_a_script_loads_by_a_computed_name_its_own_controllers_may_use(
+    tmp_path: Path, name: str, kept: int
+) -> None:
+    (tmp_path / "best.toml").write_text('controller = "other.py:Other"\n')
+    script = f"import hexmj\n{NEW}BASE = hexmj.load_controller({name})\n"
+    script += f"def cell():\n    return xr.Dataset({{'gain': BASE.gain}})\n{SWEEPS}"
+    gain, found, complaint = sweep(tmp_path, script=script, other=OTHER)
+    assert (gain, found) == (2.0, kept) and ("best.toml, of which" in complaint) != bool(kept)
+
+
 def test_a_controller_that_another_one_loads_by_name_is_noticed(tmp_path: Path) -> None:
     mine = f"{NEW}import hexmj\ndef cell():\n    gain = hexmj.load_controller('other.py:Other').gain\n"
-    other = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Other:\n    name: str = 'other'\n"
-    other += "    gain = 2.0\n    def begin(self, starts, velocity, stride, acceleration=None, threads=None): ...\n"
     script = f"import hexmj\n{NEW}from mine import cell\nhexmj.load_controller('other.py:Other')\n{SWEEPS}"
     gain, kept, complaint = sweep(
-        tmp_path, mine=f"{mine}    return xr.Dataset({{'gain': gain}})\n", other=other, script=script
+        tmp_path, mine=f"{mine}    return xr.Dataset({{'gain': gain}})\n", other=OTHER, script=script
     )
     assert (gain, kept) == (2.0, 0) and "other.py, of which" in complaint
 

@@ -18,6 +18,7 @@ except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
 from hexmj import checks
+from hexmj.environments.compiled_passes import ROUNDING
 from hexmj.environments.learned import FELT, MOST, felt_in
 from hexmj.environments.task import checked_actions
 from hexmj.environments.vector import StickInsects
@@ -116,7 +117,7 @@ class FeltInsects(VecEnv):
         return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
     def _some(self, indices: Any) -> list[int]:
-        return [checks.whole("index", one, 0, self.num_envs - 1) for one in self._get_indices(indices)]
+        return [checks.whole("index", one, -self.num_envs, self.num_envs - 1) for one in self._get_indices(indices)]
 
     def _all(self, indices: Any) -> int:
         if {*self._some(indices)} != {*range(self.num_envs)}:
@@ -159,7 +160,7 @@ class HeldInsects(VecEnvWrapper):
             InputError: something else, or numbers beyond -1 to 1.
         """
         actions = checked_actions(actions, (self.num_envs, *self._shape))
-        if not (within := np.abs(actions) <= 1.0).all():
+        if not (within := np.abs(actions) <= 1.0 + ROUNDING).all():
             raise InputError(f"an action has {actions[~within][0]}; expected -1 to 1")
         self._actions = actions
 

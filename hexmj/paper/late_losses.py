@@ -23,6 +23,7 @@ def lost_after(
     What happens before does not count.
 
     Args, beside those of `kinematic.walk`:
+        controller: the network.
         wait: time that passes unseen, a step at least [time units].
         durations: observation times after it, (duration,) [time units].
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     """The data of a cell, and why it is not kept; see `Cell.not_kept`."""
 
 _Task = tuple[Cell, str, Path | None]
-"""A cell, its record and its file; nothing of these where nothing is kept."""
+"""A cell, its record and its file; empty and None where nothing is kept."""
 
 _Parcel = Callable[[Path | None], "Made"]
 """A cell on its way to a worker, who calls it with the mark of the folder."""

@@ -48,7 +48,7 @@ WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
 _ANEW: set[str] = set()
-"""What of it the code knows, since nothing was left of what it held before."""
+"""What of it the code knows: nothing was left of what it held before, which nobody had read."""
 
 _WRITTEN_EVER: set[str] = set()
 """What this program has written itself at any time."""
@@ -127,7 +127,10 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             _WRITTEN_EVER.add(file)
             if _COMPUTING:
                 WRITTEN.add(file)
-                _ANEW.update([file] if anew else [])
+                if anew and file not in _AT_FIRST:
+                    _ANEW.add(file)
+                elif event == "os.rename" and not anew:
+                    _ANEW.discard(file)
 
 
 def _note(file: str, read: bool) -> None:
@@ -142,9 +145,9 @@ def _note(file: str, read: bool) -> None:
         by.add(file)
         return
     if in_main or not _COMPUTING:
-        found = _openers(opener)
+        found = _openers(opener, file)
         if not (found or in_main):
-            found = _openers(sys._current_frames().get(main.ident or 0))
+            found = _openers(sys._current_frames().get(main.ident or 0), file)
         for one in found:
             _OPENED.setdefault(one, set()).add(file)
     if _COMPUTING and not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
@@ -171,13 +174,14 @@ def _reads_a_source(file: str, by: FrameType) -> bool:
 
 def _writes(file: str, flags: int) -> tuple[bool, bool]:
     """Whether a file is opened to be written or made, not to be read, and whether nothing is left of what it held."""
-    anew = bool(flags & (os.O_TRUNC | os.O_EXCL)) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
+    anew = bool(flags & os.O_TRUNC) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
     return anew or flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY, anew
 
 
-def _openers(frame: FrameType | None) -> set[str]:
+def _openers(frame: FrameType | None, file: str) -> set[str]:
     """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
-    Where this package opens it for them, that module alone."""
+    Where this package opens it for them, that module alone, and no script for the source of a controller that it loads.
+    """
     found, ours = set[str](), False
     while frame:
         by = frame.f_code.co_filename
@@ -187,7 +191,8 @@ def _openers(frame: FrameType | None) -> set[str]:
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
             if frame.f_code.co_name == "<module>":
-                return {os.path.abspath(by), *found}
+                loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith(".py")
+                return set() if loads else {os.path.abspath(by), *found}
             if not (ours or found):
                 found.add(os.path.abspath(by))
         frame = frame.f_back
