@@ -171,6 +171,12 @@ def _store(z, row, j, six):
 
 
 @njit(nogil=True, forceinline=True)
+def _neutral_velocity(z, j, rules):
+    """V_r of P^nr, in lane j."""
+    return z[(V_FINAL if len(rules[_FINAL]) else V) * LANES + j]
+
+
+@njit(nogil=True, forceinline=True)
 def _finish(z, j, x, s, s_old, aep, v, k):
     """Store a lane's legs after a step, note a first loss of static stability, and accelerate."""
     _store(z, X, j, x)
@@ -186,24 +192,50 @@ def _finish(z, j, x, s, s_old, aep, v, k):
 
 
 @njit(nogil=True)
-def _step(z, p, k, rules):
-    """One step of a block: all six legs at once, PEP(t + dt) from Delta(t) or from Delta(t + dt), or leg after leg."""
+def _step_printed(z, p, k, rules):
+    """One step of a block, all six legs at once, PEP(t + dt) from Delta(t)."""
     for j in range(LANES):
         x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
         v = z[V * LANES + j]
-        v_neutral = z[(V_FINAL if len(rules[_FINAL]) else V) * LANES + j]
-        if len(rules[_ORDER]) == SEQUENTIAL:
-            x_new, s_new, s_before, aep_new = _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules)
-        else:
-            s_before = s
-            pep_shift, aep_shift = _influences(x, s, s_old, aep, v_neutral, p, k, rules)
-            if len(rules[_ORDER]) == UNDELAYED:
-                x_new, s_new, aep_new = _moves(x, s, pep_shift, aep_shift, v, k)
-            else:
-                x_new, s_new, aep_new = _moves(x, s, _load(z, PEP_SHIFT, j), _load(z, AEP_SHIFT, j), v, k)
-                _store(z, PEP_SHIFT, j, pep_shift)
-                _store(z, AEP_SHIFT, j, aep_shift)
-        _finish(z, j, x_new, s_new, s_before, aep_new, v, k)
+        v_neutral = _neutral_velocity(z, j, rules)
+        x_new, s_new, aep_new = _moves(x, s, _load(z, PEP_SHIFT, j), _load(z, AEP_SHIFT, j), v, k)
+        pep_shift, aep_shift = _influences(x, s, s_old, aep, v_neutral, p, k, rules)
+        _store(z, PEP_SHIFT, j, pep_shift)
+        _store(z, AEP_SHIFT, j, aep_shift)
+        _finish(z, j, x_new, s_new, s, aep_new, v, k)
+
+
+@njit(nogil=True)
+def _step_undelayed(z, p, k, rules):
+    """One step of a block, all six legs at once, PEP(t + dt) from Delta(t + dt)."""
+    for j in range(LANES):
+        x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
+        v = z[V * LANES + j]
+        v_neutral = _neutral_velocity(z, j, rules)
+        pep_shift, aep_shift = _influences(x, s, s_old, aep, v_neutral, p, k, rules)
+        x_new, s_new, aep_new = _moves(x, s, pep_shift, aep_shift, v, k)
+        _finish(z, j, x_new, s_new, s, aep_new, v, k)
+
+
+@njit(nogil=True)
+def _step_sequential(z, p, k, rules):
+    """One step of a block, leg after leg."""
+    for j in range(LANES):
+        x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
+        v = z[V * LANES + j]
+        v_neutral = _neutral_velocity(z, j, rules)
+        x, s, s_old, aep = _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules)
+        _finish(z, j, x, s, s_old, aep, v, k)
+
+
+@njit(nogil=True)
+def _step(z, order, p, k, rules):
+    if len(order) == SEQUENTIAL:
+        _step_sequential(z, p, k, rules)
+    elif len(order) == UNDELAYED:
+        _step_undelayed(z, p, k, rules)
+    else:
+        _step_printed(z, p, k, rules)
 
 
 @njit(nogil=True)
@@ -238,7 +270,7 @@ def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, 
                     following += 1
         if who.max() < 0:
             return
-        _step(z, p, k, rules)
+        _step(z, rules[_ORDER], p, k, rules)
         undecided = 0
         for j in range(LANES):
             undecided += _undecided(z, j)
@@ -268,7 +300,7 @@ def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, veloci
         for n in range(steps):
             for j in range(lanes):
                 velocity[n, first + j] = z[V * LANES + j]
-            _step(z, p, k, rules)
+            _step(z, rules[_ORDER], p, k, rules)
             for j in range(lanes):
                 for leg in range(6):
                     x[n, first + j, leg] = z[(X + leg) * LANES + j]
@@ -283,4 +315,4 @@ def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: A
         for n in range(unseen + seen):
             if n == unseen:
                 z[STEPS * LANES : (STEPS + 1) * LANES] = z[DONE * LANES] + seen  # before, none counts
-            _step(z, p, k, rules)
+            _step(z, rules[_ORDER], p, k, rules)
