@@ -44,7 +44,7 @@ class Gait:
     periods: np.ndarray
     """(start, leg) each leg's own [time units]."""
     duty_factor: np.ndarray
-    """(start, leg) part of its period for which a leg stands."""
+    """(start, leg) part of its period for which a leg stands, of the cycles whose swings last as long as the last."""
     phase: np.ndarray
     """(start, pair) Phi_{j-k} in [0, 1), in the order of `PAIRS`."""
     reached: np.ndarray
@@ -171,7 +171,9 @@ def _regimes(
         begin, touch, end = begin[settled:], touch[settled:], end[settled:]
         span = end[-1] - begin[0]
         periods[n] = span / np.round(span / (end[-1] - begin[-1]))  # legs raised with leg 1 may skip or repeat a cycle
-        duty_factor[n] = 1.0 - (touch - begin).mean(axis=0) / periods[n]
+        swing = touch - begin
+        settled = _like_the_last(np.abs(swing - swing[-1]) / periods[n], _resolution(time) / periods[n].mean())
+        duty_factor[n] = 1.0 - swing[settled:].mean(axis=0) / periods[n]
         phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
         reached[n] = begin[0, 0]
     return {
@@ -204,14 +206,20 @@ def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
 
 
 def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
-    """The first of the cycles, (cycle, leg) [time units], from which on all are like the last one."""
+    """The first of the cycles, (cycle, leg) [time units], from which on periods and lags are those of the last one."""
     if len(begin) == 0:
         return 0
     length, lag = end - begin, begin - begin[:, :1]
     period = length[-1, 0]
     drift = (lag - lag[-1]) / period
-    change = np.maximum(np.abs(length / period - 1.0), np.abs(drift - np.round(drift))).max(axis=1)
-    unlike = np.flatnonzero(change > TOLERANCE + STEPS * resolution / period)
+    change = np.maximum(np.abs(length / period - 1.0), np.abs(drift - np.round(drift)))
+    return _like_the_last(change, resolution / period)
+
+
+def _like_the_last(change: np.ndarray, resolution: float) -> int:
+    """The first of the cycles from which on all are like the last one, by how far each differs from it, (cycle, leg);
+    that and the time step in parts of the period."""
+    unlike = np.flatnonzero(change.max(axis=1) > TOLERANCE + STEPS * resolution)
     return int(unlike[-1]) + 1 if len(unlike) else 0
 
 

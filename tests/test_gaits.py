@@ -13,7 +13,7 @@ from scipy.stats import circmean, circstd
 import hexmj.gaits
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.gaits import CYCLES, Gait, gait, limit_gait
+from hexmj.gaits import CYCLES, STEPS, TOLERANCE, Gait, gait, limit_gait
 from hexmj.legs import FIG1, MIRROR
 from hexmj.measures.kinematic import walk
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, classify, unrolled, wilson_phase
@@ -85,6 +85,13 @@ def test_phases_periods_and_duty_factors_of_a_clockwork(seed, period):
     assert found.duty_factor == pytest.approx(duty, abs=2 * step)
     first = ((onset[:, 0] - step) % 1.0 + step) * period  # a leg raised before the first step is seen a period later
     assert (found.reached <= first + 0.1).all()
+
+
+def test_swings_that_go_on_settling_while_periods_last_are_no_part_of_the_duty_factor():
+    cycle = np.arange(1, int((CYCLES + 4) * 50.0 / 0.01) + 1)[:, None, None] * 0.01 // 50.0
+    found = gait(ideal_walk(TRIPOD, duty=0.6 + 0.05 * 0.6**cycle, dt=0.01))
+    assert found.reached == 50.0
+    assert found.duty_factor == pytest.approx(np.full((1, 6), 0.6), abs=TOLERANCE + STEPS * 0.01 / 50.0)
 
 
 def test_the_lag_is_that_of_the_second_leg_behind_the_first():
