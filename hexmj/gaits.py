@@ -52,7 +52,8 @@ class Gait:
     periodic: np.ndarray
     """(start,) True if from some onset on all legs keep one period and their lags, over `CYCLES` cycles or more."""
     stable: np.ndarray
-    """(start,) True if a periodic regime is statically stable throughout the last period of the walk."""
+    """(start,) True if static stability is kept throughout the last period of the walk; where there is no periodic
+    regime, throughout `CYCLES` of the longest cycles."""
 
     def __repr__(self) -> str:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
@@ -89,7 +90,7 @@ def gait(walk: Walk) -> Gait:
     if len(typed("walk", walk, Walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
-    longest = int(_steps(regimes["period"], walk.time).max())
+    longest = int(_steps(regimes["looked_at"], walk.time).max())
     return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
 
 
@@ -127,7 +128,7 @@ def limit_gait(
     longest = (stride.aep0 - stride.pep_min) * (1.0 + 1.0 / velocity)  # from AEP_0 to PEP_min and back
     speeding = acceleration.duration(velocity) if acceleration else 0.0
     steps = int(steps_within(speeding + periods * longest, stride))
-    tail = steps - int(steps_within(2.0 * longest, stride))
+    tail = steps - int(steps_within((CYCLES + 1) * longest, stride))
     stance = np.ones((1, n_starts, 6), dtype=bool)
     changes, upright = [], []
     while plan.done < steps:
@@ -156,15 +157,18 @@ def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _regimes(
     row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, n_starts: int
 ) -> dict[str, np.ndarray]:
-    """The fields of `Gait` but `stable`."""
+    """The fields of `Gait` but `stable`, for which is `looked_at`: how long before the end [time units], (start,)."""
     raised = _by_foot(row[~down], foot[~down], 6 * n_starts)
     lowered = _by_foot(row[down], foot[down], 6 * n_starts)
     periods, duty_factor = np.full((n_starts, 6), np.nan), np.full((n_starts, 6), np.nan)
     phase, reached = np.full((n_starts, len(PAIRS)), np.nan), np.full(n_starts, np.inf)
+    looked_at = np.full(n_starts, np.inf)
     j, k = np.transpose(list(PAIRS.values()))
     for n in range(n_starts):
         legs = slice(6 * n, 6 * n + 6)
         begin, touch, end = time[_cycles(raised[legs], lowered[legs])]
+        if len(begin):
+            looked_at[n] = CYCLES * (end - begin)[-1].max()
         settled = _settled(begin, end, _resolution(time))
         if len(begin) - settled < CYCLES:
             continue
@@ -176,6 +180,7 @@ def _regimes(
         duty_factor[n] = 1.0 - swing[settled:].mean(axis=0) / periods[n]
         phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
         reached[n] = begin[0, 0]
+        looked_at[n] = periods[n].mean()
     return {
         "period": periods.mean(axis=1),
         "periods": periods,
@@ -183,6 +188,7 @@ def _regimes(
         "phase": phase,
         "reached": reached,
         "periodic": np.isfinite(reached),
+        "looked_at": looked_at,
     }
 
 
@@ -223,10 +229,9 @@ def _like_the_last(change: np.ndarray, resolution: float) -> int:
     return int(unlike[-1]) + 1 if len(unlike) else 0
 
 
-def _steps(period: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Steps of each period, rounded up and within the walk; one where there is none."""
-    steps = np.ceil(np.nan_to_num(period) / _resolution(time)).astype(int)
-    return np.clip(steps, 1, len(time))
+def _steps(duration: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Steps of each duration, rounded up and within the walk."""
+    return np.ceil(np.clip(duration / _resolution(time), 1, len(time))).astype(int)
 
 
 def _resolution(time: np.ndarray) -> float:
@@ -235,7 +240,6 @@ def _resolution(time: np.ndarray) -> float:
 
 
 def _with_stability(regimes: dict[str, np.ndarray], upright: np.ndarray, time: np.ndarray) -> Gait:
-    """Add to the regimes whether each is upright, (step, start), in its last period."""
-    ends = enumerate(_steps(regimes["period"], time))
-    stable = np.array([bool(upright[-steps:, start].all()) for start, steps in ends])
-    return Gait(**regimes, stable=regimes["periodic"] & stable)
+    """The regimes, and whether each is upright, (step, start), as long as is looked at."""
+    ends = enumerate(_steps(regimes.pop("looked_at"), time))
+    return Gait(**regimes, stable=np.array([bool(upright[-steps:, start].all()) for start, steps in ends]))

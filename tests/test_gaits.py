@@ -143,7 +143,6 @@ def test_mirrored_starts_have_mirrored_phases(controller):
 def test_what_is_not_periodic_is_reported(walked):
     found = gait(walked)
     assert not found.periodic[0]
-    assert not found.stable[0]
     assert found.reached[0] == np.inf
     assert all(np.isnan(v[0]).all() for v in (found.period, found.periods, found.duty_factor, found.phase))
 
@@ -214,6 +213,17 @@ def test_uncoordinated_legs_keep_the_phases_of_their_start():
     assert found.period == pytest.approx(np.full(30, period), abs=0.05)
     assert circle(found.phase, lags(starts / v / period)).max() < 0.001
     assert found.duty_factor == pytest.approx(np.full((30, 6), 1.0 / (1.0 + v)), abs=0.001)
+
+
+@pytest.mark.parametrize(("onset", "stable"), [(TRIPOD, True), (np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.5]), False)])
+def test_what_repeats_over_two_cycles_is_not_periodic_but_may_be_stable(onset, stable):
+    """Time runs faster and slower in turn, so one cycle of all legs lasts 45, the next one 55 time units."""
+    walked = ideal_walk(onset, duty=0.7)
+    stretched = np.interp(walked.time, np.arange(0.0, 800.0, 50.0), np.arange(0, 16) * 50.0 + np.tile([0.0, -5.0], 8))
+    rows = np.clip(np.searchsorted(stretched, walked.time), 0, len(walked.time) - 1)
+    found = gait(Walk(walked.time, walked.velocity, walked.x[rows], walked.y[rows], walked.stance[rows]))
+    assert not found.periodic[0]
+    assert found.stable[0] == stable
 
 
 @pytest.mark.parametrize("acceleration", [None, Acceleration(rate=0.001)])

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from hexmj.paper.claims import CLAIMS, INFERRED_FROM, Claim
-from hexmj.paper.quantities import Lost, Measured, Phase, Scatter, main_peak
+from hexmj.paper.quantities import Lost, Measured, Phase, Regime, Scatter, main_peak
 from hexmj.paper.rules import Answer, Band, Rule, Seen, Trend, fisher
 from hexmj.paper.table import judge, summary
 
@@ -75,6 +75,22 @@ def test_phases_are_judged_in_the_main_peak_and_the_others_counted():
     assert not answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
     outside = answer_of(Band(Scatter("hws", "phases"), (0.5, 0.5), 0.0, 0.0), measured, "")
     assert outside.value == pytest.approx(0.2) and not outside.agrees
+
+
+def test_phases_near_0_are_judged_on_the_circle():
+    measured = {"hws gaits": gaits(np.array([0.98, 0.99, 0.01, 0.02]))}
+    assert abs(answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), most=0.1), measured, "").value) < 1e-9
+    measured["hws gaits"].phase[:, :, :4] = [0.98, 0.01, 0.02, 0.99]
+    spread = answer_of(Band(Scatter("hws", "pairs"), (0.5, 0.5), most=0.1), measured, "")
+    assert spread.agrees and spread.value == pytest.approx(0.04)
+
+
+def test_an_unstable_regime_need_not_be_periodic():
+    measured = {"hws regimes": gaits(np.full(4, 0.5))}
+    measured["hws regimes"].stable[:] = [[True, True, False, False]]
+    measured["hws regimes"].periodic[:] = [[True, False, True, False]]
+    for fault in ("unstable", "aperiodic"):
+        assert answer_of(Band(Regime("hws", fault), (0.5, 0.5), most=0.5), measured, "").value == 0.5
 
 
 def test_a_mean_over_velocities_is_judged_on_the_same_starts():

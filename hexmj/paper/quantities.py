@@ -13,7 +13,7 @@ from hexmj.controllers.cruse1998 import Reading
 from hexmj.intervals import WILSON_Z, wilson_interval
 from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
-from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, classify, wilson_phase
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, circular_range, classify, unrolled, wilson_phase
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +115,7 @@ class Phase(_OfModel):
             for pair in one.pair.values[IPSILATERAL if self.pairs == "ipsilateral" else CONTRALATERAL].tolist():
                 phase = one.phase.sel(pair=pair).values
                 shift = float(wilson_phase(v)) if self.minus_wilson else 0.0
-                yield Point(v, pair, phase[main_peak(phase)] - shift)
+                yield Point(v, pair, unrolled(phase[main_peak(phase)]) - shift)
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,7 @@ class Regime(_OfModel):
         """One for each velocity."""
         for v in measured[self.needs[0]].velocity.values.tolist():
             one = measured[self.needs[0]].sel(velocity=v)
-            periodic = one.periodic.values.astype(bool)
-            yield Point(v, "", ~periodic if self.fault == "aperiodic" else periodic & ~one.stable.values.astype(bool))
+            yield Point(v, "", ~(one.periodic if self.fault == "aperiodic" else one.stable).values.astype(bool))
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ class Scatter(_OfModel):
         if self.of == "periods":
             return f"(longest - shortest) / mean period of the legs({self.model})"
         if self.of == "pairs":
-            return f"largest - smallest phase of the ipsilateral pairs({self.model})"
+            return f"largest - smallest phase, on the circle, of the ipsilateral pairs({self.model})"
         return f"part of starts outside the main peak of a pair({self.model})"
 
     def points(self, measured: Measured, window: str) -> Iterator[Point]:
@@ -166,7 +165,7 @@ class Scatter(_OfModel):
                 yield Point(v, "", np.ptp(one.periods.values, axis=1) / one.periods.values.mean(axis=1))
                 continue
             if self.of == "pairs":
-                yield Point(v, "", np.ptp(one.phase.values[:, IPSILATERAL], axis=1))
+                yield Point(v, "", circular_range(one.phase.values[:, IPSILATERAL]))
                 continue
             for pair in one.pair.values.tolist():
                 yield Point(v, pair, ~main_peak(one.phase.sel(pair=pair).values))

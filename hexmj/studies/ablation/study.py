@@ -34,7 +34,7 @@ SWITCHES = (*(f"without-{part}" for part in (1, 2, 3, 4, 5)), "with-2", "with-4"
 MEASURES = {
     "start": "lost on paper within two protractions",
     "walk": "lost on paper within three periods",
-    "limit": "no statically stable limit regime",
+    "limit": "lost static stability in the limit",
     "physical": "fell within three periods",
 }
 """What is counted."""

@@ -58,12 +58,13 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
         InputError: no start reaches a stable periodic regime.
     """
     gait = limit_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
-    if not gait.stable.any():
+    stable = gait.periodic & gait.stable
+    if not stable.any():
         raise InputError(
             f"reorganise at V = {velocity:g}: none of {CANDIDATES} starts reaches a periodic, statically stable gait;"
             " expected a controller and a velocity with one, or other strategies"
         )
-    one = int(np.argmax(gait.stable))
+    one = int(np.argmax(stable))
     plan = begin(controller, draw_starts(CANDIDATES, seed, stride)[one : one + 1], velocity, stride)
     plan.advance(round(gait.reached[one] / stride.dt))
     walk = plan.advance(round(gait.period[one] / stride.dt))
