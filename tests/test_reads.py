@@ -18,7 +18,7 @@ from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
 
 READER = """
-import functools, json, os, runpy, sqlite3, tempfile
+import functools, json, os, runpy, shutil, sqlite3, tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from glob import glob
@@ -237,6 +237,59 @@ def test_what_is_opened_as_a_cell_of_the_packages_own_is_computed_does_not_count
     assert len(list(Path("flss").glob("*.nc"))) == 1
 
 
+def test_a_file_that_a_text_names_counts_once_it_is_there_and_where_the_program_stands(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    kept = tmp_path / "kept"
+    Path("reader.py").write_text(READER.format(gain="tried('gains.toml') if Path('gains.toml').exists() else 0.0"))
+    reader = importable("reader.py").Reader
+
+    def gain() -> float:
+        return float(run([Cell("reader", reader().cell, {})], kept)[0].gain)
+
+    assert gain() == 0.0
+    Path("elsewhere").mkdir()
+    Path("elsewhere", "gains.toml").write_text("1.0")
+    monkeypatch.chdir("elsewhere")
+    assert gain() == 1.0
+    monkeypatch.chdir("..")
+    assert gain() == 0.0
+    Path("gains.toml").write_text("3.0")
+    assert gain() == 3.0
+    assert len(list(kept.glob("*.nc"))) == 3
+
+
+def test_what_one_cell_has_written_another_is_asked_for(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("[Path('memo').write_text('1.0'), float(Path('memo').read_text())][1]")
+    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*memo, of"):
+        assert computed("tried('memo')") == (1.0, 2)
+    Path("memo").write_text("5.0")
+    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*memo, of"):
+        assert computed("tried('memo')") == (5.0, 3)
+
+
+def test_what_was_read_before_a_cell_writes_it_anew_counts(computed: Callable[..., tuple[float, int]]) -> None:
+    assert computed("remembered('one/gain')", "one/gain") == (1.0, 1)
+    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*one.gain, of"):
+        computed("[Path('one/gain').write_text('5.0'), float(Path('one/gain').read_text())][1]")
+
+
+def test_a_folder_that_a_cell_makes_and_removes_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[it := tempfile.mkdtemp(), os.makedirs(it + '/within/it'), shutil.rmtree(it), 1.0][3]"
+    assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+
+
+def test_a_file_that_a_field_names_by_a_link_or_sqlite_reads_is_remembered(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    Path("link").symlink_to("one/gain")
+    for file, gain, later in (("link", "remembered('link')", "7.0"), ("one/gain.db", READS[-5][1], "8.0")):
+        computed(gain, file)
+        write_all(later)
+        with pytest.warns(UserWarning, match="gain.* has changed since it was opened first"):
+            computed(gain, file)
+
+
 def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[..., tuple[float, int]]) -> None:
     computed("1.0")
     Path("reader.py").write_text(READER.format(gain="[float(Path(at, 'gain').read_text()) for _ in range(200)][0]"))
@@ -253,6 +306,15 @@ def test_workers_tell_what_they_do_not_keep(computed: Callable[..., tuple[float,
         assert computed(gain, executor=pool) == (1.0, 1)
     with ProcessPoolExecutor(1) as pool:
         assert [computed(gain, "one/gain", executor=pool), computed(gain, "one/gain")] == 2 * [(1.0, 2)]
+
+
+def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("1.0", "one/gain")
+    Path("reader.py").write_text(READER.format(gain="remembered('one/gain')"))
+    reader = importable("reader.py").Reader()
+    KeptValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
+    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*one.gain, of"):
+        run([Cell("reader", reader.cell, {})], Path("kept"))
 
 
 def test_values_of_what_reads_a_file_that_nothing_names_are_not_kept(

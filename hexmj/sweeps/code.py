@@ -26,7 +26,7 @@ from hexmj.storage.mjcf import content, parts
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
 from hexmj.user_code.opened_files import WRITTEN
-from hexmj.user_code.parsing import files_named, parsed
+from hexmj.user_code.parsing import files_named, parsed, texts
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -41,6 +41,8 @@ DATA = (
     *(".npy", ".npz", ".pt", ".pth", ".pkl"),
 )
 """Ends of the names of data files, in small letters or capitals."""
+
+_DATA_OF_OURS = ".toml", ".xml"
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -71,8 +73,8 @@ class Code:
 @dataclass(frozen=True)
 class _Module:
     digest: str
-    data: list[Path]
-    """Files that it names."""
+    texts: list[str]
+    """Some of which name files of data."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -83,8 +85,8 @@ class _Module:
 class _Needed(NamedTuple):
     sources: dict[str, str]
     versions: dict[str, str]
-    modules: list[tuple[str, Path, list[Path]]]
-    """Of each its name, its file and its data files."""
+    modules: list[tuple[str, Path, list[str]]]
+    """Of each its name, its file and its texts."""
     missing: set[str]
     """Modules without a file."""
 
@@ -101,11 +103,11 @@ def code(modules: frozenset[str]) -> Code:
         InputError: one has no source, or a source is not what this program ran.
     """
     needed, data = _needed(modules), dict[str, list[str]]()
-    for name, file, paths in needed.modules:
+    for name, file, named in needed.modules:
         source = sources_as_run.as_run(file, name) or (file.read_bytes() if str(file) not in _AT_FIRST else None)
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        for path in paths:
+        for path in _data(file, named):
             data.setdefault(f"{module_label(name)}, {path.name}", []).append(_held(path, ours=str(file) in _AT_FIRST))
     sources = needed.sources | {name: ",".join(held) for name, held in data.items()}
     return Code(dict(sorted(sources.items())), needed.versions)
@@ -126,7 +128,14 @@ def needed_files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
     """
     read = _needed(modules).modules
     sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
-    return sources, [part for _, _, paths in read for path in paths if path.is_file() for part in parts(path)]
+    return sources, [part for _, file, named in read for path in _data(file, named) for part in parts(path)]
+
+
+def _data(file: Path, named: list[str]) -> list[Path]:
+    """Files that are there as a value begins and that texts of a module name, beside it or in the current folder."""
+    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd(), DATA)
+    found = files_named(named, (file.parent, folder), endings) if named else []
+    return [path for path in found if str(path) not in WRITTEN or path in _HELD]
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -154,7 +163,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
         if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
             sources[module_label(name)] = module.digest
-            read.append((name, file, module.data))
+            read.append((name, file, module.texts))
             ours = top == PACKAGE.name
             if not file.is_relative_to(PACKAGE):
                 installed |= CARRIERS & {imported.partition(".")[0] for imported, _ in module.imports}
@@ -240,9 +249,9 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
-    folders, endings = ((file.parent, _ASSETS), (".toml", ".xml")) if ours else ((file.parent, Path.cwd()), DATA)
-    data = files_named(tree, folders, endings) if any(one.encode() in held.lower() for one in endings) else []
-    return _Module(digest(held), data, of_package, imports, bound)
+    endings = _DATA_OF_OURS if ours else DATA
+    named = texts(tree) if any(one.encode() in held.lower() for one in endings) else []
+    return _Module(digest(held), named, of_package, imports, bound)
 
 
 def _statements(tree: ast.Module, *, types: bool) -> Iterator[ast.AST]:

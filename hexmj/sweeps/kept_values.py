@@ -57,9 +57,9 @@ class KeptValues:
             picked = rows[list(new.values())]
             with heard() as opened:
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
+            why = self._cell.not_kept(opened) if self._path or opened else ""
             if self._path:
-                changed = check_unchanged(self._cell, self._record, self._cell.record())
-                if why := changed or self._cell.not_kept(opened):
+                if why := check_unchanged(self._cell, self._record, self._cell.record()) or why:
                     warn(why, stacklevel=2)
                     self._path = None
                 else:

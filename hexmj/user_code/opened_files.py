@@ -38,6 +38,12 @@ _OURS = f"{Path(__file__).parents[1]}{os.sep}"
 _READS_SOURCES = "tokenize.py", "<frozen importlib._bootstrap_external>"
 """Ends of the names of the code that reads sources to import them or to show their lines."""
 
+_WALKERS = "os", "shutil"
+"""Modules of Python that open folders by their names within another one."""
+
+_SCRIPTS = "__main__", "__mp_main__"
+"""Names of a script where it runs, and in the workers that it starts."""
+
 _OPENED: dict[str, set[str]] = {}
 """Source -> what was opened or ran while it was imported or called, if no cell told it."""
 
@@ -48,7 +54,8 @@ WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
 _ANEW: set[str] = set()
-"""What of it the code knows: nothing was left of what it held before, which nobody had read."""
+"""What the code of the cells that are computed now knows: nothing was left of what it held before, which nobody had
+read."""
 
 _WRITTEN_EVER: set[str] = set()
 """What this program has written itself at any time."""
@@ -70,6 +77,8 @@ def heard() -> Iterator[set[str]]:
         if outer is not None:
             outer |= opened
             _COMPUTING[mine] = outer
+        if not _COMPUTING:
+            _ANEW.clear()
 
 
 def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[str]:
@@ -93,7 +102,7 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
 
 def changed(told: Iterable[Path]) -> list[str]:
     """Those of some files that have changed since they were first opened, as which the code may remember them."""
-    files = {os.path.abspath(file) for file in told}
+    files = {os.path.realpath(file) for file in told}
     return sorted(file for file in files & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
 
 
@@ -109,8 +118,9 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         path: Any = arguments[_PATH[event]]
         if event == "exec":
             path = path.co_filename if path.co_name == "<module>" else None
-        if not isinstance(path, str | bytes | os.PathLike):
-            return  # an open file
+        lists = event == "open" and arguments[1] is None and sys._getframe(1).f_globals.get("__name__") in _WALKERS
+        if lists or not isinstance(path, str | bytes | os.PathLike):
+            return  # a folder that is walked through or removed; an open file
         given = os.fsdecode(path)
         name = ":memory:" if "mode=memory" in given else _URI.sub(r"\1", given)
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
@@ -123,11 +133,12 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             else:
                 writes, anew = _writes(file, arguments[2]) if event == "open" else (False, False)
             if not writes:
-                return _note(file, event == "open")
+                within = threading.get_ident() in _COMPUTING and os.path.exists(file)
+                return _note(file, event == "open" or (event == "sqlite3.connect" and within))
             _WRITTEN_EVER.add(file)
             if _COMPUTING:
                 WRITTEN.add(file)
-                if anew and file not in _AT_FIRST:
+                if anew and os.path.realpath(file) not in _AT_FIRST:
                     _ANEW.add(file)
                 elif event == "os.rename" and not anew:
                     _ANEW.discard(file)
@@ -137,10 +148,10 @@ def _note(file: str, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     main = threading.main_thread()
     in_main = threading.current_thread() is main
-    if read and not opener.f_code.co_filename.startswith(_OURS):
-        _AT_FIRST.setdefault(file, _stamp(file))
     if file in _ANEW:
         return
+    if read and not opener.f_code.co_filename.startswith(_OURS):
+        _AT_FIRST.setdefault(os.path.realpath(file), _stamp(file))
     if by is not None:
         by.add(file)
         return
@@ -151,7 +162,7 @@ def _note(file: str, read: bool) -> None:
         for one in found:
             _OPENED.setdefault(one, set()).add(file)
     if _COMPUTING and not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
-        for opened in _COMPUTING.values():  # whose thread it is nobody knows
+        for opened in list(_COMPUTING.values()):  # whose thread it is nobody knows
             opened.add(file)
 
 
@@ -191,7 +202,7 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
             if frame.f_code.co_name == "<module>":
-                loads = ours and frame.f_globals.get("__name__") == "__main__" and file.endswith(".py")
+                loads = ours and frame.f_globals.get("__name__") in _SCRIPTS and file.endswith(".py")
                 return set() if loads else {os.path.abspath(by), *found}
             if not (ours or found):
                 found.add(os.path.abspath(by))

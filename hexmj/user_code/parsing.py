@@ -36,16 +36,20 @@ def _alone() -> Iterator[None]:
         yield
 
 
-def files_named(tree: ast.AST, folders: Sequence[Path], endings: tuple[str, ...]) -> list[Path]:
-    """Files that are there, and that texts of a source name, as ``f"{folder}/leg.xml"`` does.
+def texts(tree: ast.AST) -> list[str]:
+    """The texts of a source, each also without the slash it begins with, as in ``f"{folder}/leg.xml"``."""
+    constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    return list(dict.fromkeys(text for one in constants for text in (one, one.lstrip("/"))))
+
+
+def files_named(texts: Sequence[str], folders: Sequence[Path], endings: tuple[str, ...]) -> list[Path]:
+    """Files that are there, and that texts name.
 
     Args:
-        tree: of the source.
+        texts: of a source.
         folders: where they are looked for, and in folders there that texts name.
         endings: of the names, in small letters.
     """
-    constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
-    texts = dict.fromkeys(text for one in constants for text in (one, one.lstrip("/")))
     names = [text for text in texts if text.lower().endswith(endings)]
     within = [folder / text for folder in folders for text in texts if isdir(folder / text)] if names else []
     return sorted({one for folder in (*folders, *within) for name in names if isfile(one := folder / name)})
