@@ -150,7 +150,7 @@ def test_a_command_drops_a_wish_that_would_keep_mujoco_from_being_imported(envir
     gl.drop_vain_wish()
     assert os.environ.get("MUJOCO_GL") == left
     if left == "disable":
-        assert f"there is no MUJOCO_GL = {wish}; egl, glfw and osmesa are known" in str(gl.missing())
+        assert f"MUJOCO_GL = {wish} is not there; expected one of egl, glfw and osmesa that is" in str(gl.missing())
 
 
 def test_with_the_libraries_the_wish_for_egl_stands(environment):

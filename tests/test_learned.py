@@ -203,6 +203,7 @@ def test_what_all_insects_share_is_not_asked_of_some_or_set():
     pytest.importorskip("stable_baselines3", exc_type=ImportError)
     insects = importlib.import_module("hexmj.environments.stable_baselines").FeltInsects(3)
     assert len(insects.env_method("reset")) == len(insects.get_attr("task")) == 3
+    assert len(insects.env_method("reset", indices=[0, -2, -1])) == 3
     with pytest.raises(InputError, match=r"indices = \[0\]; expected all 3"):
         insects.env_method("reset", indices=[0])
     with pytest.raises(InputError, match=r"velocity = 0.9 cannot be set; expected new insects"):

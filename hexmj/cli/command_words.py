@@ -31,7 +31,7 @@ def checked(words: list[str]) -> list[str]:
         InputError: a word that is empty, no print, or a book, or an option that is given twice or is tyro's own.
     """
     if alone := [word for word in words if word in ("", "--")]:
-        raise InputError(f"{alone[0]!r} stands alone; expected options, each with its values")
+        raise InputError(f"{alone[0]!r} was given; expected options, each with its values, none of them empty")
     options = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
     if any(option.startswith("--tyro-") for option in options):
         raise InputError(f"options of tyro's own were given; for --completion, expected one of {', '.join(SHELLS)}")

@@ -117,7 +117,8 @@ class FeltInsects(VecEnv):
         return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
     def _some(self, indices: Any) -> list[int]:
-        return [checks.whole("index", one, -self.num_envs, self.num_envs - 1) for one in self._get_indices(indices)]
+        n = self.num_envs
+        return [checks.whole("index", one, -n, n - 1) % n for one in self._get_indices(indices)]
 
     def _all(self, indices: Any) -> int:
         if {*self._some(indices)} != {*range(self.num_envs)}:

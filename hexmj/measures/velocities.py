@@ -9,6 +9,9 @@ import numpy as np
 from hexmj.starts import checked_list
 from hexmj.timing import Acceleration, Stride, check_reached, observation_time, steps_within
 
+VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
+"""Attributes of an axis of velocities."""
+
 
 def several(velocities: Sequence[float] | float) -> Sequence[float]:
     """Velocities as a list, one alone too."""
@@ -34,6 +37,6 @@ def observed(
 def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
     """Velocities and their observation times, both (velocity,), as a table has them."""
     return {
-        "velocity": ("velocity", v, {"units": "V_p", "long_name": "velocity V_r"}),
+        "velocity": ("velocity", v, VELOCITY),
         "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
     }

@@ -11,6 +11,7 @@ import numpy as np
 
 from hexmj.diagrams import spans
 from hexmj.legs import LEGS
+from hexmj.measures.velocities import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
@@ -74,7 +75,7 @@ def phase_figure(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
     dims = ("leg", "velocity")
     data = xr.Dataset(
         {"phase": ((*dims, "gait"), phase, {"units": "1"}), "main_peak": (dims, peak, {"units": "1"})},
-        {"velocity": v, "leg": list(RELATIVE)},
+        {"velocity": ("velocity", v, VELOCITY), "leg": list(RELATIVE)},
     )
     figure = _figure(6.4, 4.6)
     axes = figure.subplots()
@@ -84,7 +85,7 @@ def phase_figure(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
         label = f"leg {leg} relative to leg 1"
         axes.plot(v, peak[row], color=colour, marker=marker, markersize=5, linewidth=1.3, label=label)
     if model == "ldvs":
-        data["wilson"] = (dims, np.array([wilson_phase(v), 2 * wilson_phase(v) - 1]))
+        data["wilson"] = (dims, np.array([wilson_phase(v), 2 * wilson_phase(v) - 1]), {"units": "1"})
         for leg, label in zip(RELATIVE, ("Gait II (Wilson)", None), strict=True):
             axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
     axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
@@ -114,8 +115,12 @@ def phase_histograms(measured: Measured, model: str) -> "tuple[Figure, xr.Datase
     figure.supxlabel("relative phase", fontsize=11)
     figure.supylabel("number of starts", fontsize=11)
     data = xr.Dataset(
-        {"starts": (("velocity", "pair", "bin"), counts)},
-        {"velocity": [v for v, _ in kept], "pair": list(PAIRS), "bin": (edges[:-1] + edges[1:]) / 2},
+        {"starts": (("velocity", "pair", "bin"), counts, {"units": "1"})},
+        {
+            "velocity": ("velocity", [v for v, _ in kept], VELOCITY),
+            "pair": list(PAIRS),
+            "bin": ("bin", (edges[:-1] + edges[1:]) / 2, {"units": "1", "long_name": "relative phase"}),
+        },
     )
     return figure, data
 

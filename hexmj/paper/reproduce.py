@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 from hexmj.checks import path_of
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError, check_distinct
+from hexmj.measures.velocities import VELOCITY
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of
@@ -90,7 +91,9 @@ def _measurements(names: Sequence[str], protocol: Protocol, folder: Path, how: E
 
 def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]") -> "xr.Dataset":
     velocities = list(velocities_of(name, protocol))
-    return over_axes({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(velocity=velocities)
+    return over_axes({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(
+        velocity=("velocity", velocities, VELOCITY)
+    )
 
 
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:

@@ -119,7 +119,7 @@ def drop_vain_wish() -> None:
 def missing() -> str | None:
     """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
     if _VAIN:
-        return _sentence(f"there is no MUJOCO_GL = {_VAIN[0]:.80}; egl, glfw and osmesa are known")
+        return _sentence(f"MUJOCO_GL = {_VAIN[0]:.80} is not there; expected one of egl, glfw and osmesa that is")
     if os.environ.get("MUJOCO_GL", "").lower().strip() in NONE:
         return _sentence("MUJOCO_GL asks for nothing")
     try:

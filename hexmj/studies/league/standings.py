@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.intervals import paired_difference
+from hexmj.measures.velocities import VELOCITY
 from hexmj.phases import circular_mean
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.entrant import Entrant
@@ -74,7 +75,7 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
     table["missing"] = _over(walked, lambda one: one.fall.isnull().sum())
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
-    velocity = ("velocity", velocities, {"units": "V_p", "long_name": "velocity V_r"})
+    velocity = ("velocity", velocities, VELOCITY)
     axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(happened)}
     result = xr.Dataset(table, axes, {"reference": reference})
     for name, values in result.items():

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError, check_distinct
+from hexmj.measures.velocities import VELOCITY
 from hexmj.starts import checked_list
 from hexmj.studies.same_starts import SameStarts
 from hexmj.studies.terrain.crossings import with_crossings
@@ -144,7 +145,7 @@ class Terrain(SameStarts):
             size=("obstacle", [_size(one) for one in before.values()], {"units": "mm"}),
             end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
             grasp=("grasp", list(self.grasps), grasp),
-            velocity=("velocity", checked_list(self.velocities), {"units": "V_p", "long_name": "velocity V_r"}),
+            velocity=("velocity", checked_list(self.velocities), VELOCITY),
         )
         for name, (units, long_name) in OUTCOMES.items():
             table[name].attrs = {"units": units, "long_name": long_name}
