@@ -274,6 +274,23 @@ def test_what_was_read_before_a_cell_writes_it_anew_counts(computed: Callable[..
         computed("[Path('one/gain').write_text('5.0'), float(Path('one/gain').read_text())][1]")
 
 
+def test_what_a_cell_makes_anew_each_time_may_be_read_by_others_between(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "[Path('memo').write_text('1.0'), float(Path('memo').read_text())][1]"
+    computed(gain)
+    Path("memo").read_text()
+    assert computed(f"{gain} + 1.0") == (2.0, 2)
+
+
+def test_what_workers_cells_write_is_no_other_data_in_the_next_sweep(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "[Path('debug.json').write_text('1.0'), float(Path('debug.json').read_text())][1]"
+    with ProcessPoolExecutor(1) as pool:
+        assert [computed(gain, executor=pool) for _ in range(2)] == 2 * [(1.0, 1)]
+
+
 def test_a_folder_that_a_cell_makes_and_removes_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
     gain = "[it := tempfile.mkdtemp(), os.makedirs(it + '/within/it'), shutil.rmtree(it), 1.0][3]"
     assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
@@ -286,8 +303,12 @@ def test_a_file_that_a_field_names_by_a_link_or_sqlite_reads_is_remembered(
     for file, gain, later in (("link", "remembered('link')", "7.0"), ("one/gain.db", READS[-5][1], "8.0")):
         computed(gain, file)
         write_all(later)
-        with pytest.warns(UserWarning, match="gain.* has changed since it was opened first"):
+        with pytest.warns(UserWarning, match="(gain.*|link) has changed since it was opened first"):
             computed(gain, file)
+    Path("link").unlink()
+    Path("link").symlink_to("two/gain")
+    with pytest.warns(UserWarning, match="link has changed since it was opened first"):
+        computed("remembered('link')", "link")
 
 
 def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[..., tuple[float, int]]) -> None:

@@ -94,6 +94,8 @@ class _Needed(NamedTuple):
 _KNOWN: dict[frozenset[str], _Needed] = {}
 _FILES: dict[str, Path] = {}
 _HELD: dict[Path, str] = {}
+_DATA_OF: dict[tuple[Path, Path], list[Path]] = {}
+"""Module and the folder that the program stood in -> the data files that were there as the sweep began."""
 
 
 def code(modules: frozenset[str]) -> Code:
@@ -128,14 +130,23 @@ def needed_files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
     """
     read = _needed(modules).modules
     sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
-    return sources, [part for _, file, named in read for path in _data(file, named) for part in parts(path)]
+    return sources, [
+        part for _, file, named in read for path in _data(file, named) if path.is_file() for part in parts(path)
+    ]
 
 
 def _data(file: Path, named: list[str]) -> list[Path]:
-    """Files that are there as a value begins and that texts of a module name, beside it or in the current folder."""
-    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd(), DATA)
-    found = files_named(named, (file.parent, folder), endings) if named else []
-    return [path for path in found if str(path) not in WRITTEN or path in _HELD]
+    """Files that texts of a module name, beside it or in the current folder, but for what cells have made."""
+    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd() if named else file, DATA)
+    if (file, folder) not in _DATA_OF:
+        found = files_named(named, (file.parent, folder), endings) if named else []
+        _DATA_OF[file, folder] = [path for path in found if str(path) not in WRITTEN or path in _HELD]
+    return _DATA_OF[file, folder]
+
+
+def look_again() -> None:
+    """As a sweep begins: data files may have come to be since the last one."""
+    _DATA_OF.clear()
 
 
 def _needed(modules: frozenset[str]) -> _Needed:

@@ -20,19 +20,22 @@ from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference
 from hexmj.sweeps.cluster import has_given_up
+from hexmj.sweeps.code import look_again
 from hexmj.sweeps.kept_cells import check_free, find, write
-from hexmj.user_code.opened_files import heard
+from hexmj.user_code.opened_files import WRITTEN, heard
 
 if TYPE_CHECKING:
     import xarray as xr
 
     Made = tuple[xr.Dataset, str]
     """The data of a cell, and why it is not kept; see `Cell.not_kept`."""
+    Sent = tuple[xr.Dataset, str, frozenset[str]]
+    """The same, and the files that the worker's cells have written."""
 
 _Task = tuple[Cell, str, Path | None]
 """A cell, its record and its file; empty and None where nothing is kept."""
 
-_Parcel = Callable[[Path | None], "Made"]
+_Parcel = Callable[[Path | None], "Sent"]
 """A cell on its way to a worker, who calls it with the mark of the folder."""
 
 
@@ -104,6 +107,7 @@ def finish(
     progress = typed("progress", how.get("progress"), Progress | None)
     thread_count(threads := how.get("threads"))
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
+    look_again()
     records = [cell.record() if folder else "" for cell in cells]
     tasks: list[_Task] = [
         (cell, record, folder / f"{cell.stem(record)}.nc" if folder else None)
@@ -168,9 +172,9 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
     return (write(path, record, data), "") if path and not not_kept else (data, not_kept if path else "")
 
 
-def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
+def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Sent":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
-    long as somebody waits."""
+    long as somebody waits.  The files that cells have written there are told, too."""
     here = f"a worker on {socket.gethostname()}"
     try:
         cell = pickle.loads(pickled)
@@ -186,7 +190,7 @@ def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: i
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    return _made(cell, record, path, threads=threads)
+    return (*_made(cell, record, path, threads=threads), frozenset(WRITTEN))
 
 
 def _elsewhere(
@@ -204,8 +208,8 @@ def _elsewhere(
 
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
-    futures: dict[Future[Made], int] = {}
-    done: SimpleQueue[Future[Made]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
+    futures: dict[Future[Sent], int] = {}
+    done: SimpleQueue[Future[Sent]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
     with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in parcels.items():
@@ -214,7 +218,9 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.add_done_callback(done.put)
             for _ in parcels:
                 future = done.get()
-                yield futures[future], future.result()
+                *made, written = future.result()
+                WRITTEN.update(written)
+                yield futures[future], (*made,)
         except BrokenExecutor:
             raise InputError(
                 "a process that computed cells was killed, or could not be started; what is finished is kept:"
@@ -230,7 +236,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.cancel()
 
 
-def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Future[Made]":
+def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Future[Sent]":
     if has_given_up(executor):
         raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:

@@ -12,6 +12,7 @@ import numpy as np
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
+from hexmj.sweeps.code import look_again
 from hexmj.user_code.opened_files import heard
 
 
@@ -38,6 +39,7 @@ class KeptValues:
         self._values: dict[bytes, float] = {}
         self._path, self._seed = None, 0
         if folder:
+            look_again()
             self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
             self._path = folder / f"{cell.stem(record)}.jsonl"

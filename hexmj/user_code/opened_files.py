@@ -57,6 +57,9 @@ _ANEW: set[str] = set()
 """What the code of the cells that are computed now knows: nothing was left of what it held before, which nobody had
 read."""
 
+_MADE: set[str] = set()
+"""What cells have made anew at any time before anybody had read it."""
+
 _WRITTEN_EVER: set[str] = set()
 """What this program has written itself at any time."""
 
@@ -102,7 +105,7 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
 
 def changed(told: Iterable[Path]) -> list[str]:
     """Those of some files that have changed since they were first opened, as which the code may remember them."""
-    files = {os.path.realpath(file) for file in told}
+    files = {path for file in told for path in (os.path.abspath(file), os.path.realpath(file))}
     return sorted(file for file in files & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
 
 
@@ -138,7 +141,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             _WRITTEN_EVER.add(file)
             if _COMPUTING:
                 WRITTEN.add(file)
-                if anew and os.path.realpath(file) not in _AT_FIRST:
+                if anew and (file in _MADE or os.path.realpath(file) not in _AT_FIRST):
+                    _MADE.add(file)
                     _ANEW.add(file)
                 elif event == "os.rename" and not anew:
                     _ANEW.discard(file)
@@ -151,7 +155,8 @@ def _note(file: str, read: bool) -> None:
     if file in _ANEW:
         return
     if read and not opener.f_code.co_filename.startswith(_OURS):
-        _AT_FIRST.setdefault(os.path.realpath(file), _stamp(file))
+        for one in (file, os.path.realpath(file)):
+            _AT_FIRST.setdefault(one, _stamp(file))
     if by is not None:
         by.add(file)
         return
