@@ -218,9 +218,9 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.add_done_callback(done.put)
             for _ in parcels:
                 future = done.get()
-                *made, written = future.result()
+                data, not_kept, written = future.result()
                 WRITTEN.update(written)
-                yield futures[future], (*made,)
+                yield futures[future], (data, not_kept)
         except BrokenExecutor:
             raise InputError(
                 "a process that computed cells was killed, or could not be started; what is finished is kept:"
