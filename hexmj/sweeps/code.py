@@ -137,9 +137,11 @@ def needed_files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
 
 def _data(file: Path, named: list[str]) -> list[Path]:
     """Files that texts of a module name, beside it or in the current folder, but for what cells have made."""
-    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd() if named else file, DATA)
+    if not named:
+        return []
+    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd(), DATA)
     if (file, folder) not in _DATA_OF:
-        found = files_named(named, (file.parent, folder), endings) if named else []
+        found = files_named(named, (file.parent, folder), endings)
         _DATA_OF[file, folder] = [path for path in found if str(path) not in WRITTEN or path in _HELD]
     return _DATA_OF[file, folder]
 
