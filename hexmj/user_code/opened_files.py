@@ -53,13 +53,6 @@ _COMPUTING: dict[int, set[str]] = {}
 WRITTEN: set[str] = set()
 """What the user's code has written itself as a cell was computed."""
 
-_ANEW: set[str] = set()
-"""What the code of the cells that are computed now knows: nothing was left of what it held before, which nobody had
-read."""
-
-_MADE: set[str] = set()
-"""What cells have made anew at any time before anybody had read it."""
-
 _WRITTEN_EVER: set[str] = set()
 """What this program has written itself at any time."""
 
@@ -80,8 +73,6 @@ def heard() -> Iterator[set[str]]:
         if outer is not None:
             outer |= opened
             _COMPUTING[mine] = outer
-        if not _COMPUTING:
-            _ANEW.clear()
 
 
 def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[str]:
@@ -130,30 +121,19 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = os.path.abspath(name)
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            if event == "os.rename":
-                source = os.path.abspath(os.fsdecode(arguments[0]))
-                writes, anew = True, source in _ANEW or not _is_data(source)
+            if event == "os.rename" or (event == "open" and _writes(file, arguments[2])):
+                _WRITTEN_EVER.add(file)
+                if _COMPUTING:
+                    WRITTEN.add(file)
             else:
-                writes, anew = _writes(file, arguments[2]) if event == "open" else (False, False)
-            if not writes:
                 within = threading.get_ident() in _COMPUTING and os.path.exists(file)
-                return _note(file, event == "open" or (event == "sqlite3.connect" and within))
-            _WRITTEN_EVER.add(file)
-            if _COMPUTING:
-                WRITTEN.add(file)
-                if anew and (file in _MADE or os.path.realpath(file) not in _AT_FIRST):
-                    _MADE.add(file)
-                    _ANEW.add(file)
-                elif event == "os.rename" and not anew:
-                    _ANEW.discard(file)
+                _note(file, event == "open" or (event == "sqlite3.connect" and within))
 
 
 def _note(file: str, read: bool) -> None:
     by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
     main = threading.main_thread()
     in_main = threading.current_thread() is main
-    if file in _ANEW:
-        return
     if read and not opener.f_code.co_filename.startswith(_OURS):
         for one in (file, os.path.realpath(file)):
             _AT_FIRST.setdefault(one, _stamp(file))
@@ -188,10 +168,10 @@ def _reads_a_source(file: str, by: FrameType) -> bool:
     return file.endswith(".py") and by.f_code.co_filename.endswith(_READS_SOURCES)
 
 
-def _writes(file: str, flags: int) -> tuple[bool, bool]:
-    """Whether a file is opened to be written or made, not to be read, and whether nothing is left of what it held."""
-    anew = bool(flags & os.O_TRUNC) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
-    return anew or flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY, anew
+def _writes(file: str, flags: int) -> bool:
+    """Whether a file is opened to be written or made, not to be read."""
+    only = flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY
+    return only or bool(flags & os.O_TRUNC) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
 
 
 def _openers(frame: FrameType | None, file: str) -> set[str]:
