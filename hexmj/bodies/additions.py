@@ -35,6 +35,8 @@ class SensorGroup:
     """Of the sensors where they are added."""
     contact: tuple[int, int, int] | None = None
     """What contact sensors tell, see MuJoCo's `intprm`."""
+    optional: bool = False
+    """Added only where the forces of feet are asked for; elsewhere it has no columns."""
 
     def find(self, model: mujoco.MjModel) -> slice | None:
         """Their columns of `sensordata`; none where the model lacks them, has them in another order, or alters what
@@ -54,7 +56,7 @@ class SensorGroup:
 
 
 def sensor_groups(body: Body) -> dict[str, SensorGroup]:
-    """The sensors that walks are measured with, by what they measure; `feet_push` where that is asked for."""
+    """The sensors that walks are measured with, by what they measure."""
     touches, grounds = tuple(f"{leg}_touch" for leg in LEGS), tuple(f"{part}_ground" for part in body.trunk)
     contact, geom, pushes = _SENSOR.mjSENS_CONTACT, _OBJECT.mjOBJ_GEOM, tuple(f"{leg}_push" for leg in LEGS)
     return {
@@ -62,7 +64,7 @@ def sensor_groups(body: Body) -> dict[str, SensorGroup]:
         "touch": SensorGroup(_SENSOR.mjSENS_TOUCH, _OBJECT.mjOBJ_SITE, body.feet, touches),
         "trunk": SensorGroup(contact, geom, body.trunk, grounds, _COUNTS),
         "centre_of_mass": SensorGroup(_SENSOR.mjSENS_SUBTREECOM, _OBJECT.mjOBJ_BODY, (body.root,), ("centre_of_mass",)),
-        "feet_push": SensorGroup(contact, geom, body.feet, pushes, _NET_FORCE),
+        "feet_push": SensorGroup(contact, geom, body.feet, pushes, _NET_FORCE, optional=True),
     }
 
 
@@ -88,8 +90,8 @@ def complete(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, gains: Gain
         servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
         servo.forcelimited = servo.ctrllimited = True
         servo.actrange, servo.actlimited = [0.0, 0.0], False
-    for name, group in sensor_groups(body).items():
-        if group.find(plain) is None and (pushes or name != "feet_push"):
+    for group in sensor_groups(body).values():
+        if group.find(plain) is None and (pushes or not group.optional):
             _add_sensors(spec, group)
 
 

@@ -127,7 +127,7 @@ def columns(model: mujoco.MjModel, body: Body) -> Columns:
     """Where a compiled body has its joints and sensors."""
     found = {}
     for name, group in sensor_groups(body).items():
-        here = group.find(model) or (slice(0, 0) if name == "feet_push" else None)
+        here = group.find(model) or (slice(0, 0) if group.optional else None)
         if here is None:
             raise InputError(f"body {body.name!r}: its sensors {', '.join(group.names)} do not measure {name}")
         found[name] = here
