@@ -59,11 +59,12 @@ def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_pat
     record, lines = path.read_text().split("\n", 1)
     row = np.ones(2).tobytes()
     for line in (
-        *map(other._line, [row, row], [3.0, -1.0]),
+        *map(other._line, [row, row], [3.0, -1.0], [{}, {}]),
         "zz 0x1p-1 00000000\n",
         "00\n",
         "00 0x1p9999 00000000\n",
-        ledger(tmp_path)._line(row, np.nan),
+        f"00 0x1p-1 {'[' * 100_000} 00000000\n",
+        ledger(tmp_path)._line(row, np.nan, {}),
     ):
         path.write_text(f"{record}\n{line}")
         assert ledger(tmp_path).known == 0

@@ -1,6 +1,9 @@
-"""What a cell's code opens beyond what the cell's name tells is noticed: such a cell is not kept."""
+"""What a cell's code reads beyond what the cell's name tells is kept with it: with other files it is another cell."""
 
+import io
+import json
 import os
+import shutil
 import sqlite3
 import sys
 from collections.abc import Callable
@@ -8,11 +11,14 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
+import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
 
 import hexmj
+from hexmj.errors import InputError
+from hexmj.storage.files import read_sealed
 from hexmj.sweeps import Cell, KeptValues, run
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
@@ -72,6 +78,20 @@ def write_all(gain: str, at: str = "one") -> None:
     hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
 
 
+def another_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has opened nothing so far, and remembers nothing."""
+    monkeypatch.setattr(opened_files, "_AT_FIRST", {})
+    monkeypatch.setattr(opened_files, "_OPENED", {})
+    sys.modules.pop(importable("reader.py").__name__)
+
+
+def what_was_read() -> set[str]:
+    """Files that the one kept cell tells, from here."""
+    (kept,) = Path("kept").glob("*.nc")
+    with h5netcdf.File(io.BytesIO(read_sealed(kept) or b"")) as file:
+        return {os.path.relpath(one) for one in json.loads(str(file.attrs["read"]))} - {"."}
+
+
 @pytest.fixture
 def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[float, int]]:
     """The gain that a cell reads in `at`, by a piece of Python, and how often cells were computed so far."""
@@ -110,13 +130,21 @@ READS = [
 
 
 @pytest.mark.parametrize(("file", "gain"), READS)
-def test_what_reads_a_file_that_nothing_names_is_not_kept(
-    computed: Callable[..., tuple[float, int]], file: str, gain: str
+def test_what_it_reads_is_kept_with_it(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, file: str, gain: str
 ) -> None:
-    for calls in (1, 2):
-        with pytest.warns(UserWarning, match=rf"^reader is not kept: its code opens or runs .*one.{file}, of which an"):
-            assert computed(gain) == (1.0, calls)
-    assert not list(Path("kept").iterdir())
+    if file.endswith(".py"):
+        for calls in (1, 2):
+            with pytest.warns(
+                UserWarning, match=r"^reader is not kept: its code opens or runs .*one.gain.py, of which an"
+            ):
+                assert computed(gain) == (1.0, calls)
+        assert not list(Path("kept").iterdir())
+    else:
+        assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+        write_all("7.0")
+        another_program(monkeypatch)
+        assert [computed(gain), computed(gain)] == 2 * [(7.0, 2)]
 
 
 @pytest.mark.parametrize(("file", "gain"), READS)
@@ -126,8 +154,7 @@ def test_what_a_field_names_counts(
     named = f"one/{file}"
     assert [computed(gain, named), computed(gain, named)] == 2 * [(1.0, 1)]
     write_all("7.0")
-    monkeypatch.setattr(opened_files, "_AT_FIRST", {})  # as of another program
-    sys.modules.pop(importable("reader.py").__name__)
+    another_program(monkeypatch)
     assert [computed(gain, named), computed(gain, named)] == 2 * [(7.0, 2)]
     assert len(list(Path("kept").glob("*.nc"))) == 2
 
@@ -136,29 +163,42 @@ def test_what_a_field_names_counts(
     "gain",
     [
         '[it := Path(at, "gain"), gain := float(it.read_text()), it.write_text(str(gain))][1]',
-        '[it := Path(at, "gain"), it.open("a").close(), float(it.read_text())][2]',
         '[os.replace(at + "/gain", "held"), float(Path("held").read_text()), os.replace("held", at + "/gain")][1]',
-        '[Path("held").write_text(""), os.replace(at + "/gain", "held"), float(Path("held").read_text()), '
-        'os.replace("held", at + "/gain")][2]',
-        'made_or_read(Path(at, "gain"))',
-        "[Path('a').write_text('1.0'), float(Path('a').read_text())][1]",
-        "[Path('a').write_text('1.0'), os.replace('a', 'b'), float(Path('b').read_text())][2]",
-        "[hexmj.save(xr.Dataset({'a': 1.0}), 'a.nc'), float(hexmj.load('a.nc').a)][1]",
+        '[it := Path("memo"), it.write_text("1.0"), float(it.read_text()), it.unlink()][2]',
     ],
 )
-def test_what_it_reads_counts_whoever_has_written_it(computed: Callable[..., tuple[float, int]], gain: str) -> None:
+def test_what_it_reads_and_changes_is_not_kept(computed: Callable[..., tuple[float, int]], gain: str) -> None:
     for calls in (1, 2):
-        with pytest.warns(UserWarning, match=r"^reader is not kept: its code opens or runs"):
+        with pytest.warns(UserWarning, match=r"^reader is not kept: .* has changed since it was opened first"):
             assert computed(gain) == (1.0, calls)
+
+
+@pytest.mark.parametrize(
+    ("file", "gain"),
+    [
+        ("one/gain", '[it := Path(at, "gain"), it.open("a").close(), float(it.read_text())][2]'),
+        ("one/gain", 'made_or_read(Path(at, "gain"))'),
+        ("a", "[Path('a').write_text('1.0'), float(Path('a').read_text())][1]"),
+        ("b", "[Path('a').write_text('1.0'), os.replace('a', 'b'), float(Path('b').read_text())][2]"),
+        ("a.nc", "[hexmj.save(xr.Dataset({'a': 1.0}), 'a.nc'), float(hexmj.load('a.nc').a)][1]"),
+    ],
+)
+def test_what_it_reads_counts_whoever_has_written_it(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, file: str, gain: str
+) -> None:
+    assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+    Path(file).write_text("1.00")
+    another_program(monkeypatch)
+    assert computed(gain) == (1.0, 2)
 
 
 def test_what_it_remembers_of_an_earlier_call_is_not_forgotten(computed: Callable[..., tuple[float, int]]) -> None:
     gain = 'remembered(f"{at}/gain")'
-    with pytest.warns(UserWarning, match="not kept"):
-        assert computed(gain) == (1.0, 1)
+    assert computed(gain) == (1.0, 1)
     Path("one/gain").write_text("7.0")
-    with pytest.warns(UserWarning, match="not kept"):
-        assert computed(gain) == (1.0, 2)
+    for calls in (2, 3):
+        with pytest.warns(UserWarning, match="one.gain has changed since it was opened first"):
+            assert computed(gain) == (1.0, calls)
 
 
 def test_what_it_remembers_of_a_file_that_a_field_names_is_not_kept_once_that_has_changed(
@@ -179,28 +219,27 @@ def test_a_library_that_the_system_finds_does_not_count(computed: Callable[..., 
 
 
 def test_what_a_cell_reads_after_an_inner_sweep_counts(computed: Callable[..., tuple[float, int]]) -> None:
-    with pytest.warns(UserWarning, match="reader is not kept"):
-        inner = "hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0)"
-        assert computed(f"[{inner}, float(Path(at, 'gain').read_text())][1]") == (1.0, 1)
+    inner = "hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0)"
+    assert computed(f"[{inner}, float(Path(at, 'gain').read_text())][1]") == (1.0, 1)
+    assert what_was_read() == {"one/gain"}
 
 
 @pytest.mark.parametrize("folder", [".worktrees", ".gains"])
 def test_what_is_hidden_counts(computed: Callable[..., tuple[float, int]], folder: str) -> None:
     Path(folder).mkdir()
     Path(folder, "gain").write_text("1.0")
-    with pytest.warns(UserWarning, match="not kept"):
-        assert computed(f"float(Path('{folder}/gain').read_text())") == (1.0, 1)
+    assert computed(f"float(Path('{folder}/gain').read_text())") == (1.0, 1)
+    assert what_was_read() == {f"{folder}/gain"}
 
 
 def test_a_file_that_is_missing_counts_too(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*new, of"):
-        assert computed("tried('new')") == (0.0, 1)
-    assert [computed("tried('new')", "new"), computed("tried('new')", "new")] == 2 * [(0.0, 2)]
+    for calls, file in ((1, ""), (2, "new")):
+        assert [computed("tried('new')", file), computed("tried('new')", file)] == 2 * [(0.0, calls)]
     Path("new").write_text("5.0")
-    monkeypatch.setattr(opened_files, "_AT_FIRST", {})  # as of another program
-    assert computed("tried('new')", "new") == (5.0, 3)
+    another_program(monkeypatch)
+    assert [computed("tried('new')"), computed("tried('new')", "new")] == [(5.0, 3), (5.0, 4)]
 
 
 @pytest.mark.parametrize(
@@ -257,7 +296,6 @@ def test_a_file_that_a_text_names_counts_once_it_is_there_and_where_the_program_
     assert gain() == 0.0
     Path("gains.toml").write_text("3.0")
     assert gain() == 3.0
-    assert len(list(kept.glob("*.nc"))) == 3
 
 
 def test_what_workers_cells_write_is_no_other_data_in_the_next_sweep(
@@ -298,12 +336,25 @@ def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[...,
     assert len(list(Path("both").glob("*.nc"))) == 2
 
 
-def test_workers_tell_what_they_do_not_keep(computed: Callable[..., tuple[float, int]]) -> None:
-    gain = 'float(Path(at + "/gain").read_text())'
-    with ProcessPoolExecutor(1) as pool, pytest.warns(UserWarning, match="reader is not kept: .*one.gain, of"):
-        assert computed(gain, executor=pool) == (1.0, 1)
+def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = 'remembered(at + "/gain")'
     with ProcessPoolExecutor(1) as pool:
-        assert [computed(gain, "one/gain", executor=pool), computed(gain, "one/gain")] == 2 * [(1.0, 2)]
+        assert [computed(gain, executor=pool), computed(gain)] == 2 * [(1.0, 1)]
+        Path("one/gain").write_text("7.0")
+        with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
+            assert computed(gain, executor=pool) == (1.0, 2)
+
+
+def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert computed('remembered(at + "/gain")') == (1.0, 1)
+    monkeypatch.setattr(Cell, "read", lambda *_: ({os.path.abspath("one/gain"): "of another machine"}, ""))
+    with (
+        ThreadPoolExecutor(1) as pool,
+        pytest.raises(InputError, match=r"worker has another .*one.gain than the sender"),
+    ):
+        computed('remembered(at + "/gain") + 1.0', executor=pool)
 
 
 def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[..., tuple[float, int]]) -> None:
@@ -311,22 +362,30 @@ def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[...,
     Path("reader.py").write_text(READER.format(gain="remembered('one/gain')"))
     reader = importable("reader.py").Reader()
     KeptValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
-    with pytest.warns(UserWarning, match="not kept: its code opens or runs .*one.gain, of"):
-        run([Cell("reader", reader.cell, {})], Path("kept"))
+    shutil.rmtree("kept")
+    run([Cell("reader", reader.cell, {})], Path("kept"))
+    assert what_was_read() == {"one/gain"}
 
 
-def test_values_of_what_reads_a_file_that_nothing_names_are_not_kept(
-    computed: Callable[..., tuple[float, int]],
+def test_values_are_those_of_the_files_that_were_read(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    gain, rows = "float(Path(self.at, 'gain').read_text())", np.ones((2, 1))
+    rows = np.ones((2, 1))
     computed("1.0")
-    Path("reader.py").write_text(READER.format(gain=gain))
-    for file, kept in (("", 0), ("one/gain", 1)):
-        cell = Cell("values", importable("reader.py").Reader(file=file).value, {})
-        values = KeptValues(cell, Path("values"))
-        if kept:
-            assert values(rows).tolist() == [1.0, 1.0]
-        else:
-            with pytest.warns(UserWarning, match="^values is not kept: .*one.gain, of which"):
-                assert values(rows).tolist() == [1.0, 1.0]
-        assert KeptValues(cell, Path("values")).known == kept
+    Path("reader.py").write_text(READER.format(gain="remembered(self.at + '/gain')"))
+
+    def values(gain: float, known: int) -> None:
+        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+        assert (found.known, *found(rows)) == (known, gain, gain)
+
+    values(1.0, known=0)
+    values(1.0, known=1)
+    write_all("7.0")
+    with pytest.warns(UserWarning, match="^values is not kept: .*one.gain has changed since"):
+        values(1.0, known=0)
+    another_program(monkeypatch)
+    values(7.0, known=0)
+    values(7.0, known=1)
+    write_all("1.0")
+    another_program(monkeypatch)
+    values(1.0, known=1)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -12,13 +13,19 @@ from typing import Any
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-from hexmj.storage.files import digest
-from hexmj.sweeps.code import code, needed_files
+from hexmj.storage.files import digest, digest_of
+from hexmj.sweeps.code import code, files_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, untold, written
+from hexmj.user_code.opened_files import WRITTEN, changed, seen, untold
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
+
+_HERE = "."
+"""Stands among files for the folder from which they are looked for, and its path for a digest."""
+
+_ITS_OWN = "written"
+"""Stands for the digest of a file that code names in a text, and has written itself without reading it, as a log."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +63,9 @@ class Cell:
         Raises:
             InputError: a setting, or the function, is nothing that can be written down.
         """
-        told = self._told()
-        made = code(self._modules())
+        told, modules = self._told(), self._modules()
+        made = code(modules)
+        seen(files_of_users(modules)[1])
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
     def settings_now(self) -> str:
@@ -66,34 +74,51 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def not_kept(self, opened: set[str]) -> str:
-        """Why it cannot be kept, in a sentence, if its code has opened files that its record does not tell; else empty.
+    def read(self, opened: set[str]) -> tuple[dict[str, str], str]:
+        """What its code may have read that its record does not tell, file -> digest, empty of one that is not there;
+        and why it cannot be kept, in a sentence, else empty.
 
         Args:
-            opened: while it was computed.
+            opened: what was opened while it was computed.
         """
         try:
-            sources, data = needed_files(self._modules())
+            sources, named = files_of_users(self._modules())
         except InputError:  # it has no source, so that it is named by nothing
-            return ""
+            return {}, ""
         if not sources:
-            return ""
-        told = [*data, *named_files([*self.settings.values(), self._owner])]
-        if found := untold(opened, sources, told):
-            return (
-                f"{self.name} is not kept: its code opens or runs {found[0]}, of which an edit would not be noticed;"
-                " expected a field that names it, or an import"
+            return {}, ""
+        told = self._told_files()
+        read = untold(opened | (named - WRITTEN), sources, told)
+        if ran := sorted(file for file in read if file.endswith(".py")):
+            return {}, (
+                f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
+                " expected an import, or a field that names it"
             )
-        if found := changed(told):
-            return (
+        if found := changed({*told, *read}):
+            return {}, (
                 f"{self.name} is not kept: {found[0]} has changed since it was opened first, and code may remember it;"
                 " start the program again"
             )
-        return ""
+        try:
+            held = {file: _ITS_OWN for file in named & WRITTEN} | {file: _held(file) for file in read}
+            return (held | {_HERE: os.getcwd()} if held else {}), ""
+        except InputError as error:
+            return {}, f"{self.name} is not kept: {error}"
 
-    def data(self) -> list[Path]:
-        """Files of data that texts of its code name."""
-        return needed_files(self._modules())[1]
+    def would_read(self, read: Mapping[str, str]) -> bool:
+        """Whether its code would read today what it has read, or may remember from earlier in this program."""
+        try:
+            same = all(holds(*one) for one in read.items())
+        except InputError:
+            return False
+        new = files_of_users(self._modules())[1] - read.keys()
+        told = {os.path.realpath(file) for file in self._told_files()} if new else ()
+        before = [file for file, digest in read.items() if digest != _ITS_OWN]
+        return same and not changed(before) and all(os.path.realpath(file) in told for file in new)
+
+    def _told_files(self) -> set[Path]:
+        """Files that its settings name."""
+        return set(named_files([*self.settings.values(), self._owner]))
 
     def _modules(self) -> frozenset[str]:
         return frozenset(one.__module__ for one in (self.function, *classes([self.settings, self._owner])))
@@ -122,29 +147,30 @@ class Cell:
         return f"{re.sub(r'[^A-Za-z0-9.+-]+', '-', self.name)[:100].lstrip('.-')}-{digest(record.encode())}"
 
 
-def check_unchanged(cell: Cell, before: str, now: str) -> str:
-    """Refuse what a cell has given if something that it depends on has changed since, as its records tell.
-
-    Returns:
-        Why it is not kept, if that is a file which a text names, and which this process writes itself; else empty.
-
-    Raises:
-        InputError: anything else has changed.
-    """
+def check_unchanged(cell: Cell, before: str, now: str) -> None:
+    """Refuse what a cell has given if something that it depends on has changed since, as its records tell."""
     if not before or now == before:
-        return ""
+        return
     if not now:
         cell.record()  # which says what cannot be written down
-    what, (old, new) = difference(before, now), (json.loads(one).get("sources", {}) for one in (before, now))
-    sources = [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
-    here = tuple(f", {Path(file).name}" for file in written(cell.data()))
-    if what.endswith("of sources") and all(one.endswith(here) for one in sources):
-        file = min(sources).rpartition(", ")[2]
-        return f"{cell.name} is not kept: the program writes {file}, which a text of the cell's code names"
     raise InputError(
-        f"{cell.name}: {what} has changed while it was in use; start again, with fields that stay as they are and name"
-        " files that are read, not written"
+        f"{cell.name}: {difference(before, now)} has changed while it was in use; start again, with fields that stay as"
+        " they are and name files that are read, not written"
     )
+
+
+def holds(file: str, digest: str) -> bool:
+    """Whether a file is what was read, as `Cell.read` tells it.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return digest == os.getcwd() if file == _HERE else digest in (_ITS_OWN, _held(file))
+
+
+def _held(file: str) -> str:
+    """A digest of a file; empty if it is not there."""
+    return digest_of(Path(file)) if os.path.exists(file) else ""
 
 
 def difference(one: str, other: str) -> str:

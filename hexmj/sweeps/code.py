@@ -3,7 +3,7 @@
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
 for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from.  Data files count that texts of the modules name.
+the one module it comes from.  Its data files count that texts of its modules name.
 """
 
 import ast
@@ -22,10 +22,9 @@ from typing import NamedTuple
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.storage.mjcf import content, parts
+from hexmj.storage.mjcf import parts
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
-from hexmj.user_code.opened_files import WRITTEN
 from hexmj.user_code.parsing import files_named, parsed, texts
 
 CARRIERS = {
@@ -36,13 +35,14 @@ CARRIERS = {
 """What carries, keeps and shows this package's numbers, but computes none: another version makes no cell anew, unless
 a user's module imports it."""
 
-DATA = (
+_DATA_OF_OURS = ".toml", ".xml"
+"""Ends of the names of data files."""
+
+_DATA = (
     *(".toml", ".xml", ".mjcf", ".mjb", ".urdf", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
     *(".npy", ".npz", ".pt", ".pth", ".pkl"),
 )
-"""Ends of the names of data files, in small letters or capitals."""
-
-_DATA_OF_OURS = ".toml", ".xml"
+"""The same of a user's own, in small letters or capitals."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -65,7 +65,7 @@ class Code:
     """What a value was made by."""
 
     sources: dict[str, str]
-    """Module or data file -> digest."""
+    """Module, or data file of this package -> digest."""
     versions: dict[str, str]
     """Python (major.minor) and packages -> version."""
 
@@ -73,8 +73,10 @@ class Code:
 @dataclass(frozen=True)
 class _Module:
     digest: str
+    data: list[Path]
+    """Of this package, that its texts name."""
     texts: list[str]
-    """Some of which name files of data."""
+    """Of a user's own, some of which name files of data."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -85,70 +87,46 @@ class _Module:
 class _Needed(NamedTuple):
     sources: dict[str, str]
     versions: dict[str, str]
-    modules: list[tuple[str, Path, list[str]]]
-    """Of each its name, its file and its texts."""
+    modules: list[tuple[str, Path, _Module]]
+    """With their names and files."""
     missing: set[str]
     """Modules without a file."""
 
 
 _KNOWN: dict[frozenset[str], _Needed] = {}
 _FILES: dict[str, Path] = {}
-_HELD: dict[Path, str] = {}
-_DATA_OF: dict[tuple[Path, Path], list[Path]] = {}
-"""Module and the folder that the program stood in -> the data files that were there as the sweep began."""
 
 
 def code(modules: frozenset[str]) -> Code:
-    """All that some modules need, and they themselves: sources as they ran, data files as they are.
+    """All that some modules need, and they themselves: sources as they ran.
 
     Raises:
         InputError: one has no source, or a source is not what this program ran.
     """
-    needed, data = _needed(modules), dict[str, list[str]]()
-    for name, file, named in needed.modules:
+    needed = _needed(modules)
+    sources = dict(needed.sources)
+    for name, file, module in needed.modules:
         source = sources_as_run.as_run(file, name) or (file.read_bytes() if str(file) not in _AT_FIRST else None)
         if source and digest(source) != needed.sources[module_label(name)]:
             raise InputError(f"{file} was edited while this program used it; start it again")
-        for path in _data(file, named):
-            data.setdefault(f"{module_label(name)}, {path.name}", []).append(_held(path, ours=str(file) in _AT_FIRST))
-    sources = needed.sources | {name: ",".join(held) for name, held in data.items()}
+        sources |= {f"{name}, {path.name}": digest_of(path) for path in module.data}
     return Code(dict(sorted(sources.items())), needed.versions)
 
 
-def _held(path: Path, ours: bool) -> str:
-    """A digest of a data file, none of one that is gone; of one that the user's code writes itself, as it was."""
-    if str(path) not in WRITTEN or path not in _HELD:
-        _HELD[path] = digest_of(path) if ours else digest(content(path)) if path.is_file() else ""
-    return _HELD[path]
-
-
-def needed_files(modules: frozenset[str]) -> tuple[set[str], list[Path]]:
-    """The sources that some modules need, but for this package's, and the data that all name, with their parts.
+def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
+    """Of the user's own modules that some need their sources, and the data that their texts name, beside them or in the
+    current folder, with its parts, as far as they are there.
 
     Raises:
         InputError: a module has no source.
     """
-    read = _needed(modules).modules
-    sources = {os.path.abspath(file) for _, file, _ in read if not file.is_relative_to(PACKAGE)}
-    return sources, [
-        part for _, file, named in read for path in _data(file, named) if path.is_file() for part in parts(path)
-    ]
-
-
-def _data(file: Path, named: list[str]) -> list[Path]:
-    """Files that texts of a module name, beside it or in the current folder, but for what cells have made."""
-    if not named:
-        return []
-    folder, endings = (_ASSETS, _DATA_OF_OURS) if str(file) in _AT_FIRST else (Path.cwd(), DATA)
-    if (file, folder) not in _DATA_OF:
-        found = files_named(named, (file.parent, folder), endings)
-        _DATA_OF[file, folder] = [path for path in found if str(path) not in WRITTEN or path in _HELD]
-    return _DATA_OF[file, folder]
-
-
-def look_again() -> None:
-    """As a sweep begins: data files may have come to be since the last one."""
-    _DATA_OF.clear()
+    sources, data = set[str](), set[str]()
+    for _, file, module in _needed(modules).modules:
+        if not file.is_relative_to(PACKAGE):
+            sources.add(os.path.abspath(file))
+            named = files_named(module.texts, (file.parent, Path.cwd()), _DATA) if module.texts else ()
+            data.update(os.path.abspath(part) for path in named for part in parts(path))
+    return sources, data
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -176,7 +154,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
         if file and (top in followed or not _is_installed(file)):
             module = _read(name, file)
             sources[module_label(name)] = module.digest
-            read.append((name, file, module.texts))
+            read.append((name, file, module))
             ours = top == PACKAGE.name
             if not file.is_relative_to(PACKAGE):
                 installed |= CARRIERS & {imported.partition(".")[0] for imported, _ in module.imports}
@@ -226,7 +204,7 @@ def _found(module: str) -> Path | None:
     top, *inner = module.split(".")
     if (file := getattr(sys.modules.get(module), "__file__", None)) is not None:
         return Path(file)
-    spec = find_spec(top) if top not in sys.modules else sys.modules[top].__spec__
+    spec = find_spec(top) if top not in sys.modules else getattr(sys.modules[top], "__spec__", None)
     if spec is None or not inner:
         return Path(spec.origin) if spec and spec.has_location and spec.origin else None
     for folder in spec.submodule_search_locations or ():
@@ -262,9 +240,9 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
-    endings = _DATA_OF_OURS if ours else DATA
-    named = texts(tree) if any(one.encode() in held.lower() for one in endings) else []
-    return _Module(digest(held), named, of_package, imports, bound)
+    named = texts(tree) if any(one.encode() in held.lower() for one in _DATA) else []
+    data = files_named(named, (file.parent, _ASSETS), _DATA_OF_OURS) if ours else []
+    return _Module(digest(held), data, [] if ours else named, of_package, imports, bound)
 
 
 def _statements(tree: ast.Module, *, types: bool) -> Iterator[ast.AST]:

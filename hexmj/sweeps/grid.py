@@ -18,24 +18,21 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_unchanged, difference
+from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds
 from hexmj.sweeps.cluster import has_given_up
-from hexmj.sweeps.code import look_again
 from hexmj.sweeps.kept_cells import check_free, find, write
-from hexmj.user_code.opened_files import WRITTEN, heard
+from hexmj.user_code.opened_files import heard, remembered
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    Made = tuple[xr.Dataset, str]
-    """The data of a cell, and why it is not kept; see `Cell.not_kept`."""
-    Sent = tuple[xr.Dataset, str, frozenset[str]]
-    """The same, and the files that the worker's cells have written."""
+    Made = tuple[xr.Dataset, dict[str, str], str]
+    """The data of a cell, what else its code has read, and why it is not kept; see `Cell.read`."""
 
 _Task = tuple[Cell, str, Path | None]
 """A cell, its record and its file; empty and None where nothing is kept."""
 
-_Parcel = Callable[[Path | None], "Sent"]
+_Parcel = Callable[[Path | None], "Made"]
 """A cell on its way to a worker, who calls it with the mark of the folder."""
 
 
@@ -98,7 +95,7 @@ def finish(
             fail raises.
 
     Warns:
-        UserWarning: cells are not kept, since their code opens files that nothing names.
+        UserWarning: cells are not kept, since what their code has read has changed, or it runs what no import names.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
@@ -107,7 +104,6 @@ def finish(
     progress = typed("progress", how.get("progress"), Progress | None)
     thread_count(threads := how.get("threads"))
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
-    look_again()
     records = [cell.record() if folder else "" for cell in cells]
     tasks: list[_Task] = [
         (cell, record, folder / f"{cell.stem(record)}.nc" if folder else None)
@@ -128,7 +124,7 @@ def finish(
         made = ((i, _made(*task, threads=threads, progress=partial(tell, i))) for i, task in enumerate(tasks))
     else:
         made = _elsewhere(executor, tasks, folder, threads or 1)
-    for i, (data, not_kept) in made:
+    for i, (data, _, not_kept) in made:
         if not_kept and not warned:
             warned = True
             warn(not_kept, stacklevel=2)
@@ -157,24 +153,32 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     return whole
 
 
+def _kept(cell: Cell, record: str, path: Path) -> "xr.Dataset | None":
+    """What is kept of a cell, if its code would read today what it has read."""
+    found = find(path, record)
+    return found[0] if found and cell.would_read(found[1]) else None
+
+
 def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
-    if path and (kept := find(path, record)) is not None:
-        return kept, ""
+    if path and (kept := _kept(cell, record, path)) is not None:
+        return kept, {}, ""
     before = record if path else cell.settings_now()
     with heard() as opened:
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
-    not_kept = check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    not_kept = not_kept or (cell.not_kept(opened) if path or opened else "")
-    return (write(path, record, data), "") if path and not not_kept else (data, not_kept if path else "")
+    check_unchanged(cell, before, cell.record() if path else cell.settings_now())
+    read, not_kept = cell.read(opened) if path or opened else ({}, "")
+    if path and not not_kept:
+        return write(path, record, read, data), read, ""
+    return data, read, not_kept if path else ""
 
 
-def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Sent":
+def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
-    long as somebody waits.  The files that cells have written there are told, too."""
+    long as somebody waits."""
     here = f"a worker on {socket.gethostname()}"
     try:
         cell = pickle.loads(pickled)
@@ -190,7 +194,7 @@ def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: i
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    return (*_made(cell, record, path, threads=threads), frozenset(WRITTEN))
+    return _made(cell, record, path, threads=threads)
 
 
 def _elsewhere(
@@ -199,8 +203,8 @@ def _elsewhere(
     """What is kept, and then what an executor's workers make of the rest."""
     parcels = dict[int, _Parcel]()
     for i, (cell, record, path) in enumerate(tasks):
-        if path and (kept := find(path, record)) is not None:
-            yield i, (kept, "")
+        if path and (kept := _kept(cell, record, path)) is not None:
+            yield i, (kept, {}, "")
         else:
             parcels[i] = partial(_made_by_a_worker, _pickled(cell), record or cell.record(), path, threads)
     yield from _by_others(executor, parcels, folder)
@@ -208,8 +212,8 @@ def _elsewhere(
 
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
-    futures: dict[Future[Sent], int] = {}
-    done: SimpleQueue[Future[Sent]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
+    futures: dict[Future[Made], int] = {}
+    done: SimpleQueue[Future[Made]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
     with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
             for i, parcel in parcels.items():
@@ -218,9 +222,12 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.add_done_callback(done.put)
             for _ in parcels:
                 future = done.get()
-                data, not_kept, written = future.result()
-                WRITTEN.update(written)
-                yield futures[future], (data, not_kept)
+                data, read, not_kept = future.result()
+                if other := [file for file in read if remembered(file) and not holds(file, read[file])]:
+                    raise InputError(
+                        f"a worker has another {other[0]} than the sender; start it again, where it has the same"
+                    )
+                yield futures[future], (data, read, not_kept)
         except BrokenExecutor:
             raise InputError(
                 "a process that computed cells was killed, or could not be started; what is finished is kept:"
@@ -236,7 +243,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.cancel()
 
 
-def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Future[Sent]":
+def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Future[Made]":
     if has_given_up(executor):
         raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:

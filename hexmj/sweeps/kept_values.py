@@ -1,9 +1,11 @@
 """Many small values of a pure function, kept line by line in one file: the evaluations of a search."""
 
+import json
 import math
 import os
 import zlib
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from warnings import warn
 
@@ -12,7 +14,6 @@ import numpy as np
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged
-from hexmj.sweeps.code import look_again
 from hexmj.user_code.opened_files import heard
 
 
@@ -20,8 +21,9 @@ class KeptValues:
     """A function of rows that never computes one twice, in this run or in a later one.
 
     It is called as `function(rows, **settings)`, (row, number) -> (row,), and must treat every row by itself.  The file
-    begins with the cell's record; every further line is a row, its value and a checksum.  Lines are only ever added, by
-    several runs at once if need be; one that is not whole counts as if it were not there.
+    begins with the cell's record; every further line is a row, its value, what else was read for it, and a checksum.
+    Lines are only ever added, by several runs at once if need be; one that is not whole, or whose files are others
+    today, counts as if it were not there.
     """
 
     def __init__(self, cell: Cell, folder: Path | None = None, *, threads: int | None = None) -> None:
@@ -39,7 +41,6 @@ class KeptValues:
         self._values: dict[bytes, float] = {}
         self._path, self._seed = None, 0
         if folder:
-            look_again()
             self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
             self._path = folder / f"{cell.stem(record)}.jsonl"
@@ -59,13 +60,15 @@ class KeptValues:
             picked = rows[list(new.values())]
             with heard() as opened:
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
-            why = self._cell.not_kept(opened) if self._path or opened else ""
+            read, not_kept = self._cell.read(opened) if self._path or opened else ({}, "")
             if self._path:
-                if why := check_unchanged(self._cell, self._record, self._cell.record()) or why:
-                    warn(why, stacklevel=2)
+                check_unchanged(self._cell, self._record, self._cell.record())
+                if not_kept:
+                    warn(not_kept, stacklevel=2)
                     self._path = None
                 else:
-                    _add(self._path, "".join(self._line(*one) for one in zip(new, values.tolist(), strict=True)))
+                    lines = (self._line(*one, read) for one in zip(new, values.tolist(), strict=True))
+                    _add(self._path, "".join(lines))
             self._values |= zip(new, values.tolist(), strict=True)
         return np.array([self._values[key] for key in keys])
 
@@ -82,18 +85,20 @@ class KeptValues:
                 if not f"{record}\n".startswith(first):
                     raise InputError(f"{path} is damaged, or of another search; delete it, and it is made anew")
                 lines = file.read().decode(errors="replace").split("\n")
+        current = cache(lambda told: self._cell.would_read(json.loads(told)))
         for line in lines:
-            row, _, value = line.rpartition(" ")[0].partition(" ")
-            with suppress(ValueError, OverflowError):  # of what is no line
-                key, number = bytes.fromhex(row), float.fromhex(value)
-                if f"{line}\n" == self._line(key, number) and math.isfinite(number):
+            with suppress(ValueError, OverflowError, RecursionError):  # of what is no line
+                row, value, told = f"{line.rpartition(' ')[0]} ".split(" ", 2)
+                key, number, read = bytes.fromhex(row), float.fromhex(value), json.loads(told or "{}")
+                whole = f"{line}\n" == self._line(key, number, read) and math.isfinite(number)
+                if whole and current(told or "{}"):
                     self._values[key] = number
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 
-    def _line(self, row: bytes, value: float) -> str:
+    def _line(self, row: bytes, value: float, read: dict[str, str]) -> str:
         """With a checksum that no line of another cell has."""
-        text = f"{row.hex()} {value.hex()}"
+        text = f"{row.hex()} {value.hex()}{' ' + json.dumps(read) if read else ''}"
         return f"{text} {zlib.crc32(text.encode(), self._seed):08x}\n"
 
 

@@ -1,8 +1,7 @@
 """Files that a user's code opens, or finds and runs, as it is imported and as cells are computed.
 
-What a cell is named by tells its settings, with the files that they name, and its sources.  What its code opens beyond
-these no name tells: such a cell is not kept, and a sentence says why.  Opens are noted from the first import of this
-package on.
+What a cell is named by tells its settings, with the files that they name, and its sources.  What its code reads beyond
+these is kept with it.  Opens are noted from the first import of this package on.
 """
 
 import os
@@ -18,7 +17,7 @@ from typing import Any
 
 from hexmj.user_code.sources_as_run import is_users
 
-_PATH = {"open": 0, "exec": 0, "os.rename": 1, "sqlite3.connect": 0, "ctypes.dlopen": 0}
+_PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
 
 _URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
@@ -34,6 +33,7 @@ _SYSTEMS = "/etc/", "/lib/", "/lib64/", "/proc/", "/sys/", "/usr/lib/", "/usr/sh
 _SYSTEMS += tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std", "tty", "urandom", "zero"))
 
 _OURS = f"{Path(__file__).parents[1]}{os.sep}"
+_SWEEPS = f"{_OURS}sweeps{os.sep}"
 
 _READS_SOURCES = "tokenize.py", "<frozen importlib._bootstrap_external>"
 """Ends of the names of the code that reads sources to import them or to show their lines."""
@@ -51,13 +51,10 @@ _COMPUTING: dict[int, set[str]] = {}
 """Thread that computes a cell -> what was opened or ran meanwhile."""
 
 WRITTEN: set[str] = set()
-"""What the user's code has written itself as a cell was computed."""
-
-_WRITTEN_EVER: set[str] = set()
-"""What this program has written itself at any time."""
+"""What the user's code has written itself while cells were computed."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
-"""File -> its size and times as anybody but this package opened it first."""
+"""File -> its size and times as anybody opened it first, but for a sweep that looks what it holds."""
 
 
 @contextmanager
@@ -75,7 +72,7 @@ def heard() -> Iterator[set[str]]:
             _COMPUTING[mine] = outer
 
 
-def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[str]:
+def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> set[str]:
     """Files that some code has opened, or found and run, beyond its sources and what its cell tells.
 
     Args:
@@ -84,25 +81,28 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> list[st
         told: other files that the cell's name tells.
     """
     known = {os.path.realpath(file) for file in (*sources, *told)}
-
-    def beyond(files: set[str]) -> set[str]:
-        return {file for file in files if os.path.realpath(file) not in known}
-
-    found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
+    found = {file for file in opened if os.path.realpath(file) not in known}
+    earlier = set[str]().union(*(_OPENED.get(file, ()) for file in sources))
     for file in sources:
         _OPENED.setdefault(file, set()).update(found)
-    return sorted(found | earlier)
+    return found | {file for file in earlier if os.path.realpath(file) not in known}
 
 
-def changed(told: Iterable[Path]) -> list[str]:
+def seen(files: Iterable[str]) -> None:
+    """Note how some files are that code may open where nobody hears it."""
+    for file in files:
+        _AT_FIRST.setdefault(file, _stamp(file))
+
+
+def remembered(file: str) -> bool:
+    """Whether this program has opened a file itself, and it is as it was then."""
+    return file in _AT_FIRST and _AT_FIRST[file] == _stamp(file)
+
+
+def changed(files: Iterable[Path | str]) -> list[str]:
     """Those of some files that have changed since they were first opened, as which the code may remember them."""
-    files = {path for file in told for path in (os.path.abspath(file), os.path.realpath(file))}
-    return sorted(file for file in files & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
-
-
-def written(told: Iterable[Path]) -> list[str]:
-    """Those of some files that this program has written itself."""
-    return sorted({os.path.abspath(file) for file in told} & _WRITTEN_EVER)
+    paths = {path for file in files for path in (os.path.abspath(file), os.path.realpath(file))}
+    return sorted(file for file in paths & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
@@ -121,34 +121,42 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = os.path.abspath(name)
         if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            if event == "os.rename" or (event == "open" and _writes(file, arguments[2])):
-                _WRITTEN_EVER.add(file)
+            if event == "open" and _writes(file, arguments[2]):
                 if _COMPUTING:
                     WRITTEN.add(file)
-            else:
-                within = threading.get_ident() in _COMPUTING and os.path.exists(file)
-                _note(file, event == "open" or (event == "sqlite3.connect" and within))
+                return
+            makes = event == "sqlite3.connect" and not (threading.get_ident() in _COMPUTING and os.path.exists(file))
+            _note(file, not makes)
 
 
 def _note(file: str, read: bool) -> None:
-    by, opener = _COMPUTING.get(threading.get_ident()), sys._getframe(2)
-    main = threading.main_thread()
-    in_main = threading.current_thread() is main
-    if read and not opener.f_code.co_filename.startswith(_OURS):
+    by, opener, main = _COMPUTING.get(threading.get_ident()), sys._getframe(2), threading.main_thread()
+    of_a_sweep = _is_of_a_sweep(opener)
+    if read and not of_a_sweep:
         for one in (file, os.path.realpath(file)):
             _AT_FIRST.setdefault(one, _stamp(file))
     if by is not None:
         by.add(file)
         return
-    if in_main or not _COMPUTING:
-        found = _openers(opener, file)
-        if not (found or in_main):
-            found = _openers(sys._current_frames().get(main.ident or 0), file)
-        for one in found:
-            _OPENED.setdefault(one, set()).add(file)
-    if _COMPUTING and not any(frame.f_code.co_filename.startswith(_OURS) for frame, _ in walk_stack(opener)):
+    found = _openers(opener, file)
+    if not (found or _COMPUTING or threading.current_thread() is main):
+        found = _openers(sys._current_frames().get(main.ident or 0), file)
+    for one in found:
+        _OPENED.setdefault(one, set()).add(file)
+    if not of_a_sweep:
         for opened in list(_COMPUTING.values()):  # whose thread it is nobody knows
             opened.add(file)
+
+
+def _is_of_a_sweep(opener: FrameType) -> bool:
+    """Whether a sweep opens a file for itself, to see what it holds."""
+    for frame, _ in walk_stack(opener):
+        by = frame.f_code.co_filename
+        if by.startswith(_SWEEPS):
+            return True
+        if not by.startswith(("<", _OURS)) and is_users(os.path.abspath(by)):
+            return False
+    return False
 
 
 def _stamp(file: str) -> tuple[int, ...]:
@@ -175,8 +183,8 @@ def _writes(file: str, flags: int) -> bool:
 
 
 def _openers(frame: FrameType | None, file: str) -> set[str]:
-    """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
-    Where this package opens it for them, that module alone, and no script for the source of a controller that it loads.
+    """The user's function that opens a file, and his module that runs at the moment unless this package has called it;
+    but no script for the source of a controller that this package loads for it, nor a function.
     """
     found, ours = set[str](), False
     while frame:
@@ -186,10 +194,11 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
                 return found
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
+            loads = ours and file.endswith(".py")
             if frame.f_code.co_name == "<module>":
-                loads = ours and frame.f_globals.get("__name__") in _SCRIPTS and file.endswith(".py")
-                return set() if loads else {os.path.abspath(by), *found}
-            if not (ours or found):
+                script = frame.f_globals.get("__name__") in _SCRIPTS
+                return set() if loads and script else {os.path.abspath(by), *found}
+            if not (loads or found):
                 found.add(os.path.abspath(by))
         frame = frame.f_back
     return found
