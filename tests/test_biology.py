@@ -259,6 +259,9 @@ def test_starts_that_fall_count_nowhere(falling):
     row = falling.isel(row=list(falling.name.values).index("way of a standing foot"))
     some = falling.value.sel(speed=24.0, quantity="way of a standing foot").dropna("start")
     assert row["mean"].item() == pytest.approx(some.mean().item()) or (some.size == 0 and math.isnan(row["mean"]))
+    assert row["walked"].item() == some.size
+    title = biology_figure(falling).texts[0].get_text()
+    assert ("with standard deviations" in title) == (some.size > 1)
 
 
 def test_a_row_without_walks_has_no_number(falling):
@@ -303,7 +306,8 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     code, text, _ = run(*words)
     assert code == 0
     table = (tmp_path / "biology.md").read_text()
-    assert "starts that walked: 2 of 2 at" in text
+    assert "starts that walked: 2 of 2 at" in text and "Starts that walked: 2 of 2 at" in table
+    assert answer["walked"][0] == 2
     assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
     assert table.count("\n| ") >= len(ANIMALS)
     assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)

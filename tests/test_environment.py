@@ -1,5 +1,7 @@
 """The dm_env face: its contract, its actions, how episodes end, and what the viewer needs."""
 
+import copy
+import pickle
 import unittest
 
 import numpy as np
@@ -231,3 +233,13 @@ def test_it_is_rendered():
         assert frame.shape == (48, 64, 3)
         assert frame.std() > 5
     walking.physics.free()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda walking: pickle.loads(pickle.dumps(walking))])
+def test_an_environment_is_copied_before_its_first_reset_alone(copied):
+    walking = dm.load(actions="tips")
+    first = copied(walking).reset().observation
+    for name, value in walking.reset().observation.items():
+        np.testing.assert_array_equal(value, first[name])
+    with pytest.raises(InputError, match="neither copied nor pickled"):
+        copied(walking)

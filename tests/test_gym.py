@@ -337,6 +337,15 @@ def test_a_step_needs_a_reset_and_a_copy_another_make(walking: Any):
         walking.reset(options={"mask": np.array([True, False])})
 
 
+def test_a_refused_reset_takes_no_seed():
+    walking, other = made("hexmj/StickInsect-v0"), made("hexmj/StickInsect-v0")
+    for one in (walking, other):
+        one.reset(seed=0)
+    with pytest.raises(InputError, match="option 'x'"):
+        walking.reset(seed=5, options={"x": 1})
+    assert_same(walking.reset()[0], other.reset()[0])
+
+
 def test_a_step_after_the_end_is_refused_until_a_reset():
     """It would go on for ever: nobody ends twice."""
     walking = made("hexmj/StickInsect-v0", duration=1.0)

@@ -53,8 +53,7 @@ class Biology(StudyCommand):
         """The table, how many walked, and the conditions."""
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
         yield table(HEADS, rows(result))
-        counts = (f"{n} of {self.starts} at {speed:g} mm/s" for speed, n in biology.walked(result).items())
-        yield f"starts that walked: {', '.join(counts)}; sources in {self.out / TABLE}"
+        yield f"starts that walked: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
 

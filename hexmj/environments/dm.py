@@ -8,6 +8,7 @@ dm_control's PhysicsError.  Contacts are those of the last substep, known once i
 import os
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import glfw
 import numpy as np
@@ -156,6 +157,14 @@ class Walking(control.Task):
     def __post_init__(self) -> None:
         """Draw the starts of `draw_starts` by the seed."""
         self._random = np.random.default_rng(check_draw(1, self.seed)[1])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Refuse copies and pickles of an episode, whose insect MuJoCo steps in memory that they would not share."""
+        if hasattr(self, "_walkers"):
+            raise InputError(
+                "an environment that was reset can be neither copied nor pickled; expected its physics, or another one"
+            )
+        return vars(self)
 
     @property
     def random(self) -> np.random.Generator:

@@ -58,8 +58,8 @@ class StickInsect(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Begin an episode.  With a seed it takes the first of `hexmj.draw_starts` by that seed, then its next ones."""
-        super().reset(seed=seed)
         checked_options(options)
+        super().reset(seed=seed)
         self._walkers.begin(np.arange(1), drawn(self.np_random, self.task))
         return self._observation(), {}
 

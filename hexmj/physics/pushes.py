@@ -60,20 +60,21 @@ class Push:
         begins = self.begins(stride)[self.impulse != 0.0]
         return gcd(steps_pushed(time, stride), *begins.tolist()) if begins.size else 0
 
-    def check_within(self, duration: float, stride: Stride, n_starts: int) -> None:
-        """Refuse a push that is not of so many starts, or begins in none of the steps within a duration [time units].
+    def check_within(self, duration: float, time: TimeScale, stride: Stride, n_starts: int) -> None:
+        """Refuse a push that is not of so many starts, or not all within a duration [time units].
 
         Raises:
-            InputError: it is of others, or begins before or after that.
+            InputError: it is of others, or begins before that or ends after it.
         """
         for name, values in vars(self).items():
             if values.shape != (n_starts,):
                 raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
-        steps = steps_within(duration, stride)
-        beside = (self.impulse != 0.0) & ((self.time < 0.0) | (self.time / stride.dt + 1e-9 >= steps))
+        steps, pushed = int(steps_within(duration, stride)), self.impulse != 0.0
+        lasts = steps_pushed(time, stride) if pushed.any() else 0
+        beside = pushed & ((self.time < 0.0) | (self.begins(stride) + lasts > steps))
         if beside.any():
             start = int(np.argmax(beside))
             raise InputError(
-                f"the push of start {start} is at {self.time[start]:g} time units;"
-                f" expected 0 to below {steps * stride.dt:g}, where the walk ends"
+                f"the push of start {start} is at {self.time[start]:g} time units and lasts {lasts * stride.dt:g};"
+                f" expected one between 0 and {steps * stride.dt:g}, where the walk ends"
             )

@@ -53,7 +53,7 @@ def biology_figure(result: "xr.Dataset") -> "Picture":
     axes[2].legend(frameon=False, fontsize=9)
     fewer = [f"{n} walked at {speed:g} mm/s" for speed, n in walked(result).items() if n < result.sizes["start"]]
     told = "; ".join([caption(result), *fewer])
-    spread = ", with standard deviations" if result.sizes["start"] > 1 else ""
+    spread = ", with standard deviations" if walked(result)[24.0] > 1 else ""
     head(figure, f"The walking insect beside measured ones; bars at 24 mm/s{spread}", told)
     return figure
 

@@ -64,12 +64,13 @@ class Biology(SameStarts):
             Over (speed, quantity, start): `value`, NaN where a start fell or made no whole stride.  Over row, one for
             each of `ANIMALS`: its `name`, `unit`, `at` which speed and whether the animals' figure `depends` on it; our
             `mean` over the starts with its 95 % interval `low`, `high`; the animals' `animal_low`, `animal_high` and
-            their `source`; the `verdict`, and whether it was `built_in`.
+            their `source`; the `verdict`, and whether it was `built_in`; and how many starts `walked`.
         """
         import xarray as xr
 
         table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
-        ours = [_mean(table.value.sel(speed=row.speed, quantity=row.quantity).values, row.quantity) for row in ANIMALS]
+        values = [table.value.sel(speed=row.speed, quantity=row.quantity).values for row in ANIMALS]
+        ours = [_mean(one, row.quantity) for one, row in zip(values, ANIMALS, strict=True)]
         columns = {
             "name": [row.quantity for row in ANIMALS],
             "unit": [UNITS[row.quantity] for row in ANIMALS],
@@ -81,6 +82,7 @@ class Biology(SameStarts):
             "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
             "built_in": [row.built_in for row in ANIMALS],
             "source": [row.source for row in ANIMALS],
+            "walked": [np.count_nonzero(np.isfinite(one)) for one in values],
         }
         measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
         units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
@@ -104,3 +106,8 @@ def walked(result: "xr.Dataset") -> dict[float, int]:
     """Number of starts that walked at each speed [mm/s], of a result of `Biology`."""
     count = result.value.sel(quantity="speed").notnull().sum("start")
     return dict(zip(result.speed.values.tolist(), count.values.tolist(), strict=True))
+
+
+def walked_in_words(result: "xr.Dataset") -> str:
+    """The same as a text."""
+    return ", ".join(f"{n} of {result.sizes['start']} at {speed:g} mm/s" for speed, n in walked(result).items())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from hexmj.measures.drawable_parts import check_axes, what_parts_may_lack
 from hexmj.storage.markdown import markdown_table
 from hexmj.studies.biology.animals import SOURCES
+from hexmj.studies.biology.study import walked_in_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,7 @@ def biology_markdown(result: "xr.Dataset") -> str:
     """
     check_axes(result)
     with what_parts_may_lack(result, "the table of insects cannot be made"):
-        lines = [*markdown_table(HEADS, rows(result)), ""]
+        lines = [*markdown_table(HEADS, rows(result)), "", f"Starts that walked: {walked_in_words(result)}.", ""]
         named = {*result.source.values}
     return (
         "\n".join([*lines, *(f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text)]) + "\n"
