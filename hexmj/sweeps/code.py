@@ -89,6 +89,8 @@ class _Needed(NamedTuple):
     versions: dict[str, str]
     modules: list[tuple[str, Path, _Module]]
     """With their names and files."""
+    theirs: list[tuple[Path, list[str]]]
+    """Files of a user's own modules, with their texts."""
     missing: set[str]
     """Modules without a file."""
 
@@ -121,11 +123,10 @@ def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
         InputError: a module has no source.
     """
     sources, data = set[str](), set[str]()
-    for _, file, module in _needed(modules).modules:
-        if not file.is_relative_to(PACKAGE):
-            sources.add(os.path.abspath(file))
-            named = files_named(module.texts, (file.parent, Path.cwd()), _DATA) if module.texts else ()
-            data.update(os.path.abspath(part) for path in named for part in parts(path))
+    for file, named in _needed(modules).theirs:
+        sources.add(os.path.abspath(file))
+        found = files_named(named, (file.parent, Path.cwd()), _DATA) if named else ()
+        data.update(os.path.abspath(part) for path in found for part in parts(path))
     return sources, data
 
 
@@ -171,7 +172,9 @@ def _follow(modules: frozenset[str]) -> _Needed:
     from hexmj.sweeps.packages import version
 
     versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    return _Needed(sources, versions | {name: version(name) for name in sorted(names)}, read, missing)
+    versions |= {name: version(name) for name in sorted(names)}
+    theirs = [(file, module.texts) for _, file, module in read if not file.is_relative_to(PACKAGE)]
+    return _Needed(sources, versions, read, theirs, missing)
 
 
 def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:
