@@ -56,8 +56,10 @@ class FeltInsects(VecEnv):
         Raises:
             InputError: options have been set.
         """
-        if any(self._options):
-            raise InputError(f"options = {self._options!r:.80}; expected none")
+        options = self._options
+        self._reset_options()
+        if any(options):
+            raise InputError(f"options = {options!r:.80}; expected none")
         observed = self._insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
         return self._seen(observed)
@@ -118,7 +120,8 @@ class FeltInsects(VecEnv):
 
     def _some(self, indices: Any) -> list[int]:
         n = self.num_envs
-        return [checks.whole("index", one, -n, n - 1) % n for one in self._get_indices(indices)]
+        some = [indices] if np.isscalar(indices) else self._get_indices(indices)
+        return [checks.whole("index", one, -n, n - 1) % n for one in some]
 
     def _all(self, indices: Any) -> int:
         if {*self._some(indices)} != {*range(self.num_envs)}:
