@@ -70,6 +70,7 @@ def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_pat
         assert ledger(tmp_path).known == 0
     path.write_text(f"{record}\n{lines}")
     assert ledger(tmp_path).known == 1
+    assert other._line(row, 1.0, {"b": "", "a": ""}) == other._line(row, 1.0, {"a": "", "b": ""})
 
 
 def test_a_ledger_of_another_search_is_refused(tmp_path: Path) -> None:

@@ -19,9 +19,10 @@ import xarray as xr
 import hexmj
 from hexmj.errors import InputError
 from hexmj.storage.files import read_sealed
-from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.sweeps import Cell, KeptValues, cells, run
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
+from hexmj.user_code.opened_files import heard
 
 READER = """
 import functools, json, os, runpy, shutil, sqlite3, tempfile
@@ -72,9 +73,10 @@ def write_all(gain: str, at: str = "one") -> None:
     Path(at, "gain.py").write_text(f"GAIN = {gain}")
     np.save(Path(at, "gain.npy"), float(gain))
     np.array([float(gain)]).tofile(Path(at, "gain.bin"))
-    Path(at, "gain.db").unlink(missing_ok=True)
-    with closing(sqlite3.connect(Path(at, "gain.db"))) as data, data:
-        data.executescript(f"create table told (gain); insert into told values ({gain})")
+    for name in ("gain.db", "a gain.db"):
+        Path(at, name).unlink(missing_ok=True)
+        with closing(sqlite3.connect(Path(at, name))) as data, data:
+            data.executescript(f"create table told (gain); insert into told values ({gain})")
     hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
 
 
@@ -97,8 +99,10 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
     """The gain that a cell reads in `at`, by a piece of Python, and how often cells were computed so far."""
     monkeypatch.chdir(tmp_path)
     for at, gain in (("one", "1.0"), ("two", "2.0")):
-        (tmp_path / at).mkdir()
+        (tmp_path / at / "inner").mkdir(parents=True)
         write_all(gain, at)
+
+    Path("leads").symlink_to("one/inner")
 
     def computed(gain: str, file: str = "", **how: object) -> tuple[float, int]:
         (tmp_path / "reader.py").write_text(READER.format(gain=gain))
@@ -123,6 +127,12 @@ READS = [
     ("gain", '[os.chdir(at), float(Path("gain").read_text()), os.chdir("..")][1]'),
     ("gain.db", 'sqlite3.connect(f"{at}/gain.db").execute("select gain from told").fetchone()[0]'),
     ("gain.db", 'sqlite3.connect(f"file:{at}/gain.db?mode=ro", uri=True).execute("select * from told").fetchone()[0]'),
+    (
+        "a gain.db",
+        'sqlite3.connect(Path(at, "a gain.db").absolute().as_uri(), uri=True)'
+        '.execute("select gain from told").fetchone()[0]',
+    ),
+    ("gain", 'float(Path("leads", "..", "gain").read_text())'),
     ("gain.nc", 'float(hexmj.load(f"{at}/gain.nc").gain)'),
     ("gain", 'remembered(f"{at}/gain")'),
     ("gain", '[it := open(f"{at}/gain", "a+"), it.seek(0), float(it.read()), it.close()][2]'),
@@ -315,7 +325,7 @@ def test_a_file_that_a_field_names_by_a_link_or_sqlite_reads_is_remembered(
     computed: Callable[..., tuple[float, int]],
 ) -> None:
     Path("link").symlink_to("one/gain")
-    for file, gain, later in (("link", "remembered('link')", "7.0"), ("one/gain.db", READS[-5][1], "8.0")):
+    for file, gain, later in (("link", "remembered('link')", "7.0"), ("one/gain.db", dict(READS)["gain.db"], "8.0")):
         computed(gain, file)
         write_all(later)
         with pytest.warns(UserWarning, match="(gain.*|link) has changed since it was opened first"):
@@ -334,6 +344,34 @@ def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[...,
     with ThreadPoolExecutor(2) as threads:
         assert [float(data.gain) for data in run(cells, Path("both"), executor=threads)] == [1.0, 2.0]
     assert len(list(Path("both").glob("*.nc"))) == 2
+
+
+def test_what_changes_as_it_is_looked_at_is_not_kept(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cells, "_held", lambda file: str(Path(file).write_text("7.0")))
+    with pytest.warns(UserWarning, match=r"one.gain has changed since it was opened first"):
+        assert computed("float(Path(at, 'gain').read_text())") == (1.0, 1)
+
+
+def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callable[..., tuple[float, int]]) -> None:
+    for calls in (1, 1):
+        with heard() as opened:
+            assert computed("tried('new')") == (0.0, calls)
+        assert os.path.abspath("new") in opened
+
+
+def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = "1.0 + Path('it.csv').exists()"
+    assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+    for text in ("a", "b"):
+        Path("it.csv").write_text(text)
+        another_program(monkeypatch)
+        assert [computed(gain), computed(gain)] == 2 * [(2.0, 2)]
+    Path("it.csv").unlink()
+    assert computed(gain) == (1.0, 3)
 
 
 def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:

@@ -130,12 +130,11 @@ def test_a_log_that_a_script_names_and_writes_meanwhile_is_no_error(tmp_path: Pa
     assert (gain, kept, complaint) == (2.0, 1, "")
 
 
-def test_a_file_that_a_text_names_and_another_process_changes_meanwhile_is_no_data_of_the_cell(tmp_path: Path) -> None:
-    (tmp_path / "gains.toml").write_text("2.0")
-    mine = f"{NEW}GAINS = 'gains.toml'\ndef cell():\n"
-    mine += "    __import__('subprocess').run('echo 3.0 > gains.toml', shell=True)\n"
+def test_an_mjcf_that_changes_meanwhile_is_no_data_of_the_cell(tmp_path: Path) -> None:
+    (tmp_path / "leg.xml").write_text(BODY.format(1.0))
+    mine = f"{NEW}LEG = 'leg.xml'\ndef cell():\n    __import__('subprocess').run('echo >> leg.xml', shell=True)\n"
     gain, kept, complaint = sweep(tmp_path, mine=f"{mine}    return xr.Dataset({{'gain': 2.0}})\n", script=SCRIPT)
-    assert (gain, kept) == (2.0, 0) and "gains.toml has changed since it was opened first" in complaint
+    assert (gain, kept) == (2.0, 0) and "leg.xml has changed since it was opened first" in complaint
 
 
 def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) -> None:

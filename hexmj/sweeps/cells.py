@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, files_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import WRITTEN, changed, seen, untold
+from hexmj.user_code.opened_files import changed, heard_too, seen, untold
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -24,8 +24,8 @@ EXECUTION = ("threads", "progress")
 _HERE = "."
 """Stands among files for the folder from which they are looked for, and its path for a digest."""
 
-_ITS_OWN = "written"
-"""Stands for the digest of a file that code names in a text, and has written itself without reading it, as a log."""
+_THERE = "there"
+"""Stands for the digest of a file that a text names and nobody was heard to open: a log, or one that code looks for."""
 
 
 @dataclass(frozen=True)
@@ -82,28 +82,28 @@ class Cell:
             opened: what was opened while it was computed.
         """
         try:
-            sources, named = files_of_users(self._modules())
+            sources, unheard, others = files_of_users(self._modules())
         except InputError:  # it has no source, so that it is named by nothing
             return {}, ""
         if not sources:
             return {}, ""
         told = self._told_files()
-        read = untold(opened | (named - WRITTEN), sources, told)
-        if ran := sorted(file for file in read if file.endswith(".py")):
+        files = untold(opened | unheard, sources, told)
+        if ran := sorted(file for file in files if file.endswith(".py")):
             return {}, (
                 f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
                 " expected an import, or a field that names it"
             )
-        if found := changed({*told, *read}):
+        try:
+            read = dict.fromkeys(_beyond(others, told), _THERE) | {file: _held(file) for file in files}
+        except InputError as error:
+            return {}, f"{self.name} is not kept: {error}"
+        if found := changed({*told, *files}):
             return {}, (
                 f"{self.name} is not kept: {found[0]} has changed since it was opened first, and code may remember it;"
                 " start the program again"
             )
-        try:
-            held = {file: _ITS_OWN for file in named & WRITTEN} | {file: _held(file) for file in read}
-            return (held | {_HERE: os.getcwd()} if held else {}), ""
-        except InputError as error:
-            return {}, f"{self.name} is not kept: {error}"
+        return (read | {_HERE: os.getcwd()} if read else {}), ""
 
     def would_read(self, read: Mapping[str, str]) -> bool:
         """Whether its code would read today what it has read, or may remember from earlier in this program."""
@@ -111,10 +111,13 @@ class Cell:
             same = all(holds(*one) for one in read.items())
         except InputError:
             return False
-        new = files_of_users(self._modules())[1] - read.keys()
-        told = {os.path.realpath(file) for file in self._told_files()} if new else ()
-        before = [file for file, digest in read.items() if digest != _ITS_OWN]
-        return same and not changed(before) and all(os.path.realpath(file) in told for file in new)
+        _, *named = files_of_users(self._modules())
+        new = set[str]().union(*named) - read.keys()
+        opened = {file for file, digest in read.items() if digest != _THERE and file != _HERE}
+        believed = same and not changed(opened) and not (new and _beyond(new, self._told_files()))
+        if believed:
+            heard_too(opened)
+        return believed
 
     def _told_files(self) -> set[Path]:
         """Files that its settings name."""
@@ -159,13 +162,21 @@ def check_unchanged(cell: Cell, before: str, now: str) -> None:
     )
 
 
+def _beyond(files: set[str], told: set[Path]) -> set[str]:
+    """Some files without those that settings tell."""
+    known = {os.path.realpath(file) for file in told}
+    return {file for file in files if os.path.realpath(file) not in known}
+
+
 def holds(file: str, digest: str) -> bool:
     """Whether a file is what was read, as `Cell.read` tells it.
 
     Raises:
         InputError: it cannot be read.
     """
-    return digest == os.getcwd() if file == _HERE else digest in (_ITS_OWN, _held(file))
+    if file == _HERE:
+        return digest == os.getcwd()
+    return os.path.exists(file) if digest == _THERE else digest == _held(file)
 
 
 def _held(file: str) -> str:

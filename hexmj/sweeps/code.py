@@ -25,6 +25,7 @@ from hexmj.storage.files import digest, digest_of
 from hexmj.storage.mjcf import parts
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
+from hexmj.user_code.opened_files import spelled
 from hexmj.user_code.parsing import files_named, parsed, texts
 
 CARRIERS = {
@@ -38,11 +39,15 @@ a user's module imports it."""
 _DATA_OF_OURS = ".toml", ".xml"
 """Ends of the names of data files."""
 
+_MODELS = ".xml", ".mjcf", ".mjb", ".urdf"
+"""The same of what MuJoCo opens where nobody hears it, in small letters or capitals."""
+
 _DATA = (
-    *(".toml", ".xml", ".mjcf", ".mjb", ".urdf", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
+    *_MODELS,
+    *(".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
     *(".npy", ".npz", ".pt", ".pth", ".pkl"),
 )
-"""The same of a user's own, in small letters or capitals."""
+"""The same of all data of a user's own."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -115,19 +120,22 @@ def code(modules: frozenset[str]) -> Code:
     return Code(dict(sorted(sources.items())), needed.versions)
 
 
-def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
+def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str], set[str]]:
     """Of the user's own modules that some need their sources, and the data that their texts name, beside them or in the
-    current folder, with its parts, as far as they are there.
+    current folder, as far as they are there: first what may be opened unheard, with its parts, then the rest.
 
     Raises:
         InputError: a module has no source.
     """
-    sources, data = set[str](), set[str]()
+    sources, unheard, others = set[str](), set[str](), set[str]()
     for file, named in _needed(modules).theirs:
         sources.add(os.path.abspath(file))
-        found = files_named(named, (file.parent, Path.cwd()), _DATA) if named else ()
-        data.update(os.path.abspath(part) for path in found for part in parts(path))
-    return sources, data
+        for path in files_named(named, (file.parent, Path.cwd()), _DATA) if named else ():
+            if path.name.lower().endswith(_MODELS) or str(file) in sources_as_run.BEFORE:
+                unheard.update(map(spelled, parts(path)))
+            else:
+                others.add(spelled(path))
+    return sources, unheard, others - unheard
 
 
 def _needed(modules: frozenset[str]) -> _Needed:

@@ -98,7 +98,7 @@ class KeptValues:
 
     def _line(self, row: bytes, value: float, read: dict[str, str]) -> str:
         """With a checksum that no line of another cell has."""
-        text = f"{row.hex()} {value.hex()}{' ' + json.dumps(read) if read else ''}"
+        text = f"{row.hex()} {value.hex()}{' ' + json.dumps(read, sort_keys=True) if read else ''}"
         return f"{text} {zlib.crc32(text.encode(), self._seed):08x}\n"
 
 

@@ -14,13 +14,14 @@ from pathlib import Path
 from traceback import walk_stack
 from types import FrameType
 from typing import Any
+from urllib.parse import unquote
 
 from hexmj.user_code.sources_as_run import is_users
 
 _PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
 
-_URI = re.compile(r"^file:(?://)?([^?]*)(\?.*)?$")
+_URI = re.compile(r"^file:(?://[^/?]*)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
 
 _NO_DATA = re.compile(
@@ -50,9 +51,6 @@ _OPENED: dict[str, set[str]] = {}
 _COMPUTING: dict[int, set[str]] = {}
 """Thread that computes a cell -> what was opened or ran meanwhile."""
 
-WRITTEN: set[str] = set()
-"""What the user's code has written itself while cells were computed."""
-
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size and times as anybody opened it first, but for a sweep that looks what it holds."""
 
@@ -81,11 +79,19 @@ def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> set[str
         told: other files that the cell's name tells.
     """
     known = {os.path.realpath(file) for file in (*sources, *told)}
-    found = {file for file in opened if os.path.realpath(file) not in known}
-    earlier = set[str]().union(*(_OPENED.get(file, ()) for file in sources))
+
+    def beyond(files: set[str]) -> set[str]:
+        return {file for file in files if os.path.realpath(file) not in known and not os.path.isdir(file)}
+
+    found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
     for file in sources:
         _OPENED.setdefault(file, set()).update(found)
-    return found | {file for file in earlier if os.path.realpath(file) not in known}
+    return found | earlier
+
+
+def heard_too(files: Iterable[str]) -> None:
+    """Note for the cell that this thread computes what another one has read that it takes as it is kept."""
+    _COMPUTING.get(threading.get_ident(), set()).update(files)
 
 
 def seen(files: Iterable[str]) -> None:
@@ -101,8 +107,14 @@ def remembered(file: str) -> bool:
 
 def changed(files: Iterable[Path | str]) -> list[str]:
     """Those of some files that have changed since they were first opened, as which the code may remember them."""
-    paths = {path for file in files for path in (os.path.abspath(file), os.path.realpath(file))}
+    paths = {path for file in files for path in (spelled(file), os.path.realpath(file))}
     return sorted(file for file in paths & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
+
+
+def spelled(file: str | Path) -> str:
+    """A path from the root on, without dots; but as it is where `..` may lead elsewhere through a link."""
+    path = os.path.join(os.getcwd(), file)
+    return path if os.pardir in path.split(os.sep) else os.path.normpath(path)
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
@@ -116,15 +128,14 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if lists or not isinstance(path, str | bytes | os.PathLike):
             return  # a folder that is walked through or removed; an open file
         given = os.fsdecode(path)
-        name = ":memory:" if "mode=memory" in given else _URI.sub(r"\1", given)
+        name = ":memory:" if "mode=memory" in given else given
+        if event == "sqlite3.connect" and (uri := _URI.match(name)):
+            name = unquote(uri[1])
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
-        file = os.path.abspath(name)
-        if _is_data(file) and not (event == "open" and _reads_a_source(file, sys._getframe(1))):
-            if event == "open" and _writes(file, arguments[2]):
-                if _COMPUTING:
-                    WRITTEN.add(file)
-                return
+        file = spelled(name)
+        reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
+        if reads and _is_data(file):
             makes = event == "sqlite3.connect" and not (threading.get_ident() in _COMPUTING and os.path.exists(file))
             _note(file, not makes)
 
@@ -183,8 +194,8 @@ def _writes(file: str, flags: int) -> bool:
 
 
 def _openers(frame: FrameType | None, file: str) -> set[str]:
-    """The user's function that opens a file, and his module that runs at the moment unless this package has called it;
-    but no script for the source of a controller that this package loads for it, nor a function.
+    """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
+    Where this package opens it for them, that module alone, and no script for the source of a controller that it loads.
     """
     found, ours = set[str](), False
     while frame:
@@ -194,11 +205,10 @@ def _openers(frame: FrameType | None, file: str) -> set[str]:
                 return found
             ours = True
         elif not by.startswith("<") and is_users(os.path.abspath(by)):
-            loads = ours and file.endswith(".py")
             if frame.f_code.co_name == "<module>":
-                script = frame.f_globals.get("__name__") in _SCRIPTS
-                return set() if loads and script else {os.path.abspath(by), *found}
-            if not (loads or found):
+                loads = ours and frame.f_globals.get("__name__") in _SCRIPTS and file.endswith(".py")
+                return set() if loads else {os.path.abspath(by), *found}
+            if not (ours or found):
                 found.add(os.path.abspath(by))
         frame = frame.f_back
     return found

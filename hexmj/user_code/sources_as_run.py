@@ -95,4 +95,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
 
 for _module in list(sys.modules.values()):
     _note(getattr(_module, "__file__", None))
+
+BEFORE = frozenset(RUN)
+"""Files of modules that ran before anybody noted them."""
+
 sys.addaudithook(_hear)
