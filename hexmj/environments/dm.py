@@ -164,7 +164,7 @@ class Walking(control.Task):
             raise InputError(
                 "an environment that was reset can be neither copied nor pickled; expected its physics, or another one"
             )
-        return vars(self)
+        return self.__dict__
 
     @property
     def random(self) -> np.random.Generator:
