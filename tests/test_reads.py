@@ -133,6 +133,7 @@ READS = [
         '.execute("select gain from told").fetchone()[0]',
     ),
     ("gain", 'float(Path("leads", "..", "gain").read_text())'),
+    ("gain.json", "float(Path('one/gain.json').read_text())"),
     ("gain.nc", 'float(hexmj.load(f"{at}/gain.nc").gain)'),
     ("gain", 'remembered(f"{at}/gain")'),
     ("gain", '[it := open(f"{at}/gain", "a+"), it.seek(0), float(it.read()), it.close()][2]'),
@@ -352,6 +353,17 @@ def test_what_changes_as_it_is_looked_at_is_not_kept(
     monkeypatch.setattr(cells, "_held", lambda file: str(Path(file).write_text("7.0")))
     with pytest.warns(UserWarning, match=r"one.gain has changed since it was opened first"):
         assert computed("float(Path(at, 'gain').read_text())") == (1.0, 1)
+
+
+def test_what_is_no_file_is_not_kept_or_believed(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "[it := open('it', 'rb'), float(b'1' + it.read(1).strip(b'\\0 ')), it.close()][1]"
+    Path("it").write_text(" ")
+    assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
+    Path("it").unlink()
+    Path("it").symlink_to("/dev/full")
+    opened_files._AT_FIRST.clear()
+    with pytest.warns(UserWarning, match=r"^reader is not kept: .*it is a pipe or a device; expected a file"):
+        assert computed(gain) == (1.0, 2)
 
 
 def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callable[..., tuple[float, int]]) -> None:
