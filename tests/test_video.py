@@ -27,7 +27,7 @@ from hexmj.replay.film.video import _view, render
 from hexmj.replay.footfall import walk_figure
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
 from hexmj.replay.schema import MEASURED, PLANNED
-from hexmj.replay.take import Take
+from hexmj.replay.take import Take, margin_in_words
 from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s
@@ -172,6 +172,7 @@ def test_what_is_stable_is_told_without_colours(fallen):
     states = [overlay._state(row, seconds)[0] for row, seconds in ((0, 0.0), (unstable, take.lost), (0, take.fell))]
     assert [state[0] for state in states] == ["●", "▲", "■"]
     assert "stable, but lost at" in Overlay(again, Film(), 0.0, 1.0)._state(unstable, take.lost)[0]
+    assert [margin_in_words(margin) for margin in (-1.25, -np.inf)] == ["margin -1.2 mm", "no foot stands"]
     frame = np.full((480, 640, 3), 200, dtype=np.uint8)
     overlay.draw(frame, 0, 0.0, 5.0)
     strip = frame[400 - 9]

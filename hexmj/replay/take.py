@@ -105,6 +105,11 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> lis
         raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
 
 
+def margin_in_words(margin: float) -> str:
+    """A stability margin [mm] as films and views tell it; it is infinite where no foot stands."""
+    return f"margin {margin:+.1f} mm" if np.isfinite(margin) else "no foot stands"
+
+
 def support_on_ground(
     conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, float]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from hexmj.diagrams import spans
 from hexmj.legs import LEGS
+from hexmj.replay.take import margin_in_words
 from hexmj.view.live import Moment
 from hexmj.view.session import LiveSession
 
@@ -31,11 +32,10 @@ def footfall(seconds: np.ndarray, off: np.ndarray) -> str:
 def readout(session: LiveSession, moment: Moment) -> str:
     """What is said of a moment, in Markdown."""
     walk = session.walk
-    margin = f"margin {moment.margin:+.1f} mm" if np.isfinite(moment.margin) else "no foot stands"
     state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if moment.margin > 0 else 'outside'} the polygon"
     sign = "\N{HEAVY CHECK MARK}" if moment.margin > 0 and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
     lines = [
-        f"**{margin}** {sign} {state}",
+        f"**{margin_in_words(moment.margin)}** {sign} {state}",
         f"V = {moment.velocity:.2f}, {moment.seconds:.2f} s, start {session.start};"
         f" {session.factor:.2f} times real time",
     ]

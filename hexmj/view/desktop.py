@@ -17,7 +17,7 @@ from hexmj.bodies.loading import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.take import support_on_ground
+from hexmj.replay.take import margin_in_words, support_on_ground
 from hexmj.view.session import IMPULSE, LiveSession, ReplaySession, ticks
 
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -47,7 +47,7 @@ def view_live(session: LiveSession) -> None:
                 session.attempt(partial(_obey, session, wishes.get()))
             moment = session.tick(passed)
             seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
-            state = f"fell on {walk.fell_on}" if walk.fell_on else f"margin {moment.margin:+.1f} mm"
+            state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
             text = f"V = {walk.velocity:.2f}, {state}"
             _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.told)
 
@@ -61,7 +61,7 @@ def view_recording(session: ReplaySession) -> None:
                 session.paused ^= wishes.get() == SPACE
             row = session.tick(passed)
             seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
-            text = f"{take.title}, half speed, margin {take.margin[row]:+.1f} mm"
+            text = f"{take.title}, half speed, {margin_in_words(take.margin[row])}"
             _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
 
 

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
 from hexmj.replay.film.film import Film
-from hexmj.replay.take import Take
+from hexmj.replay.take import Take, margin_in_words
 
 INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
 GREEN, RED = (0, 112, 72), (190, 56, 0)
@@ -77,12 +77,12 @@ class Overlay:
         free = image.width - 3 * edge - _font(size, bold=True).getlength(state)
         _write(image, (edge, first), _shortened(take.title, _font(size, bold=True), free), size, bold=True)
         _write(image, (image.width - edge, first), state, size, colour, "rm", bold=True)
-        margin = f"{take.margin[row]:+.1f} mm".replace("-", MINUS) if seconds < take.fell else "unknown"
+        margin = margin_in_words(take.margin[row]).replace("-", MINUS) if seconds < take.fell else "margin unknown"
         fields = (
             f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
             f"V = {take.velocity[row]:.2f}",
             f"Vₚ = {take.conditions.time.vp:g} mm/s",
-            f"margin {margin}",
+            margin,
         )
         for place, text in zip((0.0, 0.51, 0.615, 0.79), fields, strict=True):
             _write(image, (edge + place * (image.width - 2 * edge), second), text, self._pixels(12))
