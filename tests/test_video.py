@@ -163,6 +163,16 @@ def test_a_film_and_the_figure_of_its_walk_have_the_same_bars(kind: str, request
         assert all(np.min(corner[:, 1]) < leg < np.max(corner[:, 1]) for corner in corners)
 
 
+def test_what_was_not_recorded_is_not_told(plan):
+    """Beside a longer recording, or one that begins before."""
+    take = Take.of(plan.isel(step=slice(10, 40)))
+    overlay = Overlay(take, Film(), 0.0, 1.0)
+    early, late = overlay._state(0, 0.0)[0], overlay._state(29, 1.0)[0]
+    assert (early, late) == (f"recorded from {1e3 * take.begin:.0f} ms", f"recorded until {1e3 * take.end:.0f} ms")
+    for row, seconds in ((0, take.begin), (29, take.end)):
+        assert "stable" in overlay._state(row, seconds)[0]
+
+
 def test_what_is_stable_is_told_without_colours(fallen):
     """By a sign and by words, of now and of what was before; the bar of the scale is as long as it says."""
     take = Take.of(fallen)

@@ -77,10 +77,12 @@ class Overlay:
         free = image.width - 3 * edge - _font(size, bold=True).getlength(state)
         _write(image, (edge, first), _shortened(take.title, _font(size, bold=True), free), size, bold=True)
         _write(image, (image.width - edge, first), state, size, colour, "rm", bold=True)
-        margin = margin_in_words(take.margin[row]).replace("-", MINUS) if seconds < take.fell else "margin unknown"
+        told = self._not_told(seconds)
+        known = seconds < take.fell and not told
+        margin = margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown"
         fields = (
             f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
-            f"V = {take.velocity[row]:.2f}",
+            "V unknown" if told else f"V = {take.velocity[row]:.2f}",
             f"Vₚ = {take.conditions.time.vp:g} mm/s",
             margin,
         )
@@ -93,9 +95,18 @@ class Overlay:
         take, lost = self._take, f"{1000 * self._take.lost:.0f} ms"
         if seconds >= take.fell:
             return f"■ fell on {take.part} at {1000 * take.fell:.0f} ms", RED
+        if told := self._not_told(seconds):
+            return told, FAINT
         if take.margin[row] <= 0:
             return f"▲ unstable, first at {lost}" if seconds >= take.lost else "▲ unstable", RED
         return f"● stable, but lost at {lost}" if seconds >= take.lost else "● stable", GREEN
+
+    def _not_told(self, seconds: float) -> str:
+        """What to say where the recording has not begun or is over, as beside a longer one; else nothing."""
+        take = self._take
+        if seconds < take.begin - take.step / 2:
+            return f"recorded from {1000 * take.begin:.0f} ms"
+        return f"recorded until {1000 * take.end:.0f} ms" if seconds > take.end + take.step / 2 else ""
 
     def _axes(self, width: int, height: int) -> np.ndarray:
         """The diagram without bars, (height, width, 3)."""
