@@ -82,7 +82,7 @@ class Overlay:
         margin = margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown"
         fields = (
             f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
-            "V unknown" if told else f"V = {take.velocity[row]:.2f}",
+            "V = ?" if told else f"V = {take.velocity[row]:.2f}",
             f"Vₚ = {take.conditions.time.vp:g} mm/s",
             margin,
         )
