@@ -19,6 +19,7 @@ from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.disturbance.study import DisturbedWalks
 from hexmj.sweeps import conduct
+from hexmj.timing import Acceleration
 
 STRIDE, V, GRID = Stride(), 0.5, 20
 STABLE = find_stable_starts(LDVS, V, 6, 0, STRIDE, GRID)
@@ -138,6 +139,20 @@ def test_some_starts_alone_go_as_among_all(kind):
     asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
     every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
     assert alone.identical(every.isel(start=[2, 0]))
+
+
+def test_windows_that_hold_no_push_or_recovery_are_refused_before_the_work():
+    def study(**other: Any) -> DisturbedWalks:
+        return DisturbedWalks(LDVS, **{**FEW, **other})
+
+    with pytest.raises(InputError, match=r"window = 1.9, 1.9 time units; expected at least 2, which a push lasts"):
+        study(window=1.9)
+    study(window=2.0)
+    study(window=1.9, disturbances=["halt"])
+    slow = Acceleration(rate=1e-7)
+    with pytest.raises(InputError, match=r"recovery: V and the window after it take .* units; expected at most 1e\+06"):
+        study(recovery=slow)
+    study(recovery=slow, strategies=["grasp"])
 
 
 def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered():

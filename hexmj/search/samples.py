@@ -140,7 +140,8 @@ class Sample:
     ) -> "xr.Dataset":
         """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
 
-        The interval of a mean over variants is too wide rather than too narrow: as if all lost stability together.
+        The interval of a mean over variants is that of the mean count, rounded, and too wide rather than too narrow: as
+        if all lost stability together.
         """
         import xarray as xr
 

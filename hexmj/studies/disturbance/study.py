@@ -20,7 +20,7 @@ from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.same_starts import SameStarts
 from hexmj.sweeps import Cell, over_axes
-from hexmj.timing import Acceleration, check_reached
+from hexmj.timing import MOST_STEPS, Acceleration, check_reached, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,8 +64,18 @@ class DisturbedWalks(SameStarts):
                 f"velocities = {v.tolist()}; expected above 0 and at least V_r(0), {low:g}, if it slows down"
             )
         check_reached(v, self.stride, self.recovery if slows else None)
+        window, dt = self.observed[1], self.stride.dt
+        if slows and (longest := float((window + self.recovery.duration(v)).max())) > MOST_STEPS * dt:
+            raise InputError(
+                f"recovery: V and the window after it take {longest:g} time units; expected at most {MOST_STEPS * dt:g}"
+            )
         if self.physical and "push" in self.disturbances:
-            steps_pushed(self.conditions.time, self.stride)
+            lasts = steps_pushed(self.conditions.time, self.stride)
+            if (steps_within(window, self.stride) < lasts).any():
+                raise InputError(
+                    f"window = {self.window!r}, {window.min():g} time units; expected at least {lasts * dt:g}, which a"
+                    " push lasts"
+                )
         self.conditions.but(grasp=self.adhesion)
         _ = self._cells()
 

@@ -100,8 +100,9 @@ class Variants:
         Returns:
             Over (network, variant, velocity): `flss` with its 95 % Wilson interval, over the starts too `lost`; and
             `instead`, the default that was walked where a set has the variant already, empty elsewhere.  Over
-            (network, velocity): `mean` and `worst` over the variants with their intervals, that of the mean too wide
-            rather than too narrow: as if all variants lost the same starts; and the name of the worst, `worst_variant`.
+            (network, velocity): `mean` and `worst` over the variants with their intervals, that of the mean of the mean
+            count, rounded, and too wide rather than too narrow: as if all variants lost the same starts; and the name
+            of the worst, `worst_variant`.
         """
         sizes = {"network": len(self.networks), "variant": len(self.variants), "velocity": len(self.velocities)}
         times = {"units": "time unit", "long_name": "observation time t"}
