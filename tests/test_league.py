@@ -107,6 +107,13 @@ def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League,
         assert np.array_equal(other[name].sel(entrant="wilson"), result[name].sel(entrant="wilson"), equal_nan=True)
 
 
+def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:
+    """It lasts 2 time units."""
+    for window, pushed in ((1.9, False), (2.0, True)):
+        short = replace(league, entrants={"ldvs": league.entrants["ldvs"]}, window=window)
+        assert (("ldvs", "push") in short.named_cells()) == pushed
+
+
 def test_velocities_that_look_alike_are_not_the_same(league: League) -> None:
     near = replace(league, velocities=(0.3, 0.3000001))
     assert len(near.named_cells()) == len(league.named_cells())

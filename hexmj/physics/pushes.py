@@ -26,9 +26,9 @@ def steps_pushed(time: TimeScale, stride: Stride) -> int:
     return round(PUSH_LASTS / time.seconds(stride))
 
 
-def can_push(time: TimeScale, stride: Stride) -> bool:
-    """Whether steps of the plan are short enough for a push."""
-    return round(PUSH_LASTS / time.seconds(stride)) > 0
+def can_push(time: TimeScale, stride: Stride, window: float = np.inf) -> bool:
+    """Whether steps of the plan are short enough for a push, and a window [time units] holds it."""
+    return 0 < round(PUSH_LASTS / time.seconds(stride)) <= window / stride.dt + 1e-6
 
 
 @dataclass(frozen=True, eq=False)

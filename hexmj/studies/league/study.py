@@ -165,15 +165,15 @@ class League:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
         from hexmj.studies.league import in_physics
 
-        way = self.tried_at * float(observation_time(self.window, self.tried_at, self.stride))
+        window = float(observation_time(self.window, self.tried_at, self.stride))
         for trial in TRIALS:
             case = DISTURBED.get(trial)
-            if case and case.kind == "push" and not can_push(self.conditions.time, self.stride):
+            if case and case.kind == "push" and not can_push(self.conditions.time, self.stride, window):
                 continue
             if case and entrant.steerable:
                 how = {"case": case, "conditions": self.conditions, "grid": GRID}
                 yield trial, in_physics.disturbed, 300, how
-            elif case or (trial in GROUNDS and way < crossed(self.conditions)):
+            elif case or (trial in GROUNDS and self.tried_at * window < crossed(self.conditions)):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.stride):
                 yield trial, in_physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}

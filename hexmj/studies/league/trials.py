@@ -52,8 +52,8 @@ TOLD = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
     f" until then; step and rough ground of {HEIGHT:g} of the body's standing height; load: twice the weight; lost: one"
     " leg, from the front; reads: the legs are read; noise, late: with errors of 10 % of the step range, 20 ms late, in"
-    " whole steps; - where plans cannot be steered or read no legs, a step is too long for what happens, the walk ends"
-    " before the ground, or no walk is left that is stable, and has not fallen, until then"
+    " whole steps; - where plans cannot be steered or read no legs, a step is too long, or a walk too short, for what"
+    " happens, the walk ends before the ground, or no walk is left that is stable, and has not fallen, until then"
 )
 """What they are."""
 
