@@ -151,7 +151,11 @@ class Cell:
 
 
 def check_unchanged(cell: Cell, before: str, now: str) -> None:
-    """Refuse what a cell has given if something that it depends on has changed since, as its records tell."""
+    """Refuse what a cell has given if something that it depends on has changed since, as its records tell.
+
+    Raises:
+        InputError: it has.
+    """
     if not before or now == before:
         return
     if not now:
