@@ -2,10 +2,8 @@
 
 import io
 import math
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from threading import Lock
+from collections.abc import Mapping
+from numbers import Number
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,9 +23,6 @@ TAKEN_OF_VARIABLES = TAKEN | {
 }
 """The same of a variable; by most of them other numbers are read."""
 
-_ENCODING = Lock()
-"""Held while Dask's settings are other ones."""
-
 
 def encode(data: "xr.Dataset") -> bytes:
     """A dataset as it stands in its file, before the seal; the bits of all numbers stay.
@@ -35,6 +30,9 @@ def encode(data: "xr.Dataset") -> bytes:
     Raises:
         InputError: something that NetCDF cannot hold.
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     plain = data.drop_encoding()
     if odd := [name for name in (*plain.variables, *plain.dims) if not _is_text(name)]:
         raise InputError(f"NetCDF cannot hold this: the name {literal(repr(odd[0])):.80}; expected a text without NUL")
@@ -49,13 +47,15 @@ def encode(data: "xr.Dataset") -> bytes:
             )
         _check_attributes(str(name), variable.attrs, TAKEN_OF_VARIABLES)
         variable.encoding["_FillValue"] = None
+    content = io.BytesIO()
     try:
-        with _no_lock_of_dask():
-            return bytes(plain.to_netcdf(engine="h5netcdf"))
+        with h5netcdf.File(content, "w") as file:  # in to_netcdf xarray would ask Dask's cluster for a lock
+            plain.compute().dump_to_store(H5NetCDFStore(file))
     except (TypeError, ValueError, OverflowError, NotImplementedError, AttributeError) as error:
         raise InputError(
             f"NetCDF cannot hold this: {literal(str(error))}; expected arrays, numbers and texts"
         ) from None
+    return content.getvalue()
 
 
 def _check_attributes(of: str, attributes: Mapping[Any, Any], taken: set[str]) -> None:
@@ -63,7 +63,7 @@ def _check_attributes(of: str, attributes: Mapping[Any, Any], taken: set[str]) -
     for name, value in attributes.items():
         if name in taken:
             raise InputError(f"NetCDF would be read otherwise: {of} has the attribute {name}; expected none")
-        if not (_is_text(name) and (_is_text(value) or _are_texts(value) or _are_numbers(value))):
+        if not (name and _is_text(name) and (_is_text(value) or _are_texts(value) or _are_numbers(value))):
             told = f"{of} has the attribute {literal(f'{name} = {value!r}'):.80}"
             raise InputError(f"NetCDF cannot hold this: {told}; expected a text, a number, or a row of several")
 
@@ -79,23 +79,13 @@ def _are_texts(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     """Whether it is a number or a row of numbers; of one alone the number would be read."""
+    if not isinstance(value, Number | np.ndarray | list | tuple):
+        return False
     try:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
         return False
     return array.dtype.kind in "iufc" and (array.ndim == 0 or (array.ndim == 1 and array.size != 1))
-
-
-@contextmanager
-def _no_lock_of_dask() -> Iterator[None]:
-    """While the block runs, xarray asks no Dask cluster for a lock that this process works for: nobody else writes to
-    its memory, and the cluster does not know such a file."""
-    dask: Any = sys.modules.get("dask")
-    if not dask:
-        yield
-        return
-    with _ENCODING, dask.config.set(scheduler="synchronous"):
-        yield
 
 
 def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":
