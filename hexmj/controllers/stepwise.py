@@ -53,15 +53,18 @@ class StepwisePlan:
         steps = whole("steps", steps, 1)
         stride, shape = self.stride, self.starts.shape
         v = commanded_velocities(self.velocity, self.done, steps, stride, self.acceleration)
-        usual = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
         planned = {name: np.empty((steps, *shape), dtype=bool if name == "stance" else float) for name in PLANNED}
+        usual = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
+        for name, value in usual.items():
+            planned[name][:] = value
         for n, now in enumerate(v):
             step = self.step(now.copy())
             if not isinstance(step, Step):
                 raise InputError(f"a step gave {step!r:.80}; expected a Step")
-            given = usual | {name: value for name, value in vars(step).items() if value is not None}
             for name, values in planned.items():
-                values[n] = _checked(name, given.get(name), shape)
+                value = getattr(step, name)
+                if value is not None or name not in usual:
+                    values[n] = _checked(name, value, shape)
         self.done += steps
         time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
         return PlannedWalk(time, np.array(v), **planned, geometry=stride.geometry)
@@ -110,10 +113,10 @@ def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     kinds, expected = ("b", "booleans") if name == "stance" else ("fiu", "numbers")
     if values.dtype.kind not in kinds:
         raise InputError(f"{name} of a step is of type {values.dtype}; expected {expected}")
-    if np.ma.is_masked(value):
+    if type(value) is not np.ndarray and np.ma.is_masked(value):
         raise InputError(f"{name} of a step is masked in part; expected {expected} throughout")
     try:
-        return np.broadcast_to(values, shape)
+        return values if values.shape == shape else np.broadcast_to(values, shape)
     except ValueError:
         raise InputError(
             f"{name} of a step has the shape {values.shape}; expected (start, leg), {shape}, or what broadcasts to it"

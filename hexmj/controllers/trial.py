@@ -12,7 +12,7 @@ from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED, PlannedWalk, copied, joined
 
-N_STARTS, STEPS = 8, 600
+N_STARTS, STEPS = 16, 600
 """Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
 
 DIVIDED = (1, 7, 250, 342)
