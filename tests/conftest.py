@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from hexmj.user_code import opened_files
+from reader import computed  # noqa: F401
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, and so would what tests start
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,117 +1,15 @@
 """What a cell's code reads beyond what the cell's name tells is kept with it: with other files it is another cell."""
 
-import io
-import json
-import os
-import shutil
-import sqlite3
-import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import closing
 from pathlib import Path
 
-import h5netcdf
-import numpy as np
 import pytest
-import xarray as xr
 
 import hexmj
-from hexmj.errors import InputError
-from hexmj.storage.files import read_sealed
-from hexmj.sweeps import Cell, KeptValues, cells, run
+from hexmj.sweeps import Cell, cells, run
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
-from hexmj.user_code.opened_files import heard
-
-READER = """
-import functools, json, os, runpy, shutil, sqlite3, tempfile
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from glob import glob
-from pathlib import Path
-
-import hexmj
-import numpy as np
-import xarray as xr
-
-@functools.cache
-def remembered(path):
-    return float(Path(path).read_text())
-
-def tried(path):
-    try:
-        return float(Path(path).read_text())
-    except OSError:
-        return 0.0
-
-def made_or_read(memo):
-    try:
-        memo.open("x").close()
-    except FileExistsError:
-        pass
-    return float(memo.read_text())
-
-@dataclass(frozen=True)
-class Reader:
-    at: str = "one"
-    file: str = ""
-    def cell(self):
-        at = self.at
-        with open("calls", "a") as file:
-            file.write(".")
-        return xr.Dataset({{"gain": {gain}}})
-    def value(self, rows):
-        return rows[:, 0] * {gain}
-"""
-
-
-def write_all(gain: str, at: str = "one") -> None:
-    """Into every file of the folder."""
-    Path(at, "gain").write_text(gain)
-    Path(at, "gain.json").write_text(gain)
-    Path(at, "gain.py").write_text(f"GAIN = {gain}")
-    np.save(Path(at, "gain.npy"), float(gain))
-    np.array([float(gain)]).tofile(Path(at, "gain.bin"))
-    for name in ("gain.db", "a gain.db"):
-        Path(at, name).unlink(missing_ok=True)
-        with closing(sqlite3.connect(Path(at, name))) as data, data:
-            data.executescript(f"create table told (gain); insert into told values ({gain})")
-    hexmj.save(xr.Dataset({"gain": float(gain)}), Path(at, "gain.nc"))
-
-
-def another_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has opened nothing so far, and remembers nothing."""
-    monkeypatch.setattr(opened_files, "_AT_FIRST", {})
-    monkeypatch.setattr(opened_files, "_OPENED", {})
-    sys.modules.pop(importable("reader.py").__name__)
-
-
-def what_was_read() -> set[str]:
-    """Files that the one kept cell tells, from here."""
-    (kept,) = Path("kept").glob("*.nc")
-    with h5netcdf.File(io.BytesIO(read_sealed(kept) or b"")) as file:
-        return {os.path.relpath(one) for one in json.loads(str(file.attrs["read"]))} - {"."}
-
-
-@pytest.fixture
-def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[float, int]]:
-    """The gain that a cell reads in `at`, by a piece of Python, and how often cells were computed so far."""
-    monkeypatch.chdir(tmp_path)
-    for at, gain in (("one", "1.0"), ("two", "2.0")):
-        (tmp_path / at / "inner").mkdir(parents=True)
-        write_all(gain, at)
-
-    Path("leads").symlink_to("one/inner")
-
-    def computed(gain: str, file: str = "", **how: object) -> tuple[float, int]:
-        (tmp_path / "reader.py").write_text(READER.format(gain=gain))
-        cell = Cell("reader", importable("reader.py").Reader(file=file).cell, {})
-        data = run([cell], Path("kept"), **how)[0]  # pyright: ignore[reportArgumentType]
-        return float(data.gain), os.stat("calls").st_size
-
-    return computed
-
+from reader import READER, another_program, what_was_read, write_all
 
 READS = [
     ("gain.npy", 'float(np.load(f"{at}/gain" + ".npy"))'),
@@ -136,6 +34,7 @@ READS = [
     ("gain.json", "float(Path('one/gain.json').read_text())"),
     ("gain.nc", 'float(hexmj.load(f"{at}/gain.nc").gain)'),
     ("gain", 'remembered(f"{at}/gain")'),
+    ("gain", 'tried(os.path.join(p := os.path.dirname(hexmj.__file__), os.path.relpath(at, p), "gain"))'),
     ("gain", '[it := open(f"{at}/gain", "a+"), it.seek(0), float(it.read()), it.close()][2]'),
 ]
 
@@ -260,6 +159,8 @@ def test_a_file_that_is_missing_counts_too(
         "[hexmj.save(xr.Dataset({'a': 1.0}), 'a.nc'), 1.0][1]",
         "[it := open('log', 'a'), it.write('1.0'), it.close(), open('log', 'a').close(), 1.0][4]",
         "[(it := tempfile.mkstemp()), os.write(it[0], b'1.0'), os.close(it[0]), 1.0][3]",
+        "[it := tempfile.mkdtemp(), Path(it, 'a').write_text('1.0'), tried(Path(it, 'a')), shutil.rmtree(it)][2]",
+        "[it := tempfile.mkstemp()[1], Path(it).write_text('1.0'), tried(it), os.unlink(it)][2]",
         "len(list(Path(at).rglob('*.json')))",
         "len(hexmj.load_controller('graham').name) / 6",
         "sqlite3.connect(':memory:').execute('select 1.0').fetchone()[0]",
@@ -309,14 +210,6 @@ def test_a_file_that_a_text_names_counts_once_it_is_there_and_where_the_program_
     assert gain() == 3.0
 
 
-def test_what_workers_cells_write_is_no_other_data_in_the_next_sweep(
-    computed: Callable[..., tuple[float, int]],
-) -> None:
-    gain = "[Path('debug.json').write_text('1.0'), 1.0][1]"
-    with ProcessPoolExecutor(1) as pool:
-        assert [computed(gain, executor=pool) for _ in range(2)] == 2 * [(1.0, 1)]
-
-
 def test_a_folder_that_a_cell_makes_and_removes_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
     gain = "[it := tempfile.mkdtemp(), os.makedirs(it + '/within/it'), shutil.rmtree(it), 1.0][3]"
     assert [computed(gain), computed(gain)] == 2 * [(1.0, 1)]
@@ -335,16 +228,6 @@ def test_a_file_that_a_field_names_by_a_link_or_sqlite_reads_is_remembered(
     Path("link").symlink_to("two/gain")
     with pytest.warns(UserWarning, match="link has changed since it was opened first"):
         computed("remembered('link')", "link")
-
-
-def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[..., tuple[float, int]]) -> None:
-    computed("1.0")
-    Path("reader.py").write_text(READER.format(gain="[float(Path(at, 'gain').read_text()) for _ in range(200)][0]"))
-    reader = importable("reader.py").Reader
-    cells = [Cell(at, reader(at, f"{at}/gain").cell, {}) for at in ("one", "two")]
-    with ThreadPoolExecutor(2) as threads:
-        assert [float(data.gain) for data in run(cells, Path("both"), executor=threads)] == [1.0, 2.0]
-    assert len(list(Path("both").glob("*.nc"))) == 2
 
 
 def test_what_changes_as_it_is_looked_at_is_not_kept(
@@ -366,13 +249,6 @@ def test_what_is_no_file_is_not_kept_or_believed(computed: Callable[..., tuple[f
         assert computed(gain) == (1.0, 2)
 
 
-def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callable[..., tuple[float, int]]) -> None:
-    for calls in (1, 1):
-        with heard() as opened:
-            assert computed("tried('new')") == (0.0, calls)
-        assert os.path.abspath("new") in opened
-
-
 def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -386,56 +262,12 @@ def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
     assert computed(gain) == (1.0, 3)
 
 
-def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:
-    gain = 'remembered(at + "/gain")'
-    with ProcessPoolExecutor(1) as pool:
-        assert [computed(gain, executor=pool), computed(gain)] == 2 * [(1.0, 1)]
-        Path("one/gain").write_text("7.0")
-        with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
-            assert computed(gain, executor=pool) == (1.0, 2)
-
-
-def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
-    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
+    computed: Callable[..., tuple[float, int]],
 ) -> None:
-    assert computed('remembered(at + "/gain")') == (1.0, 1)
-    monkeypatch.setattr(Cell, "read", lambda *_: ({os.path.abspath("one/gain"): "of another machine"}, ""))
-    with (
-        ThreadPoolExecutor(1) as pool,
-        pytest.raises(InputError, match=r"worker has another .*one.gain than the sender"),
-    ):
-        computed('remembered(at + "/gain") + 1.0', executor=pool)
-
-
-def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[..., tuple[float, int]]) -> None:
-    computed("1.0", "one/gain")
-    Path("reader.py").write_text(READER.format(gain="remembered('one/gain')"))
-    reader = importable("reader.py").Reader()
-    KeptValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
-    shutil.rmtree("kept")
-    run([Cell("reader", reader.cell, {})], Path("kept"))
-    assert what_was_read() == {"one/gain"}
-
-
-def test_values_are_those_of_the_files_that_were_read(
-    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rows = np.ones((2, 1))
-    computed("1.0")
-    Path("reader.py").write_text(READER.format(gain="remembered(self.at + '/gain')"))
-
-    def values(gain: float, known: int) -> None:
-        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
-        assert (found.known, *found(rows)) == (known, gain, gain)
-
-    values(1.0, known=0)
-    values(1.0, known=1)
+    read = dict(READS)["gain.db"].replace("{at}", "one")
+    Path("reader.py").write_text(f"{READER.format(gain='GAIN')}\nGAIN = {read}\n")
+    reader = importable("reader.py").Reader
     write_all("7.0")
-    with pytest.warns(UserWarning, match="^values is not kept: .*one.gain has changed since"):
-        values(1.0, known=0)
-    another_program(monkeypatch)
-    values(7.0, known=0)
-    values(7.0, known=1)
-    write_all("1.0")
-    another_program(monkeypatch)
-    values(1.0, known=1)
+    with pytest.warns(UserWarning, match="one.gain.db has changed since it was opened first"):
+        assert float(run([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0

@@ -4,8 +4,8 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from inspect import signature
 from pathlib import Path
@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, files_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, heard_too, seen, untold
+from hexmj.user_code.opened_files import changed, opened_by, read_too, seen, telling
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -74,27 +74,30 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def read(self, opened: set[str]) -> tuple[dict[str, str], str]:
-        """What its code may have read that its record does not tell, file -> digest, empty of one that is not there;
-        and why it cannot be kept, in a sentence, else empty.
+    def telling(self) -> AbstractContextManager[None]:
+        """While it is computed: what its settings name is none of what its code reads beyond them."""
+        return telling(self._told_files())
 
-        Args:
-            opened: what was opened while it was computed.
-        """
+    def opened(self) -> set[str]:
+        """What its code has opened so far in this program, and may remember."""
+        return opened_by(files_of_users(self._modules())[0])
+
+    def knows(self, opened: set[str]) -> None:
+        """Note what its code has opened in the program that has sent it."""
+        read_too(opened, files_of_users(self._modules())[0])
+
+    def read(self) -> tuple[dict[str, str], str]:
+        """What its code may have read that its record does not tell, file -> digest, empty of one that is not there;
+        and why it cannot be kept, in a sentence, else empty."""
         try:
             sources, unheard, others = files_of_users(self._modules())
-        except InputError:  # it has no source, so that it is named by nothing
-            return {}, ""
-        if not sources:
-            return {}, ""
-        told = self._told_files()
-        files = untold(opened | unheard, sources, told)
-        if ran := sorted(file for file in files if file.endswith(".py")):
-            return {}, (
-                f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
-                " expected an import, or a field that names it"
-            )
-        try:
+            told = self._told_files()
+            files = _beyond(opened_by(sources) | unheard, {*told, *sources})
+            if ran := sorted(file for file in files if file.endswith(".py")):
+                return {}, (
+                    f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
+                    " expected an import, or a field that names it"
+                )
             read = dict.fromkeys(_beyond(others, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
@@ -109,14 +112,14 @@ class Cell:
         """Whether its code would read today what it has read, or may remember from earlier in this program."""
         try:
             same = all(holds(*one) for one in read.items())
+            _, *named = files_of_users(self._modules())
         except InputError:
             return False
-        _, *named = files_of_users(self._modules())
         new = set[str]().union(*named) - read.keys()
         opened = {file for file, digest in read.items() if digest != _THERE and file != _HERE}
         believed = same and not changed(opened) and not (new and _beyond(new, self._told_files()))
         if believed:
-            heard_too(opened)
+            read_too(opened)
         return believed
 
     def _told_files(self) -> set[Path]:
@@ -166,10 +169,26 @@ def check_unchanged(cell: Cell, before: str, now: str) -> None:
     )
 
 
-def _beyond(files: set[str], told: set[Path]) -> set[str]:
-    """Some files without those that settings tell."""
+def check_alike(name: str, before: dict[str, str], read: Mapping[str, str]) -> None:
+    """Refuse a result of which one part has read a file as it was, and another one as it is.
+
+    Args:
+        name: of the part that has read last.
+        before: what the others have read, see `Cell.read`; the last one's is added.
+        read: by the last one.
+
+    Raises:
+        InputError: that.
+    """
+    for file, held in read.items():
+        if held != _THERE and before.setdefault(file, held) != held:
+            raise InputError(f"{file} has changed before {name} read it, and after others did; start again")
+
+
+def _beyond(files: set[str], told: Iterable[str | Path]) -> set[str]:
+    """Some files without those that are told, and without folders."""
     known = {os.path.realpath(file) for file in told}
-    return {file for file in files if os.path.realpath(file) not in known}
+    return {file for file in files if os.path.realpath(file) not in known and not os.path.isdir(file)}
 
 
 def holds(file: str, digest: str) -> bool:

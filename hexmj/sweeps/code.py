@@ -26,7 +26,7 @@ from hexmj.storage.mjcf import parts
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
 from hexmj.user_code.opened_files import spelled
-from hexmj.user_code.parsing import files_named, parsed, texts
+from hexmj.user_code.parsing import files_named, folders_named, parsed, texts
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -39,15 +39,17 @@ a user's module imports it."""
 _DATA_OF_OURS = ".toml", ".xml"
 """Ends of the names of data files."""
 
-_MODELS = ".xml", ".mjcf", ".mjb", ".urdf"
-"""The same of what MuJoCo opens where nobody hears it, in small letters or capitals."""
+_MODELS = ".xml", ".mjcf", ".urdf"
+"""The same of models that MuJoCo opens with all their parts, in small letters or capitals."""
 
-_DATA = (
-    *_MODELS,
-    *(".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt"),
-    *(".npy", ".npz", ".pt", ".pth", ".pkl"),
-)
+_UNHEARD = *_MODELS, ".mjb", ".pt", ".pth", ".onnx", ".safetensors", ".h5", ".hdf5", ".parquet"
+"""The same of all that libraries may open by themselves, where nobody hears it."""
+
+_DATA = *_UNHEARD, ".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt", ".npy", ".npz", ".pkl"
 """The same of all data of a user's own."""
+
+_DEEP = 3
+"""So many folders in one another are followed that texts of a user's own name."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -81,7 +83,7 @@ class _Module:
     data: list[Path]
     """Of this package, that its texts name."""
     texts: list[str]
-    """Of a user's own, some of which name files of data."""
+    """Of a user's own, some of which name files of data; none if no one does."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -121,21 +123,35 @@ def code(modules: frozenset[str]) -> Code:
 
 
 def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str], set[str]]:
-    """Of the user's own modules that some need their sources, and the data that their texts name, beside them or in the
-    current folder, as far as they are there: first what may be opened unheard, with its parts, then the rest.
+    """Of the user's own modules that some need their sources, and the data that their texts name, as far as they are
+    there: first what may be opened unheard, with its parts, then the rest.
+
+    Files are looked for beside each module, a folder above, in the current one, and in folders there that texts name.
 
     Raises:
-        InputError: a module has no source.
+        InputError: a module has no source; a file cannot be read.
     """
-    sources, unheard, others = set[str](), set[str](), set[str]()
-    for file, named in _needed(modules).theirs:
-        sources.add(os.path.abspath(file))
-        for path in files_named(named, (file.parent, Path.cwd()), _DATA) if named else ():
-            if path.name.lower().endswith(_MODELS) or str(file) in sources_as_run.BEFORE:
-                unheard.update(map(spelled, parts(path)))
-            else:
-                others.add(spelled(path))
-    return sources, unheard, others - unheard
+    theirs = _needed(modules).theirs
+    sources = {os.path.abspath(file) for file, _ in theirs}
+    named = [text for _, one in theirs for text in one]
+    if not named:
+        return sources, set(), set()
+    before = [text for file, one in theirs if str(file) in sources_as_run.BEFORE for text in one]
+    folders = folders_named(named, [Path.cwd(), *(one for file, _ in theirs for one in file.parents[:2])], _DEEP)
+    unheard = {*files_named(named, folders, _UNHEARD), *files_named(before, folders, _DATA)}
+    others = {*files_named(named, folders, _DATA)} - unheard
+    whole = {spelled(part) for path in unheard for part in _parts(path)}
+    return sources, whole, {spelled(path) for path in others} - whole
+
+
+def _parts(path: Path) -> list[Path]:
+    """A file with all that MuJoCo opens with it; none once it is gone."""
+    try:
+        return parts(path) if path.name.lower().endswith(_MODELS) else [path]
+    except InputError:
+        if path.exists():
+            raise
+        return []
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
@@ -252,7 +268,7 @@ def _read(name: str, file: Path) -> _Module:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
     named = texts(tree) if any(one.encode() in held.lower() for one in _DATA) else []
-    data = files_named(named, (file.parent, _ASSETS), _DATA_OF_OURS) if ours else []
+    data = files_named(named, folders_named(named, (file.parent, _ASSETS)), _DATA_OF_OURS) if ours else []
     return _Module(digest(held), data, [] if ours else named, of_package, imports, bound)
 
 

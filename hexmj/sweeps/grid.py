@@ -18,10 +18,10 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds
+from hexmj.sweeps.cells import Cell, check_alike, check_unchanged, difference, holds
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
-from hexmj.user_code.opened_files import heard, remembered
+from hexmj.user_code.opened_files import read_too, remembered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,7 +124,9 @@ def finish(
         made = ((i, _made(*task, threads=threads, progress=partial(tell, i))) for i, task in enumerate(tasks))
     else:
         made = _elsewhere(executor, tasks, folder, threads or 1)
-    for i, (data, _, not_kept) in made:
+    before: dict[str, str] = {}
+    for i, (data, read, not_kept) in made:
+        check_alike(cells[i].name, before, read)
         if not_kept and not warned:
             warned = True
             warn(not_kept, stacklevel=2)
@@ -153,32 +155,34 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     return whole
 
 
-def _kept(cell: Cell, record: str, path: Path) -> "xr.Dataset | None":
+def _kept(cell: Cell, record: str, path: Path) -> "Made | None":
     """What is kept of a cell, if its code would read today what it has read."""
     found = find(path, record)
-    return found[0] if found and cell.would_read(found[1]) else None
+    return (*found, "") if found and cell.would_read(found[1]) else None
 
 
 def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
-    if path and (kept := _kept(cell, record, path)) is not None:
-        return kept, {}, ""
+    if path and (kept := _kept(cell, record, path)):
+        return kept
     before = record if path else cell.settings_now()
-    with heard() as opened:
+    with cell.telling():
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    read, not_kept = cell.read(opened) if path or opened else ({}, "")
+    read, not_kept = cell.read() if record else ({}, "")
     if path and not not_kept:
         return write(path, record, read, data), read, ""
     return data, read, not_kept if path else ""
 
 
-def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
+def _made_by_a_worker(
+    pickled: bytes, record: str, path: Path | None, threads: int, opened: set[str], mark: Path | None
+) -> "Made":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
-    long as somebody waits."""
+    long as somebody waits.  What its code has opened where it was sent from it may have brought along."""
     here = f"a worker on {socket.gethostname()}"
     try:
         cell = pickle.loads(pickled)
@@ -194,6 +198,7 @@ def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: i
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
+    cell.knows(opened)
     return _made(cell, record, path, threads=threads)
 
 
@@ -203,10 +208,12 @@ def _elsewhere(
     """What is kept, and then what an executor's workers make of the rest."""
     parcels = dict[int, _Parcel]()
     for i, (cell, record, path) in enumerate(tasks):
-        if path and (kept := _kept(cell, record, path)) is not None:
-            yield i, (kept, {}, "")
+        if path and (kept := _kept(cell, record, path)):
+            yield i, kept
         else:
-            parcels[i] = partial(_made_by_a_worker, _pickled(cell), record or cell.record(), path, threads)
+            parcels[i] = partial(
+                _made_by_a_worker, _pickled(cell), record or cell.record(), path, threads, cell.opened()
+            )
     yield from _by_others(executor, parcels, folder)
 
 
@@ -227,6 +234,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                     raise InputError(
                         f"a worker has another {other[0]} than the sender; start it again, where it has the same"
                     )
+                read_too(read)
                 yield futures[future], (data, read, not_kept)
         except BrokenExecutor:
             raise InputError(

@@ -13,8 +13,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
-from hexmj.sweeps.cells import Cell, check_unchanged
-from hexmj.user_code.opened_files import heard
+from hexmj.sweeps.cells import Cell, check_alike, check_unchanged
 
 
 class KeptValues:
@@ -39,6 +38,7 @@ class KeptValues:
         """
         self._cell, self._threads = cell, threads
         self._values: dict[bytes, float] = {}
+        self._read: dict[str, str] = {}
         self._path, self._seed = None, 0
         if folder:
             self._record = record = cell.record()
@@ -58,11 +58,12 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            with heard() as opened:
+            with self._cell.telling():
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
-            read, not_kept = self._cell.read(opened) if self._path or opened else ({}, "")
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
+                read, not_kept = self._cell.read()
+                check_alike(self._cell.name, self._read, read)
                 if not_kept:
                     warn(not_kept, stacklevel=2)
                     self._path = None
@@ -93,6 +94,7 @@ class KeptValues:
                 whole = f"{line}\n" == self._line(key, number, read) and math.isfinite(number)
                 if whole and current(told or "{}"):
                     self._values[key] = number
+                    self._read |= read
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 

@@ -21,12 +21,15 @@ from hexmj.user_code.sources_as_run import is_users
 _PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
 
+_MAKES = "tempfile.mkdtemp", "tempfile.mkstemp"
+"""The same of what makes a file, or a folder for some, to be used and thrown away."""
+
 _URI = re.compile(r"^file:(?://[^/?]*)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
 
 _NO_DATA = re.compile(
     r"[/\\](__pycache__|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv))[/\\]"
-    r"|\.(egg|dist)-info[/\\]|[/\\]\.part-|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
+    r"|\.(egg|dist)-info[/\\]|[/\\](\.part-|torchinductor_)|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
 )
 """In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
@@ -46,52 +49,43 @@ _SCRIPTS = "__main__", "__mp_main__"
 """Names of a script where it runs, and in the workers that it starts."""
 
 _OPENED: dict[str, set[str]] = {}
-"""Source -> what was opened or ran while it was imported or called, if no cell told it."""
+"""Source, or `_ANYBODY` -> what was opened or ran while a function or module of it was called, if no cell told it."""
 
-_COMPUTING: dict[int, set[str]] = {}
-"""Thread that computes a cell -> what was opened or ran meanwhile."""
+_ANYBODY = ""
+"""Stands for a source where a thread opens something of which no function is a user's."""
+
+_TOLD: dict[int, set[str]] = {}
+"""Thread that computes a cell -> files that the cell tells by itself, each as it really is."""
+
+_TEMPORARY = set[str]()
+"""What cells have had made as they were computed, to be used and thrown away."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size and times as anybody opened it first, but for a sweep that looks what it holds."""
 
 
 @contextmanager
-def heard() -> Iterator[set[str]]:
-    """What this thread, or one of nobody's, opens or runs meanwhile."""
+def telling(told: Iterable[Path]) -> Iterator[None]:
+    """While this thread computes a cell that tells some files by itself."""
     mine = threading.get_ident()
-    outer, opened = _COMPUTING.get(mine), set[str]()
-    _COMPUTING[mine] = opened
+    outer, _TOLD[mine] = _TOLD.get(mine), {os.path.realpath(file) for file in told}
     try:
-        yield opened
+        yield
     finally:
-        del _COMPUTING[mine]
+        del _TOLD[mine]
         if outer is not None:
-            outer |= opened
-            _COMPUTING[mine] = outer
+            _TOLD[mine] = outer
 
 
-def untold(opened: set[str], sources: set[str], told: Iterable[Path]) -> set[str]:
-    """Files that some code has opened, or found and run, beyond its sources and what its cell tells.
-
-    Args:
-        opened: while the cell was computed; what of it nobody tells the code may remember for the next.
-        sources: its files.
-        told: other files that the cell's name tells.
-    """
-    known = {os.path.realpath(file) for file in (*sources, *told)}
-
-    def beyond(files: set[str]) -> set[str]:
-        return {file for file in files if os.path.realpath(file) not in known and not os.path.isdir(file)}
-
-    found, earlier = beyond(opened), beyond(set[str]().union(*(_OPENED.get(file, ()) for file in sources)))
-    for file in sources:
-        _OPENED.setdefault(file, set()).update(found)
-    return found | earlier
+def opened_by(sources: set[str]) -> set[str]:
+    """What the code of some sources, if there are any, has opened, or found and run, and may remember."""
+    return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
-def heard_too(files: Iterable[str]) -> None:
-    """Note for the cell that this thread computes what another one has read that it takes as it is kept."""
-    _COMPUTING.get(threading.get_ident(), set()).update(files)
+def read_too(files: Iterable[str], sources: Iterable[str] = ()) -> None:
+    """Note for whose code is being called, and for some sources, what another program has read that they may know."""
+    for one in {*_callers(sys._getframe(1)), *sources}:
+        _OPENED.setdefault(one, set()).update(files)
 
 
 def seen(files: Iterable[str]) -> None:
@@ -118,6 +112,8 @@ def spelled(file: str | Path) -> str:
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if event in _MAKES and threading.get_ident() in _TOLD:
+        _TEMPORARY.add(os.path.realpath(arguments[0]))
     if event not in _PATH:
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
@@ -135,39 +131,52 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
         reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
-        if reads and _is_data(file):
-            makes = event == "sqlite3.connect" and not (threading.get_ident() in _COMPUTING and os.path.exists(file))
-            _note(file, not makes)
+        if reads and _is_data(os.path.realpath(file)):
+            _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
 
-def _note(file: str, read: bool) -> None:
-    by, opener, main = _COMPUTING.get(threading.get_ident()), sys._getframe(2), threading.main_thread()
-    of_a_sweep = _is_of_a_sweep(opener)
-    if read and not of_a_sweep:
-        for one in (file, os.path.realpath(file)):
-            _AT_FIRST.setdefault(one, _stamp(file))
-    if by is not None:
-        by.add(file)
+def _note(file: str, opener: FrameType, read: bool) -> None:
+    if _is_of_a_sweep(opener):
         return
-    found = _openers(opener, file)
-    if not (found or _COMPUTING or threading.current_thread() is main):
-        found = _openers(sys._current_frames().get(main.ident or 0), file)
-    for one in found:
+    really = os.path.realpath(file)
+    if read:
+        for one in (file, really):
+            _AT_FIRST.setdefault(one, _stamp(file))
+    if really in _TOLD.get(threading.get_ident(), ()):
+        return
+    if not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
+        return
+    callers = _callers(opener, file)
+    if not callers and threading.current_thread() is not threading.main_thread():
+        callers.add(_ANYBODY)
+    for one in callers:
         _OPENED.setdefault(one, set()).add(file)
-    if not of_a_sweep:
-        for opened in list(_COMPUTING.values()):  # whose thread it is nobody knows
-            opened.add(file)
 
 
 def _is_of_a_sweep(opener: FrameType) -> bool:
     """Whether a sweep opens a file for itself, to see what it holds."""
     for frame, _ in walk_stack(opener):
         by = frame.f_code.co_filename
-        if by.startswith(_SWEEPS):
-            return True
-        if not by.startswith(("<", _OURS)) and is_users(os.path.abspath(by)):
-            return False
+        if by.startswith(_SWEEPS) or _is_code_of_users(by):
+            return by.startswith(_SWEEPS)
     return False
+
+
+def _callers(frame: FrameType, file: str = "") -> set[str]:
+    """The user's sources of which functions or modules are being called; no script for a `.py` that it has this package
+    load, as a controller."""
+    found, ours = set[str](), False
+    for one, _ in walk_stack(frame):
+        by = one.f_code.co_filename
+        ours |= by.startswith(_OURS)
+        loads = ours and file.endswith(".py") and one.f_globals.get("__name__") in _SCRIPTS
+        if _is_code_of_users(by) and not loads:
+            found.add(os.path.abspath(by))
+    return found
+
+
+def _is_code_of_users(by: str) -> bool:
+    return not by.startswith("<") and is_users(os.path.abspath(by))
 
 
 def _stamp(file: str) -> tuple[int, ...]:
@@ -191,27 +200,6 @@ def _writes(file: str, flags: int) -> bool:
     """Whether a file is opened to be written or made, not to be read."""
     only = flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY
     return only or bool(flags & os.O_TRUNC) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
-
-
-def _openers(frame: FrameType | None, file: str) -> set[str]:
-    """The user's function that opens a file, and his module that runs at the moment unless this package has called it.
-    Where this package opens it for them, that module alone, and no script for the source of a controller that it loads.
-    """
-    found, ours = set[str](), False
-    while frame:
-        by = frame.f_code.co_filename
-        if by.startswith(_OURS):
-            if found:
-                return found
-            ours = True
-        elif not by.startswith("<") and is_users(os.path.abspath(by)):
-            if frame.f_code.co_name == "<module>":
-                loads = ours and frame.f_globals.get("__name__") in _SCRIPTS and file.endswith(".py")
-                return set() if loads else {os.path.abspath(by), *found}
-            if not (ours or found):
-                found.add(os.path.abspath(by))
-        frame = frame.f_back
-    return found
 
 
 sys.addaudithook(_hear)

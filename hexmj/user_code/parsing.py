@@ -10,6 +10,9 @@ from threading import Lock
 from types import CodeType
 from warnings import catch_warnings, simplefilter
 
+LONGEST = 1000
+"""More letters no path has that a source names."""
+
 _ONE = Lock()
 
 
@@ -37,19 +40,30 @@ def _alone() -> Iterator[None]:
 
 
 def texts(tree: ast.AST) -> list[str]:
-    """The texts of a source, each also without the slash it begins with, as in ``f"{folder}/leg.xml"``."""
+    """The texts of a source that may be names, each also without the slash it begins with, as ``f"{folder}/leg.xml"``
+    has one."""
     constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
-    return list(dict.fromkeys(text for one in constants for text in (one, one.lstrip("/"))))
+    names = [one for one in constants if 0 < len(one) < LONGEST and one.isprintable()]
+    return list(dict.fromkeys(text for one in names for text in (one, one.lstrip("/")) if text))
 
 
 def files_named(texts: Sequence[str], folders: Sequence[Path], endings: tuple[str, ...]) -> list[Path]:
     """Files that are there, and that texts name.
 
     Args:
-        texts: of a source.
-        folders: where they are looked for, and in folders there that texts name.
+        texts: of a source, or of several.
+        folders: where they are looked for; see `folders_named` for those that texts name.
         endings: of the names, in small letters.
     """
     names = [text for text in texts if text.lower().endswith(endings)]
-    within = [folder / text for folder in folders for text in texts if isdir(folder / text)] if names else []
-    return sorted({one for folder in (*folders, *within) for name in names if isfile(one := folder / name)})
+    return sorted({one for folder in folders for name in names if isfile(one := folder / name)})
+
+
+def folders_named(texts: Sequence[str], folders: Sequence[Path], deep: int = 1) -> list[Path]:
+    """Some folders, and those that texts name in them; as often as asked also what they name in these."""
+    found = {folder: None for folder in folders}
+    new = list(found)
+    for _ in range(deep):
+        new = [one for folder in new for text in texts if isdir(one := folder / text) and one not in found]
+        found |= dict.fromkeys(new)
+    return list(found)

@@ -1,0 +1,181 @@
+"""What one cell's code has read others may know: of the same program, of workers, of values that a search keeps."""
+
+import os
+import shutil
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexmj.errors import InputError
+from hexmj.sweeps import Cell, KeptValues, finish, run
+from hexmj.user_code import opened_files
+from hexmj.user_code.loaded import importable
+from reader import READER, another_program, what_was_read, write_all
+
+
+def test_what_a_cell_that_fails_has_read_is_remembered(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = "remembered('one/gain') / (self.file != 'fails')"
+    with pytest.raises(ZeroDivisionError):
+        computed(gain, "fails")
+    assert computed(gain) == (1.0, 2)
+    assert what_was_read() == {"one/gain"}
+
+
+def test_what_a_cell_has_read_that_goes_on_in_another_thread_is_remembered(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    computed("1.0")
+    Path("reader.py").write_text(
+        READER.format(gain="[remembered('one/gain'), __import__('time').sleep(at == 'slow')][0]")
+    )
+    reader = importable("reader.py").Reader
+    with ThreadPoolExecutor(2) as threads:
+        run([Cell(at, reader(at).cell, {}) for at in ("slow", "quick")], Path("kept"), executor=threads)
+    assert what_was_read("slow*") == what_was_read("quick*") == {"one/gain"}
+
+
+def test_what_the_main_thread_opens_meanwhile_is_its_own(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("1.0")
+    Path("reader.py").write_text(READER.format(gain="[tried('one/gain'), __import__('time').sleep(0.2)][0]"))
+    reader = importable("reader.py").Reader
+    with ThreadPoolExecutor(1) as threads:
+        for _ in finish([Cell(at, reader(at).cell, {}) for at in "ab"], Path("kept"), executor=threads):
+            Path("two/gain").read_text()
+            time.sleep(0.1)
+    assert what_was_read("b-*") == {"one/gain"}
+
+
+def test_no_result_is_of_a_file_as_it_was_and_as_it_is(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("reader.py").write_text(READER.format(gain="float(Path('one/gain').read_text())"))
+
+    def cells() -> list[Cell]:
+        return [Cell(at, importable("reader.py").Reader(at).cell, {}) for at in ("first", "second")]
+
+    run(cells()[:1], Path("kept"))
+    another_program(monkeypatch)
+    found = finish(cells(), Path("kept"))
+    assert float(next(found)[1].gain) == 1.0
+    write_all("7.0")
+    with pytest.raises(InputError, match="gain has changed before second read it, and after others did; start again"):
+        next(found)
+    another_program(monkeypatch)
+    assert [float(data.gain) for data in run(cells(), Path("kept"))] == [7.0, 7.0]
+
+
+def test_a_cell_that_sweeps_by_workers_has_read_what_they_have(computed: Callable[..., tuple[float, int]]) -> None:
+    pool = "__import__('concurrent.futures').futures.ProcessPoolExecutor(1)"
+    sweep = f"hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {{}})], executor={pool})"
+    assert computed(f"{sweep}[0].gain.item()") == (1.0, 1)
+    assert what_was_read() == {"one/gain"}
+
+
+def test_what_a_cell_brings_along_to_a_worker_counts_there(computed: Callable[..., tuple[float, int]]) -> None:
+    with ProcessPoolExecutor(1) as pool:
+        pool.submit(os.getpid).result()
+        Path("reader.py").write_text(READER.format(gain="self.known"))
+        reader = importable("reader.py").Reader()
+        assert reader.known == 1.0
+        run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+    assert what_was_read() == {"one/gain"}
+
+
+def test_what_workers_cells_write_is_no_other_data_in_the_next_sweep(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    gain = "[Path('debug.json').write_text('1.0'), 1.0][1]"
+    with ProcessPoolExecutor(1) as pool:
+        assert [computed(gain, executor=pool) for _ in range(2)] == 2 * [(1.0, 1)]
+
+
+def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("1.0")
+    Path("reader.py").write_text(READER.format(gain="[float(Path(at, 'gain').read_text()) for _ in range(200)][0]"))
+    reader = importable("reader.py").Reader
+    cells = [Cell(at, reader(at, f"{at}/gain").cell, {}) for at in ("one", "two")]
+    with ThreadPoolExecutor(2) as threads:
+        assert [float(data.gain) for data in run(cells, Path("both"), executor=threads)] == [1.0, 2.0]
+    assert len(list(Path("both").glob("*.nc"))) == 2
+
+
+def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callable[..., tuple[float, int]]) -> None:
+    for calls in (1, 1):
+        opened_files._OPENED.clear()
+        assert computed("tried('new')") == (0.0, calls)
+        assert os.path.abspath("new") in opened_files.opened_by([__file__])
+
+
+def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:
+    gain = 'remembered(at + "/gain")'
+    with ProcessPoolExecutor(1) as pool:
+        assert [computed(gain, executor=pool), computed(gain)] == 2 * [(1.0, 1)]
+        Path("one/gain").write_text("7.0")
+        with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
+            assert computed(gain, executor=pool) == (1.0, 2)
+
+
+def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert computed('remembered(at + "/gain")') == (1.0, 1)
+    monkeypatch.setattr(Cell, "read", lambda *_: ({os.path.abspath("one/gain"): "of another machine"}, ""))
+    with (
+        ThreadPoolExecutor(1) as pool,
+        pytest.raises(InputError, match=r"worker has another .*one.gain than the sender"),
+    ):
+        computed('remembered(at + "/gain") + 1.0', executor=pool)
+
+
+def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[..., tuple[float, int]]) -> None:
+    computed("1.0", "one/gain")
+    Path("reader.py").write_text(READER.format(gain="remembered('one/gain')"))
+    reader = importable("reader.py").Reader()
+    KeptValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
+    shutil.rmtree("kept")
+    run([Cell("reader", reader.cell, {})], Path("kept"))
+    assert what_was_read() == {"one/gain"}
+
+
+def test_values_are_those_of_the_files_that_were_read(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = np.ones((2, 1))
+    computed("1.0")
+    Path("reader.py").write_text(READER.format(gain="remembered(self.at + '/gain')"))
+
+    def values(gain: float, known: int) -> None:
+        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+        assert (found.known, *found(rows)) == (known, gain, gain)
+
+    values(1.0, known=0)
+    values(1.0, known=1)
+    write_all("7.0")
+    with pytest.warns(UserWarning, match="^values is not kept: .*one.gain has changed since"):
+        values(1.0, known=0)
+    another_program(monkeypatch)
+    values(7.0, known=0)
+    values(7.0, known=1)
+    write_all("1.0")
+    another_program(monkeypatch)
+    values(1.0, known=1)
+
+
+def test_no_values_are_of_a_file_as_it_was_and_as_it_is(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("reader.py").write_text(READER.format(gain="float(Path('one/gain').read_text())"))
+
+    def values() -> KeptValues:
+        return KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+
+    values()(np.ones((1, 1)))
+    another_program(monkeypatch)
+    found = values()
+    write_all("7.0")
+    with pytest.raises(InputError, match="gain has changed before values read it, and after others did"):
+        found(np.zeros((1, 1)))
