@@ -107,7 +107,7 @@ def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callab
     for calls in (1, 1):
         opened_files._OPENED.clear()
         assert computed("tried('new')") == (0.0, calls)
-        assert os.path.abspath("new") in opened_files.opened_by([__file__])
+        assert os.path.abspath("new") in opened_files.opened_by({__file__})
 
 
 def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:

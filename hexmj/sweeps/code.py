@@ -83,7 +83,7 @@ class _Module:
     data: list[Path]
     """Of this package, that its texts name."""
     texts: list[str]
-    """Of a user's own, some of which name files of data; none if no one does."""
+    """Of a user's own, some of which may name files of data or their folders."""
     package: bool
     """It is an `__init__`."""
     imports: tuple[_Wanted, ...]
@@ -133,8 +133,8 @@ def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str], set[str
     """
     theirs = _needed(modules).theirs
     sources = {os.path.abspath(file) for file, _ in theirs}
-    named = [text for _, one in theirs for text in one]
-    if not named:
+    named = [*dict.fromkeys(text for _, one in theirs for text in one)]
+    if not any(text.lower().endswith(_DATA) for text in named):
         return sources, set(), set()
     before = [text for file, one in theirs if str(file) in sources_as_run.BEFORE for text in one]
     folders = folders_named(named, [Path.cwd(), *(one for file, _ in theirs for one in file.parents[:2])], _DEEP)
@@ -267,7 +267,7 @@ def _read(name: str, file: Path) -> _Module:
     if not ours:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
-    named = texts(tree) if any(one.encode() in held.lower() for one in _DATA) else []
+    named = texts(tree)
     data = files_named(named, folders_named(named, (file.parent, _ASSETS)), _DATA_OF_OURS) if ours else []
     return _Module(digest(held), data, [] if ours else named, of_package, imports, bound)
 

@@ -4,7 +4,7 @@ that of one.  Nothing is told of their warnings, which whoever imports them hear
 import ast
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from os.path import isdir, isfile
+from os.path import isdir, isfile, join
 from pathlib import Path
 from threading import Lock
 from types import CodeType
@@ -56,7 +56,7 @@ def files_named(texts: Sequence[str], folders: Sequence[Path], endings: tuple[st
         endings: of the names, in small letters.
     """
     names = [text for text in texts if text.lower().endswith(endings)]
-    return sorted({one for folder in folders for name in names if isfile(one := folder / name)})
+    return sorted({Path(one) for folder in folders for name in names if isfile(one := join(folder, name))})
 
 
 def folders_named(texts: Sequence[str], folders: Sequence[Path], deep: int = 1) -> list[Path]:
@@ -64,6 +64,7 @@ def folders_named(texts: Sequence[str], folders: Sequence[Path], deep: int = 1) 
     found = {folder: None for folder in folders}
     new = list(found)
     for _ in range(deep):
-        new = [one for folder in new for text in texts if isdir(one := folder / text) and one not in found]
+        inner = [Path(one) for folder in new for text in texts if isdir(one := join(folder, text))]
+        new = [one for one in inner if one not in found]
         found |= dict.fromkeys(new)
     return list(found)
