@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,12 @@ def done_with(words: tuple[str, ...], **around: str) -> subprocess.CompletedProc
     return done
 
 
+@cache
+def flss_in(columns: str) -> str:
+    """What `flss` prints in a terminal of so many columns."""
+    return done_with(("flss", "--velocities", "0.5", "--starts", "4", "--window", "5"), COLUMNS=columns).stdout
+
+
 @pytest.mark.parametrize("columns", ["1", "7", "39"])
 def test_a_terminal_of_few_columns_gets_its_help(columns: str):
     assert done_with(("--help",), COLUMNS=columns).returncode == 0
@@ -30,8 +37,7 @@ def test_a_terminal_of_few_columns_gets_its_help(columns: str):
 
 @pytest.mark.parametrize("columns", ["0", "00", "wide"])
 def test_no_width_is_as_wide_as_usual(columns: str):
-    words = "flss", "--velocities", "0.5", "--starts", "4", "--window", "5"
-    assert done_with(words, COLUMNS=columns).stdout == done_with(words, COLUMNS="80").stdout != ""
+    assert flss_in(columns) == flss_in("80") != ""
 
 
 def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):

@@ -20,7 +20,7 @@ class Reproduce:
     """Fewer starts and velocities, coarser steps of gaits, under a minute; the full protocol takes several."""
     only: tuple[str, ...] | None = None
     """Keys of the claims to judge, without figures; all unless given."""
-    beside: tuple[str, ...] = ()
+    beside: tuple[str, ...] | None = None
     """Readings of the network under which the claims are judged, too, such as 'lasting'; see `hexmj readings`."""
     seed: int = 1998
     """Seed of the random starts; the ideal sets were searched with 0 and 1."""
@@ -39,11 +39,14 @@ class Reproduce:
 
         if self.only == ():
             raise InputError("--only without keys; expected at least one, or no --only for all")
+        if self.beside == ():
+            raise InputError("--beside without names; expected at least one, or no --beside for none")
         results_folder(self.out, (MANIFEST,))
+        beside = self.beside or ()
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with self.sweepers.at_work("reproducing") as how, as_shipped():
-            rows, files = reproduce(self.out, protocol, self.only or (), self.beside, **how)
-        settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": self.beside}
+            rows, files = reproduce(self.out, protocol, self.only or (), beside, **how)
+        settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": beside}
         files.append(save_manifest(self, settings, files, self.out / MANIFEST))
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})

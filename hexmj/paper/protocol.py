@@ -67,6 +67,7 @@ class Protocol:
             checked_list(getattr(self, name))
         for name in ("samples", "sample", "gait_starts", "obstacle_starts"):
             whole(name, getattr(self, name), 1, MOST_STARTS)
+        whole("seed", self.seed, 0)
 
     def network(self, name: str, window: str, velocity: float) -> Cruse1998 | None:
         """The network of a measurement at a velocity, as this protocol reads it.

@@ -49,10 +49,7 @@ _SCRIPTS = "__main__", "__mp_main__"
 """Names of a script where it runs, and in the workers that it starts."""
 
 _OPENED: dict[str, set[str]] = {}
-"""Source, or `_ANYBODY` -> what was opened or ran while a function or module of it was called, if no cell told it."""
-
-_ANYBODY = ""
-"""Stands for a source where a thread opens something of which no function is a user's."""
+"""Source -> what was opened or ran while a function or module of it was being called, if no cell told it."""
 
 _TOLD: dict[int, set[str]] = {}
 """Thread that computes a cell -> files that the cell tells by itself, each as it really is."""
@@ -61,7 +58,7 @@ _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
-"""File -> its size and times as anybody opened it first, but for a sweep that looks what it holds."""
+"""File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
 
 
 @contextmanager
@@ -77,9 +74,9 @@ def telling(told: Iterable[Path]) -> Iterator[None]:
             _TOLD[mine] = outer
 
 
-def opened_by(sources: set[str]) -> set[str]:
-    """What the code of some sources, if there are any, has opened, or found and run, and may remember."""
-    return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
+def opened_by(sources: Iterable[str]) -> set[str]:
+    """What the code of some sources has opened, or found and run, and may remember."""
+    return set[str]().union(*(_OPENED.get(one, ()) for one in sources))
 
 
 def read_too(files: Iterable[str], sources: Iterable[str] = ()) -> None:
@@ -131,7 +128,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
         reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
-        if reads and _is_data(os.path.realpath(file)):
+        if reads and _is_data(os.path.normpath(file)):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
 
@@ -146,9 +143,10 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
         return
     if not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
         return
-    callers = _callers(opener, file)
-    if not callers and threading.current_thread() is not threading.main_thread():
-        callers.add(_ANYBODY)
+    callers, main = _callers(opener, file), threading.main_thread()
+    if not callers and threading.current_thread() is not main:  # one of whom it works for
+        frames = sys._current_frames()
+        callers.update(*(_callers(frames[one], file) for one in {main.ident or 0, *_TOLD} & frames.keys()))
     for one in callers:
         _OPENED.setdefault(one, set()).add(file)
 
