@@ -57,7 +57,8 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
 
 def test_empty_numbers_for_libraries_are_none_at_all():
     done = done_with(FEW, NUMBA_NUM_THREADS="", SOURCE_DATE_EPOCH="")
-    assert (done.returncode, done.stderr) == (0, "")
+    said = [line for line in done.stderr.splitlines() if "% in " not in line]
+    assert (done.returncode, said) == (0, [])
 
 
 @pytest.mark.parametrize(

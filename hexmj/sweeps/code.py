@@ -148,10 +148,10 @@ def _parts(path: Path) -> list[Path]:
     """A file with all that MuJoCo opens with it; none once it is gone."""
     try:
         return parts(path) if path.name.lower().endswith(_MODELS) else [path]
-    except InputError:
-        if path.exists():
-            raise
-        return []
+    except InputError as error:
+        if isinstance(error.__context__, FileNotFoundError):
+            return []
+        raise
 
 
 def _needed(modules: frozenset[str]) -> _Needed:
