@@ -50,6 +50,7 @@ def made_or_read(memo):
 
 @dataclass(frozen=True)
 class Inner:
+    file: str = ""
     def cell(self):
         return xr.Dataset({{"gain": float(Path("one/gain").read_text())}})
 

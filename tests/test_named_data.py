@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hexmj.sweeps import code
-from hexmj.sweeps.code import files_of_users
+from hexmj.sweeps.code import data_of_users, sources_of_users
 
 
 @pytest.mark.parametrize(
@@ -34,8 +34,9 @@ def test_what_libraries_open_by_themselves_is_found(
     for known in ("_FILES", "_KNOWN"):
         monkeypatch.setattr(code, known, {})
     importlib.invalidate_caches()
-    sources, unheard, others = files_of_users(frozenset({"named_by_mine"}))
-    assert {Path(one).name for one in sources} == {"named_by_mine.py", "named_by_helper.py"}
+    modules = frozenset({"named_by_mine"})
+    unheard, others = data_of_users(modules)
+    assert {Path(one).name for one in sources_of_users(modules)} == {"named_by_mine.py", "named_by_helper.py"}
     assert [*map(Path, unheard)] == [file] and not others
 
 

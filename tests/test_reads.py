@@ -271,3 +271,19 @@ def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
     write_all("7.0")
     with pytest.warns(UserWarning, match="one.gain.db has changed since it was opened first"):
         assert float(run([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0
+
+
+def test_what_an_installed_base_opens_counts(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "site-packages").mkdir()
+    (tmp_path / "site-packages" / "installed_base.py").write_text(
+        "from pathlib import Path\nimport xarray as xr\nclass Base:\n    def cell(self):\n"
+        "        return xr.Dataset({'gain': float(Path(self.table).read_text())})\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path / "site-packages")
+    mine = "from dataclasses import dataclass\nfrom installed_base import Base\n"
+    mine += "@dataclass(frozen=True)\nclass Reader(Base):\n    at: str = ''\n    table = 'one/gain'\n"
+    Path("reader.py").write_text(mine)
+    run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    assert what_was_read() == {"one/gain"}

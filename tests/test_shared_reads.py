@@ -12,7 +12,7 @@ import pytest
 
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, KeptValues, finish, run
-from hexmj.user_code import opened_files
+from hexmj.sweeps.cells import check_alike
 from hexmj.user_code.loaded import importable
 from reader import READER, another_program, what_was_read, write_all
 
@@ -68,10 +68,14 @@ def test_no_result_is_of_a_file_as_it_was_and_as_it_is(
     assert [float(data.gain) for data in run(cells(), Path("kept"))] == [7.0, 7.0]
 
 
-def test_a_cell_that_sweeps_by_workers_has_read_what_they_have(computed: Callable[..., tuple[float, int]]) -> None:
-    pool = "__import__('concurrent.futures').futures.ProcessPoolExecutor(1)"
-    sweep = f"hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {{}})], executor={pool})"
-    assert computed(f"{sweep}[0].gain.item()") == (1.0, 1)
+@pytest.mark.parametrize("file", ["", "one/gain"])
+@pytest.mark.parametrize("pool", ["", "Process", "Thread"])
+def test_a_cell_that_sweeps_has_read_what_its_cells_have_and_tell(
+    computed: Callable[..., tuple[float, int]], pool: str, file: str
+) -> None:
+    pool = pool and f", executor=__import__('concurrent.futures').futures.{pool}PoolExecutor(1)"
+    inner = f"hexmj.sweeps.Cell('inner', Inner({file!r}).cell, {{}})"
+    assert computed(f"hexmj.sweeps.run([{inner}]{pool})[0].gain.item()") == (1.0, 1)
     assert what_was_read() == {"one/gain"}
 
 
@@ -103,11 +107,15 @@ def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[...,
     assert len(list(Path("both").glob("*.nc"))) == 2
 
 
-def test_a_cell_that_sweeps_itself_has_read_what_its_cells_have(computed: Callable[..., tuple[float, int]]) -> None:
-    for calls in (1, 1):
-        opened_files._OPENED.clear()
-        assert computed("tried('new')") == (0.0, calls)
-        assert os.path.abspath("new") in opened_files.opened_by({__file__})
+def test_a_cell_that_takes_a_kept_one_has_read_what_that_has(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = "hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
+    for calls in (1, 2):
+        assert computed(gain) == (1.0, calls)
+        assert what_was_read() == {"one/gain"}
+        shutil.rmtree("kept")
+        another_program(monkeypatch)
 
 
 def test_workers_tell_what_they_have_read(computed: Callable[..., tuple[float, int]]) -> None:
@@ -179,3 +187,19 @@ def test_no_values_are_of_a_file_as_it_was_and_as_it_is(
     write_all("7.0")
     with pytest.raises(InputError, match="gain has changed before values read it, and after others did"):
         found(np.zeros((1, 1)))
+
+
+def test_a_file_that_values_were_kept_beside_may_be_opened_later(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("it.json").write_text("1.0")
+    Path("reader.py").write_text(READER.format(gain="(tried('it.json') if len(rows) > 1 else 1.0)"))
+    for rows in (1, 2):
+        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+        assert found(np.full((rows, 1), float(rows))).tolist() == [rows] * rows
+        another_program(monkeypatch)
+
+
+def test_workers_may_stand_in_folders_of_their_own() -> None:
+    check_alike("second", before := {".": "one"}, {".": "two", "file": "there"})
+    assert before == {".": "one"}

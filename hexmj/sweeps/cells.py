@@ -14,9 +14,9 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.code import code, files_of_users
+from hexmj.sweeps.code import code, data_of_users, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, opened_by, read_too, seen, telling
+from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -65,7 +65,7 @@ class Cell:
         """
         told, modules = self._told(), self._modules()
         made = code(modules)
-        seen(files_of_users(modules)[1])
+        seen(data_of_users(modules)[0])
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
     def settings_now(self) -> str:
@@ -74,24 +74,29 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def telling(self) -> AbstractContextManager[None]:
-        """While it is computed: what its settings name is none of what its code reads beyond them."""
-        return telling(self._told_files())
+    def computing(self, kept: bool) -> AbstractContextManager[None]:
+        """While it is computed, to be kept or not: what it opens beyond what its settings name is noted."""
+        return computing(self._told_files(), sources_of_users(self._modules()) if kept else set())
 
     def opened(self) -> set[str]:
         """What its code has opened so far in this program, and may remember."""
-        return opened_by(files_of_users(self._modules())[0])
+        return opened_by(sources_of_users(self._modules()))
 
     def knows(self, opened: set[str]) -> None:
         """Note what its code has opened in the program that has sent it."""
-        read_too(opened, files_of_users(self._modules())[0])
+        knows(opened, sources_of_users(self._modules()))
+
+    def tell(self, read: Mapping[str, str]) -> None:
+        """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
+        if computes():
+            knows({*_files(read), *map(spelled, self._told_files())})
 
     def read(self) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there;
         and why it cannot be kept, in a sentence, else empty."""
         try:
-            sources, unheard, others = files_of_users(self._modules())
-            told = self._told_files()
+            sources, told = sources_of_users(self._modules()), self._told_files()
+            unheard, others = data_of_users(self._modules())
             files = _beyond(opened_by(sources) | unheard, {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
                 return {}, (
@@ -112,15 +117,11 @@ class Cell:
         """Whether its code would read today what it has read, or may remember from earlier in this program."""
         try:
             same = all(holds(*one) for one in read.items())
-            _, *named = files_of_users(self._modules())
+            named = data_of_users(self._modules())
         except InputError:
             return False
         new = set[str]().union(*named) - read.keys()
-        opened = {file for file, digest in read.items() if digest != _THERE and file != _HERE}
-        believed = same and not changed(opened) and not (new and _beyond(new, self._told_files()))
-        if believed:
-            read_too(opened)
-        return believed
+        return same and not changed(_files(read)) and not (new and _beyond(new, self._told_files()))
 
     def _told_files(self) -> set[Path]:
         """Files that its settings name."""
@@ -180,9 +181,14 @@ def check_alike(name: str, before: dict[str, str], read: Mapping[str, str]) -> N
     Raises:
         InputError: that.
     """
-    for file, held in read.items():
-        if held != _THERE and before.setdefault(file, held) != held:
+    for file in _files(read):
+        if before.setdefault(file, read[file]) != read[file]:
             raise InputError(f"{file} has changed before {name} read it, and after others did; start again")
+
+
+def _files(read: Mapping[str, str]) -> set[str]:
+    """Those that were opened of what a cell has read."""
+    return {file for file, held in read.items() if held != _THERE and file != _HERE}
 
 
 def _beyond(files: set[str], told: Iterable[str | Path]) -> set[str]:

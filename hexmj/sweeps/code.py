@@ -26,7 +26,7 @@ from hexmj.storage.mjcf import parts
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
 from hexmj.user_code.opened_files import spelled
-from hexmj.user_code.parsing import files_named, folders_named, parsed, texts
+from hexmj.user_code.parsing import named_there, parsed, texts
 
 CARRIERS = {
     *("h5netcdf", "h5py", "matplotlib", "rich", "tyro", "xarray"),
@@ -122,9 +122,18 @@ def code(modules: frozenset[str]) -> Code:
     return Code(dict(sorted(sources.items())), needed.versions)
 
 
-def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str], set[str]]:
-    """Of the user's own modules that some need their sources, and the data that their texts name, as far as they are
-    there: first what may be opened unheard, with its parts, then the rest.
+def sources_of_users(modules: frozenset[str]) -> set[str]:
+    """Files of the user's own modules that some need.
+
+    Raises:
+        InputError: a module has no source.
+    """
+    return {os.path.abspath(file) for file, _ in _needed(modules).theirs}
+
+
+def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
+    """Of the data that texts of these name, as far as they are there: what may be opened unheard, with its parts, and
+    the rest.
 
     Files are looked for beside each module, a folder above, in the current one, and in folders there that texts name.
 
@@ -132,16 +141,15 @@ def files_of_users(modules: frozenset[str]) -> tuple[set[str], set[str], set[str
         InputError: a module has no source; a file cannot be read.
     """
     theirs = _needed(modules).theirs
-    sources = {os.path.abspath(file) for file, _ in theirs}
-    named = [*dict.fromkeys(text for _, one in theirs for text in one)]
+    named = {text for _, one in theirs for text in one}
     if not any(text.lower().endswith(_DATA) for text in named):
-        return sources, set(), set()
-    before = [text for file, one in theirs if str(file) in sources_as_run.BEFORE for text in one]
-    folders = folders_named(named, [Path.cwd(), *(one for file, _ in theirs for one in file.parents[:2])], _DEEP)
-    unheard = {*files_named(named, folders, _UNHEARD), *files_named(before, folders, _DATA)}
-    others = {*files_named(named, folders, _DATA)} - unheard
+        return set(), set()
+    before = tuple(f"/{text}" for file, one in theirs if str(file) in sources_as_run.BEFORE for text in one)
+    folders = [Path.cwd(), *(one for file, _ in theirs for one in file.parents[:2])]
+    found = [one for one in named_there(named, folders, _DEEP) if one.name.lower().endswith(_DATA) and one.is_file()]
+    unheard = {one for one in found if one.name.lower().endswith(_UNHEARD) or one.as_posix().endswith(before)}
     whole = {spelled(part) for path in unheard for part in _parts(path)}
-    return sources, whole, {spelled(path) for path in others} - whole
+    return whole, {spelled(path) for path in found} - whole
 
 
 def _parts(path: Path) -> list[Path]:
@@ -268,7 +276,8 @@ def _read(name: str, file: Path) -> _Module:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
     named = texts(tree)
-    data = files_named(named, folders_named(named, (file.parent, _ASSETS)), _DATA_OF_OURS) if ours else []
+    there = named_there(named, (file.parent, _ASSETS)) if ours else []
+    data = sorted(one for one in there if one.name.endswith(_DATA_OF_OURS) and one.is_file())
     return _Module(digest(held), data, [] if ours else named, of_package, imports, bound)
 
 

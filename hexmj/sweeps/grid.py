@@ -21,7 +21,7 @@ from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_alike, check_unchanged, difference, holds
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
-from hexmj.user_code.opened_files import read_too, remembered
+from hexmj.user_code.opened_files import remembered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,6 +127,7 @@ def finish(
     before: dict[str, str] = {}
     for i, (data, read, not_kept) in made:
         check_alike(cells[i].name, before, read)
+        cells[i].tell(read)
         if not_kept and not warned:
             warned = True
             warn(not_kept, stacklevel=2)
@@ -168,7 +169,7 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
     if path and (kept := _kept(cell, record, path)):
         return kept
     before = record if path else cell.settings_now()
-    with cell.telling():
+    with cell.computing(bool(record)):
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
@@ -234,7 +235,6 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                     raise InputError(
                         f"a worker has another {other[0]} than the sender; start it again, where it has the same"
                     )
-                read_too(read)
                 yield futures[future], (data, read, not_kept)
         except BrokenExecutor:
             raise InputError(

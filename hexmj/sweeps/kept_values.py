@@ -58,7 +58,7 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            with self._cell.telling():
+            with self._cell.computing(bool(self._path)):
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
@@ -94,7 +94,7 @@ class KeptValues:
                 whole = f"{line}\n" == self._line(key, number, read) and math.isfinite(number)
                 if whole and current(told or "{}"):
                     self._values[key] = number
-                    self._read |= read
+                    check_alike(self._cell.name, self._read, read)
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 

@@ -7,16 +7,18 @@ these is kept with it.  Opens are noted from the first import of this package on
 import os
 import re
 import sys
+import sysconfig
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from traceback import walk_stack
 from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from hexmj.user_code.sources_as_run import is_users
+from hexmj.user_code.sources_as_run import INSTALLED, is_users
 
 _PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
@@ -38,6 +40,7 @@ _SYSTEMS += tuple(f"/dev/{one}" for one in ("fd/", "null", "pts", "random", "std
 
 _OURS = f"{Path(__file__).parents[1]}{os.sep}"
 _SWEEPS = f"{_OURS}sweeps{os.sep}"
+_PYTHONS = f"{sysconfig.get_path('stdlib')}{os.sep}"
 
 _READS_SOURCES = "tokenize.py", "<frozen importlib._bootstrap_external>"
 """Ends of the names of the code that reads sources to import them or to show their lines."""
@@ -51,8 +54,8 @@ _SCRIPTS = "__main__", "__mp_main__"
 _OPENED: dict[str, set[str]] = {}
 """Source -> what was opened or ran while a function or module of it was being called, if no cell told it."""
 
-_TOLD: dict[int, set[str]] = {}
-"""Thread that computes a cell -> files that the cell tells by itself, each as it really is."""
+_COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
+"""Thread that computes a cell -> files that the cell tells by itself, each as it really is, and its sources."""
 
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
@@ -62,16 +65,21 @@ _AT_FIRST: dict[str, tuple[int, ...]] = {}
 
 
 @contextmanager
-def telling(told: Iterable[Path]) -> Iterator[None]:
-    """While this thread computes a cell that tells some files by itself."""
+def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
+    """While this thread computes a cell that tells some files by itself and has some sources."""
     mine = threading.get_ident()
-    outer, _TOLD[mine] = _TOLD.get(mine), {os.path.realpath(file) for file in told}
+    outer, _COMPUTING[mine] = _COMPUTING.get(mine), ({os.path.realpath(file) for file in told}, sources)
     try:
         yield
     finally:
-        del _TOLD[mine]
-        if outer is not None:
-            _TOLD[mine] = outer
+        del _COMPUTING[mine]
+        if outer:
+            _COMPUTING[mine] = outer
+
+
+def computes() -> bool:
+    """Whether this thread computes a cell."""
+    return threading.get_ident() in _COMPUTING
 
 
 def opened_by(sources: Iterable[str]) -> set[str]:
@@ -79,8 +87,8 @@ def opened_by(sources: Iterable[str]) -> set[str]:
     return set[str]().union(*(_OPENED.get(one, ()) for one in sources))
 
 
-def read_too(files: Iterable[str], sources: Iterable[str] = ()) -> None:
-    """Note for whose code is being called, and for some sources, what another program has read that they may know."""
+def knows(files: Iterable[str], sources: Iterable[str] = ()) -> None:
+    """Note for whose code is being called, and for some sources, what has been read elsewhere that they may know."""
     for one in {*_callers(sys._getframe(1)), *sources}:
         _OPENED.setdefault(one, set()).update(files)
 
@@ -109,7 +117,7 @@ def spelled(file: str | Path) -> str:
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    if event in _MAKES and threading.get_ident() in _TOLD:
+    if event in _MAKES and computes():
         _TEMPORARY.add(os.path.realpath(arguments[0]))
     if event not in _PATH:
         return
@@ -139,24 +147,25 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
     if read:
         for one in (file, really):
             _AT_FIRST.setdefault(one, _stamp(file))
-    if really in _TOLD.get(threading.get_ident(), ()):
+    told, sources = _COMPUTING.get(threading.get_ident(), (set[str](), set[str]()))
+    if really in told or not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
         return
-    if not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
-        return
-    callers, main = _callers(opener, file), threading.main_thread()
+    callers, main = _callers(opener, file) | sources, threading.main_thread()
     if not callers and threading.current_thread() is not main:  # one of whom it works for
         frames = sys._current_frames()
-        callers.update(*(_callers(frames[one], file) for one in {main.ident or 0, *_TOLD} & frames.keys()))
+        callers.update(*(_callers(frames[one], file) for one in {main.ident or 0, *_COMPUTING} & frames.keys()))
     for one in callers:
         _OPENED.setdefault(one, set()).add(file)
 
 
 def _is_of_a_sweep(opener: FrameType) -> bool:
-    """Whether a sweep opens a file for itself, to see what it holds."""
+    """Whether a sweep opens a file for itself, to see what it holds, with nothing between them but Python."""
     for frame, _ in walk_stack(opener):
         by = frame.f_code.co_filename
-        if by.startswith(_SWEEPS) or _is_code_of_users(by):
-            return by.startswith(_SWEEPS)
+        if by.startswith(_SWEEPS):
+            return True
+        if not (by.startswith((_OURS, "<")) or _is_of_python(by)):
+            return False
     return False
 
 
@@ -173,8 +182,14 @@ def _callers(frame: FrameType, file: str = "") -> set[str]:
     return found
 
 
+@cache
 def _is_code_of_users(by: str) -> bool:
     return not by.startswith("<") and is_users(os.path.abspath(by))
+
+
+@cache
+def _is_of_python(by: str) -> bool:
+    return by.startswith(_PYTHONS) and INSTALLED.isdisjoint(Path(by).parts)
 
 
 def _stamp(file: str) -> tuple[int, ...]:

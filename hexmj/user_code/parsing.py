@@ -2,9 +2,11 @@
 that of one.  Nothing is told of their warnings, which whoever imports them hears."""
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from os.path import isdir, isfile, join
+from os import listdir
+from os.path import exists, isabs, isdir
 from pathlib import Path
 from threading import Lock
 from types import CodeType
@@ -40,31 +42,36 @@ def _alone() -> Iterator[None]:
 
 
 def texts(tree: ast.AST) -> list[str]:
-    """The texts of a source that may be names, each also without the slash it begins with, as ``f"{folder}/leg.xml"``
-    has one."""
+    """The texts of a source that may be paths, without dots and slashes that one begins with or that lead nowhere, as
+    ``f"{folder}/leg.xml"`` has one."""
     constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
-    names = [one for one in constants if 0 < len(one) < LONGEST and one.isprintable()]
-    return list(dict.fromkeys(text for one in names for text in (one, one.lstrip("/")) if text))
+    names = [one for one in constants if len(one) < LONGEST and one.isprintable()]
+    parts = [[part for part in one.split("/") if part not in ("", ".", "..")] for one in names]
+    return list(dict.fromkeys(["/".join(one) for one in parts if one] + [one for one in names if isabs(one)]))
 
 
-def files_named(texts: Sequence[str], folders: Sequence[Path], endings: tuple[str, ...]) -> list[Path]:
-    """Files that are there, and that texts name.
+def named_there(texts: Iterable[str], folders: Iterable[Path], deep: int = 1) -> list[Path]:
+    """What texts name in some folders, and, as often as asked, in the folders found so."""
+    texts = list(texts)
+    begin = defaultdict[str, list[str]](list)
+    for text in texts:
+        begin[text.partition("/")[0]].append(text)
+    found, new = list[Path](), [*dict.fromkeys(folders), *(Path(one) for one in begin.pop("", ()))]
+    known = set(new)
+    for _ in range(deep + 1):
+        inner = [
+            Path(folder, text) for folder in new for name in _listed(folder) & begin.keys() for text in begin[name]
+        ]
+        inner = [one for one in dict.fromkeys(inner) if one not in known and exists(one)]
+        known.update(inner)
+        found += inner
+        new = [one for one in inner if isdir(one)]
+    return found
 
-    Args:
-        texts: of a source, or of several.
-        folders: where they are looked for; see `folders_named` for those that texts name.
-        endings: of the names, in small letters.
-    """
-    names = [text for text in texts if text.lower().endswith(endings)]
-    return sorted({Path(one) for folder in folders for name in names if isfile(one := join(folder, name))})
 
-
-def folders_named(texts: Sequence[str], folders: Sequence[Path], deep: int = 1) -> list[Path]:
-    """Some folders, and those that texts name in them; as often as asked also what they name in these."""
-    found = {folder: None for folder in folders}
-    new = list(found)
-    for _ in range(deep):
-        inner = [Path(one) for folder in new for text in texts if isdir(one := join(folder, text))]
-        new = [one for one in inner if one not in found]
-        found |= dict.fromkeys(new)
-    return list(found)
+def _listed(folder: Path) -> set[str]:
+    """Names in a folder; none where there is none to be read."""
+    try:
+        return set(listdir(folder))
+    except OSError:
+        return set()

@@ -7,7 +7,6 @@ import os
 import sys
 import sysconfig
 from contextlib import suppress
-from functools import cache
 from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import cache_from_source
 from pathlib import Path
@@ -59,7 +58,6 @@ def as_run(file: Path, module: str) -> bytes | None:
     return meant[0]
 
 
-@cache
 def is_users(file: str) -> bool:
     """Whether a file is a user's own: neither of Python, nor installed, nor of this package."""
     return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
