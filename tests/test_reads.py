@@ -161,6 +161,8 @@ def test_a_file_that_is_missing_counts_too(
         "[(it := tempfile.mkstemp()), os.write(it[0], b'1.0'), os.close(it[0]), 1.0][3]",
         "[it := tempfile.mkdtemp(), Path(it, 'a').write_text('1.0'), tried(Path(it, 'a')), shutil.rmtree(it)][2]",
         "[it := tempfile.mkstemp()[1], Path(it).write_text('1.0'), tried(it), os.unlink(it)][2]",
+        "ThreadPoolExecutor(1).submit(lambda: [it := tempfile.mkstemp()[1], Path(it).write_text('1.0'), tried(it)][2])"
+        ".result()",
         "len(list(Path(at).rglob('*.json')))",
         "len(hexmj.load_controller('graham').name) / 6",
         "sqlite3.connect(':memory:').execute('select 1.0').fetchone()[0]",

@@ -68,6 +68,17 @@ def test_no_result_is_of_a_file_as_it_was_and_as_it_is(
     assert [float(data.gain) for data in run(cells(), Path("kept"))] == [7.0, 7.0]
 
 
+def test_what_each_cell_writes_and_reads_again_is_no_edit(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("reader.py").write_text(READER.format(gain="[Path('it').write_text(at), float(Path('it').read_text())][1]"))
+    for n in (1, 2):
+        reader = importable("reader.py").Reader
+        data = run([Cell(at, reader(at).cell, {}) for at in ("1", "22")[:n]], Path("kept"))
+        assert [float(one.gain) for one in data] == [1.0, 22.0][:n]
+        another_program(monkeypatch)
+
+
 @pytest.mark.parametrize("file", ["", "one/gain"])
 @pytest.mark.parametrize("pool", ["", "Process", "Thread"])
 def test_a_cell_that_sweeps_has_read_what_its_cells_have_and_tell(

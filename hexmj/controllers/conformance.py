@@ -185,7 +185,7 @@ def _side_by_side(trial: Trial) -> None:
 
 def _batch(trial: Trial) -> None:
     n = len(trial.starts)
-    for which in ([0], [n - 2], [*range(n)[::-1]], np.arange(3 * n) % n):
+    for which in ([0], [n - 2], [1, n - 1, 2], [*range(n)[::-1]], np.arange(3 * n) % n):
         same(of_starts(trial.walk, which), trial.of(which).walk, "a start alone, in another order, or among others")
 
 

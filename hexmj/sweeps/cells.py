@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, data_of_users, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled
+from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled, written
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -92,8 +92,9 @@ class Cell:
             knows({*_files(read), *map(spelled, self._told_files())})
 
     def read(self) -> tuple[dict[str, str], str]:
-        """What its code may have read that its record does not tell, file -> digest, empty of one that is not there;
-        and why it cannot be kept, in a sentence, else empty."""
+        """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
+        `_THERE`; with the folder from which they were looked for, `_HERE`.  And why it cannot be kept, in a sentence,
+        else empty."""
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             unheard, others = data_of_users(self._modules())
@@ -182,7 +183,7 @@ def check_alike(name: str, before: dict[str, str], read: Mapping[str, str]) -> N
         InputError: that.
     """
     for file in _files(read):
-        if before.setdefault(file, read[file]) != read[file]:
+        if before.setdefault(file, read[file]) != read[file] and not written(file):
             raise InputError(f"{file} has changed before {name} read it, and after others did; start again")
 
 

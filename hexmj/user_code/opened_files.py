@@ -24,7 +24,7 @@ _PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
 """Event of Python's audit hooks -> which of its arguments tells the path."""
 
 _MAKES = "tempfile.mkdtemp", "tempfile.mkstemp"
-"""The same of what makes a file, or a folder for some, to be used and thrown away."""
+"""Events of what makes a file, or a folder, to be used and thrown away; the path comes first."""
 
 _URI = re.compile(r"^file:(?://[^/?]*)?([^?]*)(\?.*)?$")
 """Of a database of SQLite."""
@@ -60,6 +60,9 @@ _COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
 
+_WRITTEN = set[str]()
+"""What cells have written as they were computed."""
+
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
 
@@ -85,6 +88,11 @@ def computes() -> bool:
 def opened_by(sources: Iterable[str]) -> set[str]:
     """What the code of some sources has opened, or found and run, and may remember."""
     return set[str]().union(*(_OPENED.get(one, ()) for one in sources))
+
+
+def written(file: str) -> bool:
+    """Whether a cell has written a file as it was computed in this program."""
+    return file in _WRITTEN
 
 
 def knows(files: Iterable[str], sources: Iterable[str] = ()) -> None:
@@ -117,7 +125,7 @@ def spelled(file: str | Path) -> str:
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    if event in _MAKES and computes():
+    if event in _MAKES and _COMPUTING:
         _TEMPORARY.add(os.path.realpath(arguments[0]))
     if event not in _PATH:
         return
@@ -135,7 +143,10 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
-        reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
+        writes = event == "open" and _writes(file, arguments[2])
+        if writes and computes():
+            _WRITTEN.add(file)
+        reads = not (writes or (event == "open" and _reads_a_source(file, sys._getframe(1))))
         if reads and _is_data(os.path.normpath(file)):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
