@@ -111,6 +111,8 @@ FALSE: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "nan": (lambda r: changed(r, velocity=last(r, "velocity", np.nan)), "velocity holds nan; expected 0 to 1 V_p"),
     "gap": (lambda r: changed(r, centre_of_mass=last(r, "centre_of_mass", np.nan)), "centre_of_mass holds nan"),
     "far": (lambda r: changed(r, qpos=last(r, "qpos", 1e300)), "qpos holds 1e.300"),
+    "joint unknown": (lambda r: changed(r, qpos=last(r, "qpos", np.nan)), "of which qpos is not finite throughout"),
+    "joint beyond": (lambda r: changed(r, qpos=last(r, "qpos", np.inf)), "of which qpos is not finite throughout"),
     "fast": (lambda r: changed(r, velocity=last(r, "velocity", 2.0)), "velocity holds 2.0; expected 0 to 1"),
     "whole": (lambda r: r.assign(velocity=r.velocity.astype(int)), "velocity is int64 of .*; expected float64 over"),
     "turned": (

@@ -226,11 +226,13 @@ def test_no_manifest_gets_a_sentence(run, tmp_path):
     assert "nowhere cannot be read: No such file" in run("rerun", tmp_path / "nowhere")[2]
 
 
-def test_a_result_that_cannot_be_read_gets_a_sentence(run, flss):
+def test_a_result_that_cannot_be_read_gets_a_sentence_before_anything_is_repeated(run, flss, monkeypatch):
+    monkeypatch.setattr("hexmj.cli.rerun.options_of", None)
     (flss / "flss.nc").write_text("nothing")
     code, _, error = run("rerun", flss)
     assert code == 2
     assert "flss.nc cannot be read as NetCDF" in error
+    assert "; it was changed after it was written" in error
 
 
 @pytest.mark.parametrize("where", ["from dataclasses", "        x = starts.copy()"])

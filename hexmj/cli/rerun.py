@@ -17,7 +17,7 @@ from hexmj.cli.commands import options_of
 from hexmj.cli.manifest import Manifest, changed_files, differences, manifests, told
 from hexmj.cli.tables import print_json, show, table
 from hexmj.errors import InputError, SimulationError
-from hexmj.storage.same_numbers import Compared, compared, holds_numbers
+from hexmj.storage.same_numbers import Compared, check_readable, compared, holds_numbers
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -133,6 +133,13 @@ def _check(path: Path, manifest: Manifest) -> None:
     numbers = [name for name in manifest.files if holds_numbers(name)]
     if missing := [name for name in numbers if not (path.parent / name).is_file()]:
         raise InputError(f"{path} names {missing[0]}, which is not beside it; expected the whole result")
+    changed = changed_files(manifest, path.parent)
+    for name in numbers:
+        try:
+            check_readable(path.parent / name)
+        except InputError as error:
+            since = "; it was changed after it was written" if name in changed else ""
+            raise InputError(f"{error}{since}") from None
     if missing := [name for name in manifest.own if not Path(name).is_file()]:
         raise InputError(
             f"{missing[0]}, with which {path} was made, is no file here; expected to run where that name leads to it"

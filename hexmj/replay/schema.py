@@ -163,7 +163,14 @@ def _check_range(name: str, one: Told, values: np.ndarray, poses: np.ndarray) ->
     unknown = np.isnan(values)
     well = (one.least <= values) & (values <= one.most)
     if one.gaps == "after a fall":
-        well = np.where(poses.reshape(-1, *(1,) * (values.ndim - 1)), well, unknown)
+        known = poses.reshape(-1, *(1,) * (values.ndim - 1))
+        if (beyond := ~known & ~unknown).any():
+            step = np.argwhere(beyond)[0][0]
+            raise InputError(
+                f"no recording: {name} holds {values[beyond].flat[0]} in step {step}, of which qpos is not finite"
+                " throughout; expected a pose, or NaN in all that is unknown after a fall"
+            )
+        well |= ~known
     elif one.gaps == "as a whole":
         well |= unknown
     if not well.all():

@@ -45,6 +45,15 @@ def holds_numbers(name: str) -> bool:
     return Path(name).suffix in _READERS
 
 
+def check_readable(path: Path) -> None:
+    """Refuse a file that cannot be compared.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    _READERS[path.suffix](path)
+
+
 def compared(then: Path, now: Path) -> list[Compared]:
     """Every variable of a file beside the same one of another file.
 
