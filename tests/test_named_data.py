@@ -18,18 +18,25 @@ from hexmj.sweeps.code import data_of_users, sources_of_users
         ("models/leg.mjb", "MODELS / 'leg.mjb'", "MODELS = HERE / 'models'"),
         ("../models/policy.pt", "HERE.parent / 'models' / 'policy.pt'", ""),
         ("policy.onnx", "f'{HERE}/policy.onnx'", ""),
+        ("../../models/leg.xml", "HERE / '..' / '..' / 'models' / 'leg.xml'", ""),
+        ("../../models/leg.xml", "'../../models/leg.xml'", ""),
+        ("/elsewhere/leg.xml", "'{root}/elsewhere/leg.xml'", ""),
     ],
 )
 def test_what_libraries_open_by_themselves_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, mine: str, helper: str
 ) -> None:
-    src = tmp_path / "src"
-    src.mkdir()
-    (file := (src / where).resolve()).parent.mkdir(parents=True, exist_ok=True)
+    src = tmp_path / "inner" / "src"
+    src.mkdir(parents=True)
+    (file := Path(f"{tmp_path}{where}" if where.startswith("/") else src / where).resolve()).parent.mkdir(
+        parents=True, exist_ok=True
+    )
     file.write_text("<mujoco/>")
     here = "from pathlib import Path\nHERE = Path(__file__).parent\n"
     (src / "named_by_helper.py").write_text(f"{here}{helper}\n")
-    (src / "named_by_mine.py").write_text(f"{here}from named_by_helper import *\nFILE = {mine}\n")
+    (src / "named_by_mine.py").write_text(
+        f"{here}from named_by_helper import *\nFILE = {mine.format(root=tmp_path, HERE='{HERE}')}\n"
+    )
     monkeypatch.syspath_prepend(src)
     for known in ("_FILES", "_KNOWN"):
         monkeypatch.setattr(code, known, {})

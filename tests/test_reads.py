@@ -281,6 +281,9 @@ def test_what_an_installed_base_opens_counts(
     (tmp_path / "site-packages").mkdir()
     (tmp_path / "site-packages" / "installed_base.py").write_text(
         "from pathlib import Path\nimport xarray as xr\nclass Base:\n    def cell(self):\n"
+        "        from hexmj.sweeps import Cell, run\n"
+        "        return run([Cell('inner', self.inner, {})])[0]\n"
+        "    def inner(self):\n"
         "        return xr.Dataset({'gain': float(Path(self.table).read_text())})\n"
     )
     monkeypatch.syspath_prepend(tmp_path / "site-packages")

@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, data_of_users, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled, written
+from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -171,20 +171,18 @@ def check_unchanged(cell: Cell, before: str, now: str) -> None:
     )
 
 
-def check_alike(name: str, before: dict[str, str], read: Mapping[str, str]) -> None:
-    """Refuse a result of which one part has read a file as it was, and another one as it is.
+def unlike(name: str, before: dict[str, str], read: Mapping[str, str]) -> str:
+    """A sentence on a result of which one part has read a file as it was, and another one as it is; else empty.
 
     Args:
         name: of the part that has read last.
         before: what the others have read, see `Cell.read`; the last one's is added.
         read: by the last one.
-
-    Raises:
-        InputError: that.
     """
-    for file in _files(read):
-        if before.setdefault(file, read[file]) != read[file] and not written(file):
-            raise InputError(f"{file} has changed before {name} read it, and after others did; start again")
+    found = [file for file in sorted(_files(read)) if before.setdefault(file, read[file]) != read[file]]
+    if not found:
+        return ""
+    return f"{found[0]} has changed before {name} read it, and after others did: what comes of both is mixed"
 
 
 def _files(read: Mapping[str, str]) -> set[str]:

@@ -49,7 +49,7 @@ _DATA = *_UNHEARD, ".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", 
 """The same of all data of a user's own."""
 
 _DEEP = 3
-"""So many folders in one another are followed that texts of a user's own name."""
+"""So many folders above one another are looked through for what texts of a user's own name, and so many within."""
 
 _Wanted = tuple[str, str]
 """A module, and the name that is taken from it; no name where it is the module itself."""
@@ -135,7 +135,8 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     """Of the data that texts of these name, as far as they are there: what may be opened unheard, with its parts, and
     the rest.
 
-    Files are looked for beside each module, a folder above, in the current one, and in folders there that texts name.
+    Files are looked for beside each module, in the current folder, in those above them, and in folders there that texts
+    name.
 
     Raises:
         InputError: a module has no source; a file cannot be read.
@@ -145,7 +146,8 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     if not any(text.lower().endswith(_DATA) for text in named):
         return set(), set()
     before = tuple(f"/{text}" for file, one in theirs if str(file) in sources_as_run.BEFORE for text in one)
-    folders = [Path.cwd(), *(one for file, _ in theirs for one in file.parents[:2])]
+    beside = [Path.cwd() / "here", *(file for file, _ in theirs)]
+    folders = [folder for one in beside for folder in one.parents[:_DEEP]]
     found = [one for one in named_there(named, folders, _DEEP) if one.name.lower().endswith(_DATA) and one.is_file()]
     unheard = {one for one in found if one.name.lower().endswith(_UNHEARD) or one.as_posix().endswith(before)}
     whole = {spelled(part) for path in unheard for part in _parts(path)}

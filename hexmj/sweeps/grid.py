@@ -18,7 +18,7 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_alike, check_unchanged, difference, holds
+from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
 from hexmj.user_code.opened_files import remembered
@@ -95,7 +95,8 @@ def finish(
             fail raises.
 
     Warns:
-        UserWarning: cells are not kept, since what their code has read has changed, or it runs what no import names.
+        UserWarning: cells are not kept, since what their code has read has changed, or it runs what no import names; or
+            one has read a file that has changed since another one did.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
@@ -126,11 +127,10 @@ def finish(
         made = _elsewhere(executor, tasks, folder, threads or 1)
     before: dict[str, str] = {}
     for i, (data, read, not_kept) in made:
-        check_alike(cells[i].name, before, read)
         cells[i].tell(read)
-        if not_kept and not warned:
+        if (told := unlike(cells[i].name, before, read) or not_kept) and not warned:
             warned = True
-            warn(not_kept, stacklevel=2)
+            warn(told, stacklevel=2)
         tell(i, 1.0 - done[i])
         yield i, data
     if folder:

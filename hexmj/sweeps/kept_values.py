@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
-from hexmj.sweeps.cells import Cell, check_alike, check_unchanged
+from hexmj.sweeps.cells import Cell, check_unchanged, unlike
 
 
 class KeptValues:
@@ -63,7 +63,8 @@ class KeptValues:
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
                 read, not_kept = self._cell.read()
-                check_alike(self._cell.name, self._read, read)
+                if told := unlike(self._cell.name, self._read, read):
+                    warn(told, stacklevel=2)
                 if not_kept:
                     warn(not_kept, stacklevel=2)
                     self._path = None
@@ -71,6 +72,7 @@ class KeptValues:
                     lines = (self._line(*one, read) for one in zip(new, values.tolist(), strict=True))
                     _add(self._path, "".join(lines))
             self._values |= zip(new, values.tolist(), strict=True)
+        self._cell.tell(self._read)
         return np.array([self._values[key] for key in keys])
 
     @property
@@ -94,7 +96,7 @@ class KeptValues:
                 whole = f"{line}\n" == self._line(key, number, read) and math.isfinite(number)
                 if whole and current(told or "{}"):
                     self._values[key] = number
-                    check_alike(self._cell.name, self._read, read)
+                    unlike(self._cell.name, self._read, read)
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 

@@ -31,7 +31,7 @@ _URI = re.compile(r"^file:(?://[^/?]*)?([^?]*)(\?.*)?$")
 
 _NO_DATA = re.compile(
     r"[/\\](__pycache__|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv))[/\\]"
-    r"|\.(egg|dist)-info[/\\]|[/\\](\.part-|torchinductor_)|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
+    r"|\.(egg|dist)-info[/\\]|[/\\](\.part-|dask-scratch-space|torchinductor_)|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
 )
 """In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
@@ -52,16 +52,19 @@ _SCRIPTS = "__main__", "__mp_main__"
 """Names of a script where it runs, and in the workers that it starts."""
 
 _OPENED: dict[str, set[str]] = {}
-"""Source -> what was opened or ran while a function or module of it was being called, if no cell told it."""
+"""Source, or `_ANYBODY` -> what was opened or ran while a function or module of it was called, if no cell told it."""
+
+_ANYBODY = ""
+"""Stands for a source where a thread opens something of which no function is a user's."""
 
 _COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
 """Thread that computes a cell -> files that the cell tells by itself, each as it really is, and its sources."""
 
+_NOTHING = set[str](), set[str]()
+"""The same of a thread that computes none."""
+
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
-
-_WRITTEN = set[str]()
-"""What cells have written as they were computed."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
@@ -71,7 +74,8 @@ _AT_FIRST: dict[str, tuple[int, ...]] = {}
 def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
     """While this thread computes a cell that tells some files by itself and has some sources."""
     mine = threading.get_ident()
-    outer, _COMPUTING[mine] = _COMPUTING.get(mine), ({os.path.realpath(file) for file in told}, sources)
+    outer = _COMPUTING.get(mine)
+    _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | (outer[1] if outer else set())
     try:
         yield
     finally:
@@ -85,20 +89,17 @@ def computes() -> bool:
     return threading.get_ident() in _COMPUTING
 
 
-def opened_by(sources: Iterable[str]) -> set[str]:
-    """What the code of some sources has opened, or found and run, and may remember."""
-    return set[str]().union(*(_OPENED.get(one, ()) for one in sources))
-
-
-def written(file: str) -> bool:
-    """Whether a cell has written a file as it was computed in this program."""
-    return file in _WRITTEN
+def opened_by(sources: set[str]) -> set[str]:
+    """What the code of some sources, if there are any, has opened, or found and run, and may remember."""
+    return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
 def knows(files: Iterable[str], sources: Iterable[str] = ()) -> None:
     """Note for whose code is being called, and for some sources, what has been read elsewhere that they may know."""
-    for one in {*_callers(sys._getframe(1)), *sources}:
-        _OPENED.setdefault(one, set()).update(files)
+    told, of_cell = _COMPUTING.get(threading.get_ident(), _NOTHING)
+    new = {file for file in files if _is_data(file) and os.path.realpath(file) not in told}
+    for one in {*_callers(sys._getframe(1)), *sources, *of_cell}:
+        _OPENED.setdefault(one, set()).update(new)
 
 
 def seen(files: Iterable[str]) -> None:
@@ -143,10 +144,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
-        writes = event == "open" and _writes(file, arguments[2])
-        if writes and computes():
-            _WRITTEN.add(file)
-        reads = not (writes or (event == "open" and _reads_a_source(file, sys._getframe(1))))
+        reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
         if reads and _is_data(os.path.normpath(file)):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
@@ -158,13 +156,12 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
     if read:
         for one in (file, really):
             _AT_FIRST.setdefault(one, _stamp(file))
-    told, sources = _COMPUTING.get(threading.get_ident(), (set[str](), set[str]()))
+    told, sources = _COMPUTING.get(threading.get_ident(), _NOTHING)
     if really in told or not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
         return
-    callers, main = _callers(opener, file) | sources, threading.main_thread()
-    if not callers and threading.current_thread() is not main:  # one of whom it works for
-        frames = sys._current_frames()
-        callers.update(*(_callers(frames[one], file) for one in {main.ident or 0, *_COMPUTING} & frames.keys()))
+    callers = _callers(opener, file) | sources
+    if not callers and threading.current_thread() is not threading.main_thread():
+        callers.add(_ANYBODY)
     for one in callers:
         _OPENED.setdefault(one, set()).add(file)
 

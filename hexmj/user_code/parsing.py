@@ -56,8 +56,9 @@ def named_there(texts: Iterable[str], folders: Iterable[Path], deep: int = 1) ->
     begin = defaultdict[str, list[str]](list)
     for text in texts:
         begin[text.partition("/")[0]].append(text)
-    found, new = list[Path](), [*dict.fromkeys(folders), *(Path(one) for one in begin.pop("", ()))]
-    known = set(new)
+    found = [Path(one) for one in begin.pop("", ()) if exists(one)]
+    new = [*dict.fromkeys(folders), *filter(isdir, found)]
+    known = {*new, *found}
     for _ in range(deep + 1):
         inner = [
             Path(folder, text) for folder in new for name in _listed(folder) & begin.keys() for text in begin[name]
