@@ -88,6 +88,22 @@ def test_a_cell_that_uses_values_that_a_search_has_kept_has_read_what_they_have(
         another_program(monkeypatch)
 
 
+def test_controllers_that_share_a_helper_do_not_count_each_other_s_files(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "shared_helper.py").write_text("ZERO = 0.0")
+    monkeypatch.syspath_prepend(tmp_path)
+    computed("1.0")
+    for at in ("one", "two"):
+        text = READER.format(gain=f"shared_helper.ZERO + float(Path('{at}/gain').read_text())")
+        Path(f"{at}.py").write_text(f"import shared_helper\n{text}")
+        reader = importable(f"{at}.py").Reader
+        run([Cell(at, reader().cell, {})], Path(f"kept_{at}"))
+    shutil.rmtree("kept")
+    Path("kept_two").rename("kept")
+    assert what_was_read() == {"two/gain"}
+
+
 def test_what_an_outer_cell_tells_and_the_package_s_own_do_not_count_for_it(
     computed: Callable[..., tuple[float, int]],
 ) -> None:

@@ -133,6 +133,10 @@ def _check(path: Path, manifest: Manifest) -> None:
     numbers = [name for name in manifest.files if holds_numbers(name)]
     if missing := [name for name in numbers if not (path.parent / name).is_file()]:
         raise InputError(f"{path} names {missing[0]}, which is not beside it; expected the whole result")
+    if missing := [name for name in manifest.own if not Path(name).is_file()]:
+        raise InputError(
+            f"{missing[0]}, with which {path} was made, is no file here; expected to run where that name leads to it"
+        )
     changed = changed_files(manifest, path.parent)
     for name in numbers:
         try:
@@ -140,10 +144,6 @@ def _check(path: Path, manifest: Manifest) -> None:
         except InputError as error:
             since = "; it was changed after it was written" if name in changed else ""
             raise InputError(f"{error}{since}") from None
-    if missing := [name for name in manifest.own if not Path(name).is_file()]:
-        raise InputError(
-            f"{missing[0]}, with which {path} was made, is no file here; expected to run where that name leads to it"
-        )
 
 
 def _repeat(path: Path, then: Manifest, more: list[str]) -> _Repeated:

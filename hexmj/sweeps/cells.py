@@ -14,7 +14,7 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.code import code, data_of_users, sources_of_users
+from hexmj.sweeps.code import code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
 from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled
 
@@ -74,9 +74,9 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def computing(self, kept: bool) -> AbstractContextManager[None]:
-        """While it is computed, to be kept or not: what it opens beyond what its settings name is noted."""
-        return computing(self._told_files(), sources_of_users(self._modules()) if kept else set())
+    def computing(self) -> AbstractContextManager[None]:
+        """While it is computed: what it opens beyond what its settings name is noted."""
+        return computing(self._told_files(), files_of_classes(self._modules()))
 
     def opened(self) -> set[str]:
         """What its code has opened so far in this program, and may remember."""

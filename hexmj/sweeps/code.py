@@ -131,6 +131,12 @@ def sources_of_users(modules: frozenset[str]) -> set[str]:
     return {os.path.abspath(file) for file, _ in _needed(modules).theirs}
 
 
+def files_of_classes(modules: frozenset[str]) -> set[str]:
+    """Files of some modules, as far as they are a user's own."""
+    files = {os.path.abspath(file) for name in modules if (file := _file(name))}
+    return {file for file in files if sources_as_run.is_users(file)}
+
+
 def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     """Of the data that texts of these name, as far as they are there: what may be opened unheard, with its parts, and
     the rest.

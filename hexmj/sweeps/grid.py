@@ -169,7 +169,7 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
     if path and (kept := _kept(cell, record, path)):
         return kept
     before = record if path else cell.settings_now()
-    with cell.computing(bool(record)):
+    with cell.computing():
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())

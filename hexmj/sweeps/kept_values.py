@@ -58,7 +58,7 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            with self._cell.computing(bool(self._path)):
+            with self._cell.computing():
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())

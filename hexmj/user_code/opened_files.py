@@ -58,7 +58,7 @@ _ANYBODY = ""
 """Stands for a source where a thread opens something of which no function is a user's."""
 
 _COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
-"""Thread that computes a cell -> files that the cell tells by itself, each as it really is, and its sources."""
+"""Thread that computes a cell -> files that the cell tells by itself, as they really are, and those of its classes."""
 
 _NOTHING = set[str](), set[str]()
 """The same of a thread that computes none."""
@@ -72,7 +72,7 @@ _AT_FIRST: dict[str, tuple[int, ...]] = {}
 
 @contextmanager
 def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
-    """While this thread computes a cell that tells some files by itself and has some sources."""
+    """While this thread computes a cell that tells some files by itself and whose classes stand in some sources."""
     mine = threading.get_ident()
     outer = _COMPUTING.get(mine)
     _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | (outer[1] if outer else set())
@@ -96,9 +96,8 @@ def opened_by(sources: set[str]) -> set[str]:
 
 def knows(files: Iterable[str], sources: Iterable[str] = ()) -> None:
     """Note for whose code is being called, and for some sources, what has been read elsewhere that they may know."""
-    told, of_cell = _COMPUTING.get(threading.get_ident(), _NOTHING)
-    new = {file for file in files if _is_data(file) and os.path.realpath(file) not in told}
-    for one in {*_callers(sys._getframe(1)), *sources, *of_cell}:
+    new = {file for file in files if _is_data(file) and not _counts_by_itself(file)}
+    for one in {*_callers(sys._getframe(1)), *sources, *_COMPUTING.get(threading.get_ident(), _NOTHING)[1]}:
         _OPENED.setdefault(one, set()).update(new)
 
 
@@ -152,18 +151,23 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
 def _note(file: str, opener: FrameType, read: bool) -> None:
     if _is_of_a_sweep(opener):
         return
-    really = os.path.realpath(file)
     if read:
-        for one in (file, really):
+        for one in (file, os.path.realpath(file)):
             _AT_FIRST.setdefault(one, _stamp(file))
-    told, sources = _COMPUTING.get(threading.get_ident(), _NOTHING)
-    if really in told or not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))):
+    if _counts_by_itself(file):
         return
-    callers = _callers(opener, file) | sources
+    callers = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
     if not callers and threading.current_thread() is not threading.main_thread():
         callers.add(_ANYBODY)
     for one in callers:
         _OPENED.setdefault(one, set()).add(file)
+
+
+def _counts_by_itself(file: str) -> bool:
+    """Whether the cell that this thread computes tells a file, or had it made, to be thrown away."""
+    really = Path(os.path.realpath(file))
+    told, _ = _COMPUTING.get(threading.get_ident(), _NOTHING)
+    return str(really) in told or not _TEMPORARY.isdisjoint(map(str, (really, *really.parents)))
 
 
 def _is_of_a_sweep(opener: FrameType) -> bool:

@@ -42,8 +42,8 @@ def _alone() -> Iterator[None]:
 
 
 def texts(tree: ast.AST) -> list[str]:
-    """The texts of a source that may be paths, without dots and slashes that one begins with or that lead nowhere, as
-    ``f"{folder}/leg.xml"`` has one."""
+    """The texts of a source that may be paths, without parts that are dots and slashes that one begins with, as
+    ``f"{folder}/leg.xml"`` has one; and paths from the root as they are."""
     constants = [one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
     names = [one for one in constants if len(one) < LONGEST and one.isprintable()]
     parts = [[part for part in one.split("/") if part not in ("", ".", "..")] for one in names]
@@ -51,7 +51,7 @@ def texts(tree: ast.AST) -> list[str]:
 
 
 def named_there(texts: Iterable[str], folders: Iterable[Path], deep: int = 1) -> list[Path]:
-    """What texts name in some folders, and, as often as asked, in the folders found so."""
+    """What texts name from the root on, in some folders, and, as often as asked, in the folders found so."""
     texts = list(texts)
     begin = defaultdict[str, list[str]](list)
     for text in texts:
