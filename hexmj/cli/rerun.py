@@ -137,12 +137,11 @@ def _check(path: Path, manifest: Manifest) -> None:
         raise InputError(
             f"{missing[0]}, with which {path} was made, is no file here; expected to run where that name leads to it"
         )
-    changed = changed_files(manifest, path.parent)
     for name in numbers:
         try:
             check_readable(path.parent / name)
         except InputError as error:
-            since = "; it was changed after it was written" if name in changed else ""
+            since = "; it was changed after it was written" if name in changed_files(manifest, path.parent) else ""
             raise InputError(f"{error}{since}") from None
 
 

@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import changed, computes, computing, knows, opened_by, seen, spelled
+from hexmj.user_code.opened_files import also_opened, changed, computes, computing, opened_by, seen, spelled
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -84,12 +84,12 @@ class Cell:
 
     def knows(self, opened: set[str]) -> None:
         """Note what its code has opened in the program that has sent it."""
-        knows(opened, sources_of_users(self._modules()))
+        also_opened(opened, sources_of_users(self._modules()))
 
     def tell(self, read: Mapping[str, str]) -> None:
         """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
         if computes():
-            knows({*_files(read), *map(spelled, self._told_files())})
+            also_opened({*_files(read), *map(spelled, self._told_files())})
 
     def read(self) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or

@@ -96,7 +96,7 @@ class KeptValues:
                 whole = f"{line}\n" == self._line(key, number, read) and math.isfinite(number)
                 if whole and current(told or "{}"):
                     self._values[key] = number
-                    unlike(self._cell.name, self._read, read)
+                    unlike(self._cell.name, self._read, read)  # nothing is: all of these are as they are today
         if rest := f"{record}\n"[len(first) :]:
             _add(path, rest, begin=True)
 

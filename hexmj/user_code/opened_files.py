@@ -94,8 +94,8 @@ def opened_by(sources: set[str]) -> set[str]:
     return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
-def knows(files: Iterable[str], sources: Iterable[str] = ()) -> None:
-    """Note for whose code is being called, and for some sources, what has been read elsewhere that they may know."""
+def also_opened(files: Iterable[str], sources: Iterable[str] = ()) -> None:
+    """Note for whose code is being called, and for some sources, what was opened elsewhere that they may know."""
     new = {file for file in files if _is_data(file) and not _counts_by_itself(file)}
     for one in {*_callers(sys._getframe(1)), *sources, *_COMPUTING.get(threading.get_ident(), _NOTHING)[1]}:
         _OPENED.setdefault(one, set()).update(new)
@@ -144,7 +144,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
         reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
-        if reads and _is_data(os.path.normpath(file)):
+        if reads and _is_data(file):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
 
@@ -214,6 +214,7 @@ def _stamp(file: str) -> tuple[int, ...]:
 
 def _is_data(file: str) -> bool:
     """Whether a path may be one of data of a user's own, or of a module."""
+    file = os.path.normpath(file)
     return is_users(file) and not (file.startswith(_SYSTEMS) or _NO_DATA.search(file) or os.path.isdir(file))
 
 

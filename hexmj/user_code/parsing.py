@@ -51,7 +51,13 @@ def texts(tree: ast.AST) -> list[str]:
 
 
 def named_there(texts: Iterable[str], folders: Iterable[Path], deep: int = 1) -> list[Path]:
-    """What texts name from the root on, in some folders, and, as often as asked, in the folders found so."""
+    """What texts name from the root on, in some folders, and in the folders found so; whatever is there.
+
+    Args:
+        texts: of a source, or of several, as `texts` gives them.
+        folders: where they are looked for.
+        deep: how many folders in one another are followed.
+    """
     texts = list(texts)
     begin = defaultdict[str, list[str]](list)
     for text in texts:
