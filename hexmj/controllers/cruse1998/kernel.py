@@ -13,9 +13,8 @@ other are five times slower (`make bench`).
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from hexmj.jitted import jitted
+from hexmj.jitted import inlined, jitted, part
 from hexmj.legs import MIRROR, N2, N4
 
 LANES = 64
@@ -47,7 +46,7 @@ _AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y = 0, 1, 2, 3, 4, 5
 _ORDER, _FRONT_LASTS, _CONTRA_LASTS, _CAP, _STRONGEST, _FINAL = range(6)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _influence(d, x, s, s_old, aep, v, p, k, rules):
     """Eq. 2-5 for leg d: the sum of Delta^1, Delta^2 and Delta^3, and Delta^4; `v` is V_r of P^nr."""
     rear, contra, front = REAR[d], CONTRA[d], FRONT[d]
@@ -67,7 +66,7 @@ def _influence(d, x, s, s_old, aep, v, p, k, rules):
     return pep, (k[_PEP_MIN] - aep[d]) * p[_P4_FRONT + d] if crossed else 0.0  # Eq. 5
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _capped(shift, rules):
     """Eq. 4's bound of an influence of mechanism 3."""
     if len(rules[_CAP]) != SUM:
@@ -77,7 +76,7 @@ def _capped(shift, rules):
     return shift
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _move(x, s, pep_shift, aep_shift, v, k):
     """Eq. 6 for one leg: its tip, state and AEP after the step."""
     x += -v * k[_DT] if s == 1.0 else k[_DT]
@@ -89,7 +88,7 @@ def _move(x, s, pep_shift, aep_shift, v, k):
     return x, (stays if s == 1.0 else lands), aep
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _influences(x, s, s_old, aep, v, p, k, rules):
     """Eq. 2-5 for all legs: the shifts of PEP, and those of AEP."""
     pep0, aep0 = _influence(0, x, s, s_old, aep, v, p, k, rules)
@@ -101,7 +100,7 @@ def _influences(x, s, s_old, aep, v, p, k, rules):
     return (pep0, pep1, pep2, pep3, pep4, pep5), (aep0, aep1, aep2, aep3, aep4, aep5)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _moves(x, s, pep_shift, aep_shift, v, k):
     """Eq. 6 for all legs at once."""
     x0, s0, aep0 = _move(x[0], s[0], pep_shift[0], aep_shift[0], v, k)
@@ -113,7 +112,7 @@ def _moves(x, s, pep_shift, aep_shift, v, k):
     return (x0, x1, x2, x3, x4, x5), (s0, s1, s2, s3, s4, s5), (aep0, aep1, aep2, aep3, aep4, aep5)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _move_in_turn(d, x, s, s_old, aep, v, v_neutral, p, k, rules):
     """Eq. 2-6 for leg d, the legs before it having moved already."""
     pep_shift, aep_shift = _influence(d, x, s, s_old, aep, v_neutral, p, k, rules)
@@ -121,14 +120,14 @@ def _move_in_turn(d, x, s, s_old, aep, v, v_neutral, p, k, rules):
     return _put(x, d, x_d), _put(s, d, s_d), _put(s_old, d, s[d]), _put(aep, d, aep_d)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _put(six, d, value):
     """Six numbers with the one of leg d replaced."""
     a, b, c = (value if d == 0 else six[0]), (value if d == 1 else six[1]), (value if d == 2 else six[2])
     return a, b, c, (value if d == 3 else six[3]), (value if d == 4 else six[4]), (value if d == 5 else six[5])
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
     """Eq. 2-6 leg after leg."""
     x, s, s_old, aep = _move_in_turn(0, x, s, s_old, aep, v, v_neutral, p, k, rules)
@@ -139,7 +138,7 @@ def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
     return _move_in_turn(5, x, s, s_old, aep, v, v_neutral, p, k, rules)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _stable(x, s, k):
     """Whether the centre of mass lies strictly inside the support polygon.
 
@@ -156,27 +155,27 @@ def _stable(x, s, k):
     return (front > 0.0) & (rear < 0.0)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _load(z, row, j):
     """The six legs' numbers of lane j."""
     at = row * LANES + j
     return (z[at], z[at + LANES], z[at + 2 * LANES], z[at + 3 * LANES], z[at + 4 * LANES], z[at + 5 * LANES])
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _store(z, row, j, six):
     at = row * LANES + j
     z[at], z[at + LANES], z[at + 2 * LANES] = six[0], six[1], six[2]
     z[at + 3 * LANES], z[at + 4 * LANES], z[at + 5 * LANES] = six[3], six[4], six[5]
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _neutral_velocity(z, j, rules):
     """V_r of P^nr, in lane j."""
     return z[(V_FINAL if len(rules[_FINAL]) else V) * LANES + j]
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _finish(z, j, x, s, s_old, aep, v, k):
     """Store a lane's legs after a step, note a first loss of static stability, and accelerate."""
     _store(z, X, j, x)
@@ -191,7 +190,7 @@ def _finish(z, j, x, s, s_old, aep, v, k):
     z[V * LANES + j] = k[_V_START] + k[_RATE] * (n * k[_DT]) if v < final else final  # Eq. 11
 
 
-@njit(nogil=True)
+@part
 def _step_printed(z, p, k, rules):
     """One step of a block, all six legs at once, PEP(t + dt) from Delta(t)."""
     for j in range(LANES):
@@ -205,7 +204,7 @@ def _step_printed(z, p, k, rules):
         _finish(z, j, x_new, s_new, s, aep_new, v, k)
 
 
-@njit(nogil=True)
+@part
 def _step_undelayed(z, p, k, rules):
     """One step of a block, all six legs at once, PEP(t + dt) from Delta(t + dt)."""
     for j in range(LANES):
@@ -217,7 +216,7 @@ def _step_undelayed(z, p, k, rules):
         _finish(z, j, x_new, s_new, s, aep_new, v, k)
 
 
-@njit(nogil=True)
+@part
 def _step_sequential(z, p, k, rules):
     """One step of a block, leg after leg."""
     for j in range(LANES):
@@ -228,7 +227,7 @@ def _step_sequential(z, p, k, rules):
         _finish(z, j, x, s, s_old, aep, v, k)
 
 
-@njit(nogil=True)
+@part
 def _step(z, order, p, k, rules):
     if len(order) == SEQUENTIAL:
         _step_sequential(z, p, k, rules)
@@ -238,7 +237,7 @@ def _step(z, order, p, k, rules):
         _step_printed(z, p, k, rules)
 
 
-@njit(nogil=True)
+@part
 def _begin(z, j, start, v, v_final, steps, k):
     """Put a start at time 0 into lane j: Delta = 0, AEP = AEP_0, s(-dt) = s(0), all legs stand."""
     for leg in range(6):
@@ -276,7 +275,7 @@ def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, 
             undecided += _undecided(z, j)
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def _undecided(z, j):
     return (z[LOST * LANES + j] == 0.0) & (z[DONE * LANES + j] < z[STEPS * LANES + j])
 
