@@ -275,6 +275,15 @@ def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
         assert float(run([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0
 
 
+def test_what_a_module_unpacks_to_be_thrown_away_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
+    unpacked = (
+        "with tempfile.TemporaryDirectory() as at:\n    GAIN = float(Path(shutil.copy('one/gain', at)).read_text())"
+    )
+    Path("reader.py").write_text(f"{READER.format(gain='GAIN')}\n{unpacked}\n")
+    run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    assert what_was_read() == {"one/gain"}
+
+
 def test_what_an_installed_base_opens_counts(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -134,6 +134,50 @@ def test_what_a_cell_brings_along_to_a_worker_counts_there(computed: Callable[..
     assert what_was_read() == {"one/gain"}
 
 
+def test_what_is_sent_of_a_file_that_was_edited_since_is_not_kept(computed: Callable[..., tuple[float, int]]) -> None:
+    """A worker that has never opened the file takes over what the object remembers of it."""
+    with ProcessPoolExecutor(1) as pool:
+        pool.submit(os.getpid).result()
+        Path("reader.py").write_text(READER.format(gain="self.known"))
+        reader = importable("reader.py").Reader()
+        assert reader.known == 1.0
+        Path("one/gain").write_text("7.0")
+        with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
+            (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+    assert data.gain == 1.0
+    assert not [*Path("kept").glob("*.nc")]
+
+
+def test_a_file_that_a_text_names_counts_whoever_has_opened_it(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here this test, which the code of the cell is handed the array by."""
+    np.savetxt("gains.csv", [1.0])
+    Path("reader.py").write_text(
+        READER.format(gain="float(cached('gains.csv'))") + "cached = functools.cache(np.loadtxt)"
+    )
+    module = importable("reader.py")
+    assert module.cached("gains.csv") == 1.0
+    run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+    another_program(monkeypatch)
+    np.savetxt("gains.csv", [2.0])
+    (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    assert data.gain == 2.0
+
+
+def test_what_an_inner_cell_has_read_and_is_edited_before_the_outer_one_is_done_is_not_kept(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inner = "hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
+    gain = f"[{inner}, Path('edits').exists() and Path('one/gain').write_text('7.0')][0]"
+    assert computed(gain) == (1.0, 1)
+    another_program(monkeypatch)
+    shutil.rmtree("kept")
+    Path("edits").touch()
+    with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
+        assert computed(gain) == (1.0, 2)
+
+
 def test_what_workers_cells_write_is_no_other_data_in_the_next_sweep(
     computed: Callable[..., tuple[float, int]],
 ) -> None:

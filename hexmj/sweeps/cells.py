@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import also_opened, changed, computes, computing, opened_by, seen, spelled
+from hexmj.user_code.opened_files import also_opened, changed, computes, computing, heard, opened_by, seen, spelled
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -26,6 +26,9 @@ _HERE = "."
 
 _THERE = "there"
 """Stands for the digest of a file that a text names and nobody was heard to open: a log, or one that code looks for."""
+
+_CHANGED = "changed"
+"""Stands for the digest of what a file held as it was opened first, where it has changed since or cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +81,16 @@ class Cell:
         """While it is computed: what it opens beyond what its settings name is noted."""
         return computing(self._told_files(), files_of_classes(self._modules()))
 
-    def opened(self) -> set[str]:
-        """What its code has opened so far in this program, and may remember."""
-        return opened_by(sources_of_users(self._modules()))
+    def opened(self) -> dict[str, str]:
+        """What it may remember of files that were opened so far in this program, file -> digest or `_CHANGED`."""
+        _, others = data_of_users(self._modules())
+        files = opened_by(sources_of_users(self._modules())) | heard(others) | set(map(spelled, self._told_files()))
+        return {file: _as_opened(file) for file in _beyond(files, ())}
 
-    def knows(self, opened: set[str]) -> None:
-        """Note what its code has opened in the program that has sent it."""
-        also_opened(opened, sources_of_users(self._modules()))
+    def knows(self, opened: Mapping[str, str]) -> str:
+        """Note what was opened in the program that has sent it; why it cannot be kept, in a sentence, else empty."""
+        also_opened(opened.keys() - set(map(spelled, self._told_files())), sources_of_users(self._modules()))
+        return self._outdated(file for file in sorted(opened) if not opened[file] == _as_opened(file) != _CHANGED)
 
     def tell(self, read: Mapping[str, str]) -> None:
         """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
@@ -98,7 +104,7 @@ class Cell:
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             unheard, others = data_of_users(self._modules())
-            files = _beyond(opened_by(sources) | unheard, {*told, *sources})
+            files = _beyond(opened_by(sources) | unheard | heard(others), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
                 return {}, (
                     f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
@@ -107,11 +113,8 @@ class Cell:
             read = dict.fromkeys(_beyond(others, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
-        if found := changed({*told, *files}):
-            return {}, (
-                f"{self.name} is not kept: {found[0]} has changed since it was opened first, and code may remember it;"
-                " start the program again"
-            )
+        if outdated := self._outdated(changed({*told, *files})):
+            return {}, outdated
         return (read | {_HERE: os.getcwd()} if read else {}), ""
 
     def would_read(self, read: Mapping[str, str]) -> bool:
@@ -123,6 +126,15 @@ class Cell:
             return False
         new = set[str]().union(*named) - read.keys()
         return same and not changed(_files(read)) and not (new and _beyond(new, self._told_files()))
+
+    def _outdated(self, changed: Iterable[str]) -> str:
+        """Why it cannot be kept if some files have changed, in a sentence; else empty."""
+        for file in changed:
+            return (
+                f"{self.name} is not kept: {file} has changed since it was opened first, and code may remember it;"
+                " start the program again"
+            )
+        return ""
 
     def _told_files(self) -> set[Path]:
         """Files that its settings name."""
@@ -210,6 +222,13 @@ def holds(file: str, digest: str) -> bool:
 def _held(file: str) -> str:
     """A digest of a file; empty if it is not there."""
     return digest_of(Path(file)) if os.path.exists(file) else ""
+
+
+def _as_opened(file: str) -> str:
+    """A digest of what a file held as it was opened first, if it can be told."""
+    with suppress(InputError):
+        return _CHANGED if changed([file]) else _held(file)
+    return _CHANGED
 
 
 def difference(one: str, other: str) -> str:

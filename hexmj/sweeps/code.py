@@ -48,6 +48,9 @@ _UNHEARD = *_MODELS, ".mjb", ".pt", ".pth", ".onnx", ".safetensors", ".h5", ".hd
 _DATA = *_UNHEARD, ".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt", ".npy", ".npz", ".pkl"
 """The same of all data of a user's own."""
 
+_OPEN_BY_THEMSELVES = {"cv2", "duckdb", "polars", "pyarrow"}
+"""Packages that open any data unheard."""
+
 _DEEP = 3
 """So many folders above one another are looked through for what texts of a user's own name, and so many within."""
 
@@ -147,7 +150,8 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     Raises:
         InputError: a module has no source; a file cannot be read.
     """
-    theirs = _needed(modules).theirs
+    needed = _needed(modules)
+    theirs, ends = needed.theirs, _DATA if _OPEN_BY_THEMSELVES & needed.versions.keys() else _UNHEARD
     named = {text for _, one in theirs for text in one}
     if not any(text.lower().endswith(_DATA) for text in named):
         return set(), set()
@@ -155,7 +159,7 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     beside = [Path.cwd() / "here", *(file for file, _ in theirs)]
     folders = [folder for one in beside for folder in one.parents[:_DEEP]]
     found = [one for one in named_there(named, folders, _DEEP) if one.name.lower().endswith(_DATA) and one.is_file()]
-    unheard = {one for one in found if one.name.lower().endswith(_UNHEARD) or one.as_posix().endswith(before)}
+    unheard = {one for one in found if one.name.lower().endswith(ends) or one.as_posix().endswith(before)}
     whole = {spelled(part) for path in unheard for part in _parts(path)}
     return whole, {spelled(path) for path in found} - whole
 

@@ -180,7 +180,7 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
 
 
 def _made_by_a_worker(
-    pickled: bytes, record: str, path: Path | None, threads: int, opened: set[str], mark: Path | None
+    pickled: bytes, record: str, path: Path | None, threads: int, opened: dict[str, str], mark: Path | None
 ) -> "Made":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
     long as somebody waits.  What its code has opened where it was sent from it may have brought along."""
@@ -199,8 +199,9 @@ def _made_by_a_worker(
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    cell.knows(opened)
-    return _made(cell, record, path, threads=threads)
+    outdated = cell.knows(opened)
+    data, read, not_kept = _made(cell, record, None if outdated else path, threads=threads)
+    return data, read, outdated if path and outdated else not_kept
 
 
 def _elsewhere(

@@ -31,7 +31,7 @@ _URI = re.compile(r"^file:(?://[^/?]*)?([^?]*)(\?.*)?$")
 
 _NO_DATA = re.compile(
     r"[/\\](__pycache__|\.(cache|config|git|ipython|jupyter|local|matplotlib|venv))[/\\]"
-    r"|\.(egg|dist)-info[/\\]|[/\\](\.part-|dask-scratch-space|torchinductor_)|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
+    r"|\.(egg|dist)-info[/\\]|[/\\](\.part-|dask-scratch-space|torchinductor_|fontlist-v)|\.(py[cod]|nb[ic])$|-[0-9a-f]{12}\.(nc|jsonl)$"
 )
 """In paths of what Python, libraries and tools keep of their own, and of kept cells and values."""
 
@@ -64,7 +64,7 @@ _NOTHING = set[str](), set[str]()
 """The same of a thread that computes none."""
 
 _TEMPORARY = set[str]()
-"""What cells have had made as they were computed, to be used and thrown away."""
+"""What cells have had made as they were computed, and modules as they were imported, to be used and thrown away."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
@@ -96,7 +96,8 @@ def opened_by(sources: set[str]) -> set[str]:
 
 def also_opened(files: Iterable[str], sources: Iterable[str] = ()) -> None:
     """Note for whose code is being called, and for some sources, what was opened elsewhere that they may know."""
-    new = {file for file in files if _is_data(file) and not _counts_by_itself(file)}
+    new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
+    seen(new)
     for one in {*_callers(sys._getframe(1)), *sources, *_COMPUTING.get(threading.get_ident(), _NOTHING)[1]}:
         _OPENED.setdefault(one, set()).update(new)
 
@@ -105,6 +106,11 @@ def seen(files: Iterable[str]) -> None:
     """Note how some files are that code may open where nobody hears it."""
     for file in files:
         _AT_FIRST.setdefault(file, _stamp(file))
+
+
+def heard(files: set[str]) -> set[str]:
+    """Those of some files that anybody in this program has opened."""
+    return files & _AT_FIRST.keys()
 
 
 def remembered(file: str) -> bool:
@@ -125,7 +131,7 @@ def spelled(file: str | Path) -> str:
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    if event in _MAKES and _COMPUTING:
+    if event in _MAKES and (_COMPUTING or _imports(sys._getframe(1))):
         _TEMPORARY.add(os.path.realpath(arguments[0]))
     if event not in _PATH:
         return
@@ -151,10 +157,11 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
 def _note(file: str, opener: FrameType, read: bool) -> None:
     if _is_of_a_sweep(opener):
         return
+    really = os.path.realpath(file)
     if read:
-        for one in (file, os.path.realpath(file)):
-            _AT_FIRST.setdefault(one, _stamp(file))
-    if _counts_by_itself(file):
+        for one in {file, really} - _AT_FIRST.keys():
+            _AT_FIRST[one] = _stamp(file)
+    if _counts_by_itself(really):
         return
     callers = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
     if not callers and threading.current_thread() is not threading.main_thread():
@@ -163,11 +170,10 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
         _OPENED.setdefault(one, set()).add(file)
 
 
-def _counts_by_itself(file: str) -> bool:
-    """Whether the cell that this thread computes tells a file, or had it made, to be thrown away."""
-    really = Path(os.path.realpath(file))
+def _counts_by_itself(really: str) -> bool:
+    """Whether the cell that this thread computes tells a file, or it was made to be thrown away."""
     told, _ = _COMPUTING.get(threading.get_ident(), _NOTHING)
-    return str(really) in told or not _TEMPORARY.isdisjoint(map(str, (really, *really.parents)))
+    return really in told or (bool(_TEMPORARY) and not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))))
 
 
 def _is_of_a_sweep(opener: FrameType) -> bool:
@@ -179,6 +185,11 @@ def _is_of_a_sweep(opener: FrameType) -> bool:
         if not (by.startswith((_OURS, "<")) or _is_of_python(by)):
             return False
     return False
+
+
+def _imports(frame: FrameType) -> bool:
+    """Whether a module is being imported."""
+    return any(one.f_code.co_filename.startswith("<frozen importlib.") for one, _ in walk_stack(frame))
 
 
 def _callers(frame: FrameType, file: str = "") -> set[str]:
