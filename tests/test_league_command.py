@@ -1,15 +1,17 @@
 """The command league: what its options come to, and what it writes and tells."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from rich.console import Console
 
 from hexmj.cli.commands import options_of
 from hexmj.cli.tables import tables_that_fit
-from hexmj.errors import InputError
+from hexmj.errors import InputError, RenderingError
 from hexmj.studies.league.study import League
 
 SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --window 10 --no-video --out here"
@@ -48,6 +50,21 @@ def test_tables_are_as_wide_as_the_screen_and_break_no_cell(monkeypatch) -> None
         text = lines.getvalue()
         assert text.count("0.123 (.01-.99)") == 9 and all(name in text.split() for name in head)
         assert text.count("a" * 20) == -(-9 // ((columns - 20) // 17))
+
+
+@pytest.mark.parametrize(("error", "stops"), [(InputError("no space"), True), (RenderingError("no space"), False)])
+def test_a_film_that_cannot_be_written_stops_the_command_and_one_that_cannot_be_made_does_not(
+    monkeypatch: pytest.MonkeyPatch, capsys, tmp_path: Path, error: Exception, stops: bool
+) -> None:
+    def filmed(*_: object) -> Path:
+        raise error
+
+    command = options_of(["league", "--out", str(tmp_path)])
+    monkeypatch.setattr(type(command), "_filmed", filmed)
+    monkeypatch.setattr("hexmj.cli.league.league_markdown", lambda _: "")
+    with pytest.raises(InputError, match="no space") if stops else nullcontext():
+        command.write_others(xr.Dataset())
+    assert stops or capsys.readouterr().err == "hexmj: no video: no space\n"
 
 
 @pytest.mark.slow

@@ -59,6 +59,7 @@ NONSENSE = [
     (["variants", "--physical", "--contact-gap", "0.01"], "--contact-gap = 0.01 with falls only"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),
     (["flss", "--velocities", "1.2"], "0 <= V < 1"),
+    (["search", "--threads", "0"], "threads = 0; expected a whole number of at least 1"),
     (["flss", "--threads", "0", "--processes", "2"], "threads = 0; expected a whole number of at least 1"),
     (["flss", "--velocities", "fast"], "Could not find valid parse for arguments: ['fast']"),
     (["flss", "--velocity", "0.1"], "Unrecognized options"),
@@ -122,7 +123,9 @@ def test_nonsense_gets_a_sentence_and_code_2_and_leaves_results_alone(run, tmp_p
     assert code == 2
     assert sentence in " ".join(error.replace("│", " ").split())
     assert out == ""
-    assert all(path.read_text() == "precious" for path in results)
+    assert {path: path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == dict.fromkeys(
+        results, "precious"
+    )
 
 
 def test_a_folder_that_is_a_file(run, tmp_path):

@@ -111,7 +111,7 @@ class League(StudyCommand):
             return [table]
         try:
             return [table, self._filmed(result)]
-        except (InputError, SimulationError, RenderingError) as error:
+        except RenderingError as error:
             print(f"hexmj: no video: {literal(str(error))}", file=sys.stderr)
             return [table]
 
@@ -119,10 +119,10 @@ class League(StudyCommand):
         """The best in physics side by side, from the first of the random starts, but for walks that are refused.
 
         Raises:
-            InputError, SimulationError, RenderingError: there is no video, and why.
+            RenderingError: there is no video, and why.
+            InputError: it cannot be written.
         """
         from hexmj.replay.film.video import missing, render
-        from hexmj.studies.league.in_physics import REFUSALS
 
         if sentence := missing():
             raise RenderingError(sentence)
@@ -132,7 +132,7 @@ class League(StudyCommand):
         for name in best:
             try:
                 shown.append(recorded(self, takes_part[name].controller, v, 0, title=name))
-            except REFUSALS as error:
+            except (InputError, SimulationError) as error:
                 print(f"hexmj: {literal(f'{name} is not in the video: {error}')}", file=sys.stderr)
         if not shown:
             raise RenderingError("no controller of this league walks the first random start")

@@ -14,6 +14,7 @@ from hexmj.cli.tables import interval, print_json, save_figure, show, table
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
+from hexmj.process.threads import thread_count
 from hexmj.starts import SAMPLE
 from hexmj.storage.files import read_toml
 from hexmj.storage.literal import literal
@@ -121,6 +122,7 @@ class Search(WalkingCommand):
 
     def _check(self) -> None:
         """Refuse what makes no sense together, or would not be obeyed."""
+        thread_count(self.workers.threads)
         if not self.physical:
             self.refuse_physical("without --physical")
         if self.verdict_seed == self.walks.seed:

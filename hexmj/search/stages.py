@@ -15,6 +15,7 @@ from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError, without_extra
 from hexmj.process.progress import Progress, shown
+from hexmj.process.threads import thread_count
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import Asked, history
@@ -121,6 +122,7 @@ def search(
     """
     typed("problem", problem, Problem)
     typed("effort", effort, Effort)
+    thread_count(threads)
     folder = None if folder is None else path_of(folder)
     if problem.conditions:
         from hexmj.physics.settling import check_adhesion
