@@ -76,6 +76,22 @@ def test_the_order_of_the_axes_changes_nothing(name: str):
             assert pixels(result.isel(start=slice(None, None, -1)), which) == whole
 
 
+@pytest.mark.parametrize(
+    ("name", "axis"), [("flss", "velocity"), ("compare", "velocity"), ("disturb", "velocity"), ("converge", "vp")]
+)
+def test_curves_join_neighbours_in_whatever_order_they_were_walked(name: str, axis: str):
+    for order in (slice(None), slice(None, None, -1)):
+        drawn = hexmj.plot(made(name).isel({axis: order}))
+        curves = [line.get_xdata() for axes in drawn.axes for line in axes.lines if line.get_linestyle() != "None"]
+        assert len(curves) > 0 and all(np.all(np.diff(x) >= 0.0) for x in map(np.asarray, curves))
+
+
+def test_values_that_print_alike_have_bars_of_their_own():
+    result = made("map").assign_coords(value=("value", [160.0, 160.0000001], made("map").value.attrs))
+    bars = {patch.get_x() for patch in hexmj.plot(result, "mechanisms").axes[0].patches}  # pyright: ignore
+    assert len(bars) == 2
+
+
 @pytest.mark.parametrize("name", ["flss", "compare", "map", "converge", "terrain", "disturb", "variants", "biology"])
 def test_numbers_of_all_starts_are_not_drawn_of_a_part_of_them(name: str):
     result = made(name)

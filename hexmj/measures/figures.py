@@ -47,7 +47,7 @@ def comparison_figure(result: "xr.Dataset") -> "Picture":
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     shifts = dict(zip(MEASURE_COLOURS, np.linspace(-0.5, 0.5, len(MEASURE_COLOURS)) * BESIDE, strict=True))
     for axes, name in zip(panels.ravel(), names, strict=False):
-        one = result.sel(controller=name)
+        one = result.sel(controller=name).sortby("velocity")
         for measure, colour in MEASURE_COLOURS.items():
             style = {"color": colour, "label": measure, "markersize": 4.5} | MEASURE_STYLES[measure]
             frequency_curve(axes, one.velocity + shifts[measure], one, measure, **style)
@@ -75,8 +75,8 @@ def flss_figure(table: "xr.Dataset") -> "Picture":
         raise InputError("a result of kinematic and of physical FLSS; expected one of them")
     axes = figure.subplots()
     style = {"color": MEASURE_COLOURS[kind], "markersize": 4.5} | MEASURE_STYLES[kind]
-    named = table.rename(low="flss_low", high="flss_high")
-    frequency_curve(axes, table.velocity, named, "flss", **style)
+    named = table.rename(low="flss_low", high="flss_high").sortby("velocity")
+    frequency_curve(axes, named.velocity, named, "flss", **style)
     flss_axes(axes, table.velocity.values)
     head(figure, f"{kind} FLSS with 95 % intervals", caption(table))
     return figure

@@ -43,7 +43,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
     used = [strategy for strategy in STYLES if strategy in strategies]
     shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
-    one = result.sel(window="whole")
+    one = result.sel(window="whole").sortby("velocity")
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
         if measure == "kinematic" and kind.startswith("push"):

@@ -83,7 +83,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Picture":
     columns, total = result.sizes["velocity"], result.sizes["start"]
     figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
     panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
-    values = [f"{value:g}" for value in result.value.values]
+    values = range(result.sizes["value"])
     for panel, v in zip(panels, result.velocity.values, strict=True):
         bottom = np.zeros(len(values))
         for name, colour in MECHANISM_COLOURS.items():
@@ -94,6 +94,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Picture":
         for measure, style in MARKS.items():
             panel.plot(values, 1.0 - result[measure].sel(velocity=v).values, **BAR, **style)
         panel.set_title(f"V = {v:g}", fontsize=11)
+        panel.set_xticks(values, [f"{value:g}" for value in result.value.values])
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")

@@ -59,7 +59,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
     lines: dict[float, Any] = dict(zip(result.leg_mass.values, LINES * len(result.leg_mass), strict=False))
     for mass, line in lines.items():
-        one, first = result.sel(leg_mass=mass), mass == result.leg_mass[0]
+        one, first = result.sel(leg_mass=mass).sortby("vp"), mass == result.leg_mass[0]
         _frequencies(axes["flss"], one, line, first)
         for panel, (_, curves) in PANELS.items():
             for name, (colour, label) in curves.items():
