@@ -14,6 +14,7 @@ from hexmj.sweeps import Cell
 
 PATHS = ".", *(str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}
+WITHOUT_DASK = os.environ | {"PYTHONPATH": os.pathsep.join([*PATHS, str(Path(__file__).with_name("without_dask"))])}
 
 BODY = '<mujoco><worldbody><body><geom size="1" mass="{}"/></body></worldbody></mujoco>'
 """An MJCF of one mass."""

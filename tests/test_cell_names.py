@@ -24,7 +24,7 @@ from hexmj.sweeps import Cell, packages
 from hexmj.sweeps.code import code
 from hexmj.sweeps.packages import NAMES
 from hexmj.user_code.loaded import importable
-from small_cells import ENVIRONMENT, MINE, Wave, odd_bits, told_how
+from small_cells import MINE, WITHOUT_DASK, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
 
 
@@ -59,7 +59,7 @@ def test_what_was_typed_in_cannot_be_kept(tmp_path: Path) -> None:
     typed = "import xarray; from hexmj.sweeps import *; from pathlib import Path\n"
     typed += "def f(): return xarray.Dataset()\nrun([Cell('a', f, {})]); run([Cell('a', f, {})], Path('kept'))"
     command = [sys.executable, "-c", typed]
-    ended = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    ended = subprocess.run(command, cwd=tmp_path, env=WITHOUT_DASK, capture_output=True, text=True)
     assert ended.stderr.endswith("write it into a file\n") and "__main__ has no source" in ended.stderr
 
 
@@ -129,7 +129,7 @@ print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
 def version_of_my_helper(mine: Path, folder: Path) -> tuple[str, str]:
     """Of `my_helper` in a folder of installed packages, and of NumPy, as a cell's name tells them."""
     mine.write_text("import my_helper\nimport numpy")
-    environment = ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(folder)])}
+    environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join([WITHOUT_DASK["PYTHONPATH"], str(folder)])}
     command = [sys.executable, "-c", VERSIONS.format(mine=mine)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     found = json.loads(done.stdout or done.stderr)
@@ -181,13 +181,13 @@ print(Cell("toy", cell, {"controller": Tripod()}).record())
 def test_a_script_that_runs_as_a_module_counts_what_it_imports(toy: Path) -> None:
     (toy / "toy" / "run.py").write_text("from . import louder\n" + MINE + "\n" + PRINT_MAIN)
     command = [sys.executable, "-m", "toy.run"]
-    done = subprocess.run(command, cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=toy, env=WITHOUT_DASK, capture_output=True, text=True)
     assert {"run.py", "toy", "toy.louder"} <= set(json.loads(done.stdout)["sources"]), done.stderr
 
 
 def test_a_script_of_any_name_counts_what_it_imports(toy: Path) -> None:
     (toy / "script").write_text("import helper\n" + MINE + "\n" + PRINT_MAIN)
-    done = subprocess.run([sys.executable, "script"], cwd=toy, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "script"], cwd=toy, env=WITHOUT_DASK, capture_output=True, text=True)
     assert {"script", "helper"} <= set(json.loads(done.stdout)["sources"]), done.stderr
 
 

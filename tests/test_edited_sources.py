@@ -15,7 +15,7 @@ from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps import code as sources
 from hexmj.sweeps.code import code
 from hexmj.user_code.loaded import importable
-from small_cells import ENVIRONMENT, MINE
+from small_cells import MINE, WITHOUT_DASK
 from toy_project import write_toy
 
 
@@ -50,7 +50,7 @@ def used_record(folder: Path, how: str) -> subprocess.CompletedProcess[str]:
     (folder / "used.py").write_text("GAIN = 0.5")
     (folder / "controller.py").write_text("import used\n" + MINE)
     command = [sys.executable, "-c", USED, how]
-    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+    return subprocess.run(command, cwd=folder, env=WITHOUT_DASK, capture_output=True, text=True)
 
 
 def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: P
         "def record(): return Cell('late', cell, {}).record()"
     )
     command = [sys.executable, "-c", LATE]
-    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=tmp_path, env=WITHOUT_DASK, capture_output=True, text=True)
     assert "helper.py was edited while this program used it; start it again" in done.stderr
     assert not list(tmp_path.rglob("*.nc"))
 
@@ -102,7 +102,7 @@ def test_a_module_that_is_found_only_as_a_cell_is_computed_is_refused(tmp_path: 
         "def cell():\n    sys.path.insert(0, 'lib')\n    import helper\n    return xr.Dataset({'a': helper.GAIN})\n"
     )
     command = [sys.executable, "-c", FOUND_LATE]
-    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=tmp_path, env=WITHOUT_DASK, capture_output=True, text=True)
     assert "late: helper of sources has changed while it was in use" in done.stderr
     assert not list(tmp_path.rglob("*.nc"))
 
@@ -121,7 +121,7 @@ print(Cell("toy", cell, {"controller": stale.Tripod()}).record())
 def test_bytecode_of_another_source_is_refused(tmp_path: Path, when: str) -> None:
     """Python knows it by its time and size alone; whether the module ran before the package was imported or after."""
     write_toy(tmp_path)
-    environment = {name: value for name, value in ENVIRONMENT.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {name: value for name, value in WITHOUT_DASK.items() if name != "PYTHONDONTWRITEBYTECODE"}
     command, ended = [sys.executable, "-c", STALE, when], []
     for gain in ("12.0", "01.0"):
         (tmp_path / "stale.py").write_text(f"{MINE}GAIN = {gain}")
@@ -147,7 +147,7 @@ def test_bytecode_that_does_what_its_source_says_is_not_refused(tmp_path: Path, 
     text = "NAN = 1e999 - 1e999\nKNOWN = 'a' in {'a', 'b', 'c', 'd'}\ndef cell(controller): ..."
     (tmp_path / "sound.py").write_text(text)
     (tmp_path / "mine.py").write_text(MINE)
-    environment = {name: value for name, value in ENVIRONMENT.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {name: value for name, value in WITHOUT_DASK.items() if name != "PYTHONDONTWRITEBYTECODE"}
     for more in (how, {}):
         command = [sys.executable, "-c", SOUND]
         done = subprocess.run(command, cwd=tmp_path, env=environment | more, capture_output=True, text=True)

@@ -264,6 +264,18 @@ def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
     assert computed(gain) == (1.0, 3)
 
 
+def test_a_log_that_cells_write_does_not_count_if_the_program_looks_at_it(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    """Here this test, between two sweeps."""
+    Path("it.csv").touch()
+    for calls in (1, 2):
+        gain = f"[1.0, open('it.csv', 'a').write('{calls}')][0]"
+        assert computed(gain) == (1.0, calls)
+        assert Path("it.csv").read_text() == "12"[:calls]
+    assert len([*Path("kept").glob("*.nc")]) == 2
+
+
 def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
     computed: Callable[..., tuple[float, int]],
 ) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from small_cells import BODY, ENVIRONMENT
+from small_cells import BODY, WITHOUT_DASK
 
 NEW = "import xarray as xr\nfrom pathlib import Path\n"
 SWEEPS = """
@@ -25,7 +25,7 @@ def sweep(folder: Path, *how: str, **files: str) -> tuple[float, int, str]:
         (path := folder / f"{name.replace('__', '/')}.py").parent.mkdir(exist_ok=True)
         path.write_text(text)
     command = [sys.executable, *how, "script.py"]
-    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=folder, env=WITHOUT_DASK, capture_output=True, text=True)
     kept = len(list((folder / "kept").iterdir())) if (folder / "kept").exists() else -1
     return float(done.stdout.split()[0] if done.stdout else "nan"), kept, done.stderr
 
@@ -209,7 +209,7 @@ def test_a_command_says_in_one_line_what_is_not_kept(tmp_path: Path) -> None:
         "out",
     ]
     done = subprocess.run(
-        [sys.executable, "-m", "hexmj", *words], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True
+        [sys.executable, "-m", "hexmj", *words], cwd=tmp_path, env=WITHOUT_DASK, capture_output=True, text=True
     )
     said = [line for line in done.stderr.splitlines() if "not kept" in line]
     assert len(said) == 1 and said[0].startswith("hexmj: tripod-V-0.5-from-0 is not kept: its code opens or runs ")

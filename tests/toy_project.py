@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from small_cells import ENVIRONMENT, MINE
+from small_cells import MINE, WITHOUT_DASK
 
 TOY = {
     "toy/__init__.py": "from toy.louder import louder\nfrom toy.walk import walk\nwalk = louder(walk)",
@@ -41,7 +41,7 @@ print(Cell("toy", cell, {"controller": importable("mine.py").Tripod()}).record()
 
 def toy_record(folder: Path) -> str:
     command = [sys.executable, "-c", PRINT_STEM]
-    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(command, cwd=folder, env=WITHOUT_DASK, capture_output=True, text=True, check=True).stdout
 
 
 def write_toy(tmp_path: Path) -> Path:

@@ -83,8 +83,7 @@ class Cell:
 
     def opened(self) -> dict[str, str]:
         """What it may remember of files that were opened so far in this program, file -> digest or `_CHANGED`."""
-        _, others = data_of_users(self._modules())
-        files = opened_by(sources_of_users(self._modules())) | heard(others) | set(map(spelled, self._told_files()))
+        files = opened_by(sources_of_users(self._modules())) | set(map(spelled, self._told_files()))
         return {file: _as_opened(file) for file in _beyond(files, ())}
 
     def knows(self, opened: Mapping[str, str]) -> str:

@@ -66,6 +66,9 @@ _NOTHING = set[str](), set[str]()
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, and modules as they were imported, to be used and thrown away."""
 
+_WRITTEN = set[str]()
+"""What was written while cells were computed."""
+
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
 
@@ -109,8 +112,8 @@ def seen(files: Iterable[str]) -> None:
 
 
 def heard(files: set[str]) -> set[str]:
-    """Those of some files that anybody in this program has opened."""
-    return files & _AT_FIRST.keys()
+    """Those of some files that anybody in this program has opened, but for what its cells write."""
+    return (files & _AT_FIRST.keys()) - _WRITTEN
 
 
 def remembered(file: str) -> bool:
@@ -149,7 +152,10 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
-        reads = event != "open" or not (_reads_a_source(file, sys._getframe(1)) or _writes(file, arguments[2]))
+        writes = event == "open" and _writes(file, arguments[2])
+        if writes and _COMPUTING:
+            _WRITTEN.add(file)
+        reads = not (writes or (event == "open" and _reads_a_source(file, sys._getframe(1))))
         if reads and _is_data(file):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
 
