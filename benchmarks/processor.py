@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
+from typing import Any, cast
 
 import numpy as np
 from numba import njit
@@ -40,7 +41,7 @@ def clock(turns: int = 20_000_000) -> float:
 def operations() -> tuple[int, int]:
     """Arithmetic operations of the compiled kernel for each start and step (0 without AVX), and how many at a time."""
     block, p, k, rules = np.zeros(kernel.ROWS * kernel.LANES), (0.0,) * 72, (1.0,) * 18, ((),) * 6
-    step = njit(kernel._step_printed.py_func)
+    step = cast(Any, njit)(kernel._step_printed.py_func)
     step(block, p, k, rules)
     code = step.inspect_asm(step.signatures[0])
     lines = [line for line in code.splitlines() if re.match(rf"\s+{ARITHMETIC}\s", line)]

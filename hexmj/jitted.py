@@ -4,9 +4,12 @@ from collections.abc import Callable
 from hashlib import sha256
 from typing import Any, TypeVar
 
-from numba import njit
+import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+njit: Any = numba.njit
+"""Whose types tell not all of its options."""
 
 part = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """A function that only compiled ones call.  Without what Python would call it by, it compiles in half of the time."""

@@ -270,9 +270,8 @@ def test_a_log_that_cells_write_does_not_count_if_the_program_looks_at_it(
     """Here this test, between two sweeps."""
     Path("it.csv").touch()
     for calls in (1, 2):
-        gain = f"[1.0, open('it.csv', 'a').write('{calls}')][0]"
-        assert computed(gain) == (1.0, calls)
-        assert Path("it.csv").read_text() == "12"[:calls]
+        assert computed(f"[1.0, Path('it.csv').write_text('{calls}')][0]") == (1.0, calls)
+        assert Path("it.csv").read_text() == str(calls)
     assert len([*Path("kept").glob("*.nc")]) == 2
 
 
