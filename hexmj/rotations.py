@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
+from numba import njit
 
-from hexmj.jitted import inlined, jitted
+from hexmj.jitted import jitted
 
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -50,7 +51,7 @@ def lowest(qpos: Any, corners: Any, radii: Any) -> float:
     return least
 
 
-@inlined
+@njit(nogil=True, forceinline=True)
 def matrix(w: float, x: float, y: float, z: float) -> Any:
     """The rotation of one quaternion, row by row: nine numbers, for compiled code."""
     return (

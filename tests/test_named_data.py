@@ -47,18 +47,5 @@ def test_what_libraries_open_by_themselves_is_found(
     assert [*map(Path, unheard)] == [file] and not others
 
 
-@pytest.mark.parametrize(("imports", "unheard"), [("import polars", {"gains.csv"}), ("import csv", set())])
-def test_packages_that_open_all_by_themselves_are_known(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, imports: str, unheard: set[str]
-) -> None:
-    name = f"mine_{imports[-3:]}"
-    (tmp_path / f"{name}.py").write_text(f"GAINS = 'gains.csv'\ndef read():\n    {imports}\n")
-    (tmp_path / "gains.csv").write_text("1.0")
-    monkeypatch.syspath_prepend(tmp_path)
-    found, others = data_of_users(frozenset({name}))
-    assert {Path(one).name for one in found} == unheard
-    assert {Path(one).name for one in others} == {"gains.csv"} - unheard
-
-
 def test_an_mjcf_that_is_gone_as_it_is_looked_through_is_not_there(tmp_path: Path) -> None:
     assert code._parts(tmp_path / "leg.xml") == []

@@ -264,6 +264,18 @@ def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
     assert computed(gain) == (1.0, 3)
 
 
+def test_what_packages_open_by_themselves_counts_by_what_it_holds(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    imports = "def read():\n    import polars\n"
+    Path("reader.py").write_text(READER.format(gain="float(os.path.getsize('it.csv'))") + imports)
+    for text in ("a", "ab"):
+        Path("it.csv").write_text(text)
+        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+        assert data.gain == len(text)
+        another_program(monkeypatch)
+
+
 def test_a_log_that_cells_write_does_not_count_if_the_program_looks_at_it(
     computed: Callable[..., tuple[float, int]],
 ) -> None:
@@ -284,15 +296,6 @@ def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
     write_all("7.0")
     with pytest.warns(UserWarning, match="one.gain.db has changed since it was opened first"):
         assert float(run([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0
-
-
-def test_what_a_module_unpacks_to_be_thrown_away_does_not_count(computed: Callable[..., tuple[float, int]]) -> None:
-    unpacked = (
-        "with tempfile.TemporaryDirectory() as at:\n    GAIN = float(Path(shutil.copy('one/gain', at)).read_text())"
-    )
-    Path("reader.py").write_text(f"{READER.format(gain='GAIN')}\n{unpacked}\n")
-    run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
-    assert what_was_read() == {"one/gain"}
 
 
 def test_what_an_installed_base_opens_counts(

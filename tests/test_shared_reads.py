@@ -14,6 +14,7 @@ from hexmj.errors import InputError
 from hexmj.sweeps import Cell, KeptValues, finish, run
 from hexmj.sweeps.cells import unlike
 from hexmj.user_code.loaded import importable
+from hexmj.user_code.opened_files import heard, spelled
 from reader import READER, another_program, what_was_read, write_all
 
 
@@ -146,6 +147,24 @@ def test_what_is_sent_of_a_file_that_was_edited_since_is_not_kept(computed: Call
             (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
     assert data.gain == 1.0
     assert not [*Path("kept").glob("*.nc")]
+
+
+def test_a_worker_elsewhere_may_have_a_field_s_file_of_its_own(computed: Callable[..., tuple[float, int]]) -> None:
+    Path("two/gain.txt").write_text("2.0")
+    Path("gain.txt").write_text("2.0")
+    Path("reader.py").write_text(READER.format(gain="float(Path(self.file).read_text())"))
+    reader = importable("reader.py").Reader(file="gain.txt")
+    with ProcessPoolExecutor(1, initializer=os.chdir, initargs=("two",)) as pool:
+        (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+    assert data.gain == 2.0
+    assert what_was_read() == set()
+
+
+def test_a_file_is_heard_by_all_its_names(computed: Callable[..., tuple[float, int]]) -> None:
+    Path("one/inner/it").write_text("1.0")
+    assert heard({spelled("leads/it")}) == set()
+    assert Path("one/inner/it").read_text() == "1.0"
+    assert heard({spelled("leads/it")}) == {spelled("leads/it")}
 
 
 def test_a_file_that_a_text_names_counts_whoever_has_opened_it(

@@ -14,7 +14,7 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.code import code, data_of_users, files_of_classes, sources_of_users
+from hexmj.sweeps.code import OPEN_BY_THEMSELVES, code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
 from hexmj.user_code.opened_files import also_opened, changed, computes, computing, heard, opened_by, seen, spelled
 
@@ -27,7 +27,7 @@ _HERE = "."
 _THERE = "there"
 """Stands for the digest of a file that a text names and nobody was heard to open: a log, or one that code looks for."""
 
-_CHANGED = "changed"
+CHANGED = "changed"
 """Stands for the digest of what a file held as it was opened first, where it has changed since or cannot be read."""
 
 
@@ -68,7 +68,8 @@ class Cell:
         """
         told, modules = self._told(), self._modules()
         made = code(modules)
-        seen(data_of_users(modules)[0])
+        unheard, others = data_of_users(modules)
+        seen(unheard | others if OPEN_BY_THEMSELVES & made.versions.keys() else unheard)
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
     def settings_now(self) -> str:
@@ -81,25 +82,30 @@ class Cell:
         """While it is computed: what it opens beyond what its settings name is noted."""
         return computing(self._told_files(), files_of_classes(self._modules()))
 
-    def opened(self) -> dict[str, str]:
-        """What it may remember of files that were opened so far in this program, file -> digest or `_CHANGED`."""
-        files = opened_by(sources_of_users(self._modules())) | set(map(spelled, self._told_files()))
-        return {file: _as_opened(file) for file in _beyond(files, ())}
+    def opened(self, held: Callable[[str], str]) -> dict[str, str]:
+        """What its code has opened so far in this program, and may remember: file -> digest of what it held then, which
+        `held` tells, or `CHANGED`."""
+        files = opened_by(sources_of_users(self._modules()))
+        outdated = changed({*files, *self._told_files()})
+        return {file: held(file) for file in files.difference(outdated)} | dict.fromkeys(outdated, CHANGED)
 
-    def knows(self, opened: Mapping[str, str]) -> str:
-        """Note what was opened in the program that has sent it; why it cannot be kept, in a sentence, else empty."""
-        also_opened(opened.keys() - set(map(spelled, self._told_files())), sources_of_users(self._modules()))
-        return self._outdated(file for file in sorted(opened) if not opened[file] == _as_opened(file) != _CHANGED)
+    def knows(self, opened: Mapping[str, str]) -> None:
+        """Note what its code has opened in the program that has sent it, but for what its settings name."""
+        also_opened(_beyond(set(opened), self._told_files()), sources_of_users(self._modules()))
 
     def tell(self, read: Mapping[str, str]) -> None:
         """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
         if computes():
             also_opened({*_files(read), *map(spelled, self._told_files())})
 
-    def read(self) -> tuple[dict[str, str], str]:
+    def read(self, sent: Mapping[str, str] | None = None) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
         `_THERE`; with the folder from which they were looked for, `_HERE`.  And why it cannot be kept, in a sentence,
-        else empty."""
+        else empty.
+
+        Args:
+            sent: what was opened where the cell was sent from, see `opened`.
+        """
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             unheard, others = data_of_users(self._modules())
@@ -112,8 +118,11 @@ class Cell:
             read = dict.fromkeys(_beyond(others, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
-        if outdated := self._outdated(changed({*told, *files})):
-            return {}, outdated
+        outdated = changed({*told, *files})
+        outdated += [file for file, held in (sent or {}).items() if held == CHANGED or held != read.get(file, held)]
+        if outdated:
+            since = f"{outdated[0]} has changed since it was opened first, and code may remember it"
+            return {}, f"{self.name} is not kept: {since}; start the program again"
         return (read | {_HERE: os.getcwd()} if read else {}), ""
 
     def would_read(self, read: Mapping[str, str]) -> bool:
@@ -125,15 +134,6 @@ class Cell:
             return False
         new = set[str]().union(*named) - read.keys()
         return same and not changed(_files(read)) and not (new and _beyond(new, self._told_files()))
-
-    def _outdated(self, changed: Iterable[str]) -> str:
-        """Why it cannot be kept if some files have changed, in a sentence; else empty."""
-        for file in changed:
-            return (
-                f"{self.name} is not kept: {file} has changed since it was opened first, and code may remember it;"
-                " start the program again"
-            )
-        return ""
 
     def _told_files(self) -> set[Path]:
         """Files that its settings name."""
@@ -223,11 +223,11 @@ def _held(file: str) -> str:
     return digest_of(Path(file)) if os.path.exists(file) else ""
 
 
-def _as_opened(file: str) -> str:
-    """A digest of what a file held as it was opened first, if it can be told."""
+def held_then(file: str) -> str:
+    """A digest of a file, or `CHANGED` where it cannot be read."""
     with suppress(InputError):
-        return _CHANGED if changed([file]) else _held(file)
-    return _CHANGED
+        return _held(file)
+    return CHANGED
 
 
 def difference(one: str, other: str) -> str:

@@ -48,7 +48,7 @@ _UNHEARD = *_MODELS, ".mjb", ".pt", ".pth", ".onnx", ".safetensors", ".h5", ".hd
 _DATA = *_UNHEARD, ".toml", ".json", ".jsonl", ".yaml", ".yml", ".csv", ".tsv", ".txt", ".npy", ".npz", ".pkl"
 """The same of all data of a user's own."""
 
-_OPEN_BY_THEMSELVES = {"cv2", "duckdb", "polars", "pyarrow"}
+OPEN_BY_THEMSELVES = {"cv2", "duckdb", "polars", "pyarrow"}
 """Packages that open any data unheard."""
 
 _DEEP = 3
@@ -150,8 +150,7 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     Raises:
         InputError: a module has no source; a file cannot be read.
     """
-    needed = _needed(modules)
-    theirs, ends = needed.theirs, _DATA if _OPEN_BY_THEMSELVES & needed.versions.keys() else _UNHEARD
+    theirs = _needed(modules).theirs
     named = {text for _, one in theirs for text in one}
     if not any(text.lower().endswith(_DATA) for text in named):
         return set(), set()
@@ -159,7 +158,7 @@ def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
     beside = [Path.cwd() / "here", *(file for file, _ in theirs)]
     folders = [folder for one in beside for folder in one.parents[:_DEEP]]
     found = [one for one in named_there(named, folders, _DEEP) if one.name.lower().endswith(_DATA) and one.is_file()]
-    unheard = {one for one in found if one.name.lower().endswith(ends) or one.as_posix().endswith(before)}
+    unheard = {one for one in found if one.name.lower().endswith(_UNHEARD) or one.as_posix().endswith(before)}
     whole = {spelled(part) for path in unheard for part in _parts(path)}
     return whole, {spelled(path) for path in found} - whole
 

@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import nullcontext
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
@@ -18,7 +18,7 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
+from hexmj.sweeps.cells import Cell, check_unchanged, difference, held_then, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
 from hexmj.user_code.opened_files import remembered
@@ -162,7 +162,9 @@ def _kept(cell: Cell, record: str, path: Path) -> "Made | None":
     return (*found, "") if found and cell.would_read(found[1]) else None
 
 
-def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made":
+def _made(
+    cell: Cell, record: str, path: Path | None, sent: Mapping[str, str] | None = None, **execution: Any
+) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
@@ -173,7 +175,7 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    read, not_kept = cell.read() if record else ({}, "")
+    read, not_kept = cell.read(sent) if record else ({}, "")
     if path and not not_kept:
         return write(path, record, read, data), read, ""
     return data, read, not_kept if path else ""
@@ -199,22 +201,21 @@ def _made_by_a_worker(
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    outdated = cell.knows(opened)
-    data, read, not_kept = _made(cell, record, None if outdated else path, threads=threads)
-    return data, read, outdated if path and outdated else not_kept
+    cell.knows(opened)
+    return _made(cell, record, path, opened, threads=threads)
 
 
 def _elsewhere(
     executor: Executor, tasks: Sequence[_Task], folder: Path | None, threads: int
 ) -> Iterator[tuple[int, "Made"]]:
     """What is kept, and then what an executor's workers make of the rest."""
-    parcels = dict[int, _Parcel]()
+    parcels, held = dict[int, _Parcel](), cache(held_then)
     for i, (cell, record, path) in enumerate(tasks):
         if path and (kept := _kept(cell, record, path)):
             yield i, kept
         else:
             parcels[i] = partial(
-                _made_by_a_worker, _pickled(cell), record or cell.record(), path, threads, cell.opened()
+                _made_by_a_worker, _pickled(cell), record or cell.record(), path, threads, cell.opened(held)
             )
     yield from _by_others(executor, parcels, folder)
 

@@ -64,7 +64,7 @@ _NOTHING = set[str](), set[str]()
 """The same of a thread that computes none."""
 
 _TEMPORARY = set[str]()
-"""What cells have had made as they were computed, and modules as they were imported, to be used and thrown away."""
+"""What cells have had made as they were computed, to be used and thrown away."""
 
 _WRITTEN = set[str]()
 """What was written while cells were computed."""
@@ -113,7 +113,7 @@ def seen(files: Iterable[str]) -> None:
 
 def heard(files: set[str]) -> set[str]:
     """Those of some files that anybody in this program has opened, but for what its cells write."""
-    return (files & _AT_FIRST.keys()) - _WRITTEN
+    return {one for one in files - _WRITTEN if not _AT_FIRST.keys().isdisjoint((one, os.path.realpath(one)))}
 
 
 def remembered(file: str) -> bool:
@@ -134,7 +134,7 @@ def spelled(file: str | Path) -> str:
 
 
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    if event in _MAKES and (_COMPUTING or _imports(sys._getframe(1))):
+    if event in _MAKES and _COMPUTING:
         _TEMPORARY.add(os.path.realpath(arguments[0]))
     if event not in _PATH:
         return
@@ -191,11 +191,6 @@ def _is_of_a_sweep(opener: FrameType) -> bool:
         if not (by.startswith((_OURS, "<")) or _is_of_python(by)):
             return False
     return False
-
-
-def _imports(frame: FrameType) -> bool:
-    """Whether a module is being imported."""
-    return any(one.f_code.co_filename.startswith("<frozen importlib.") for one, _ in walk_stack(frame))
 
 
 def _callers(frame: FrameType, file: str = "") -> set[str]:
