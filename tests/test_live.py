@@ -101,6 +101,13 @@ def test_a_plan_whose_tips_fail_is_a_sentence(monkeypatch):
         live.steer(velocity=0.3)
 
 
+def test_a_walk_that_has_come_to_its_end_is_a_sentence(monkeypatch):
+    monkeypatch.setattr("hexmj.view.live.MOST_STEPS", 5)
+    live = begun()
+    with pytest.raises(InputError, match="a walk of 5 steps has come to its end; expected it to begin again"):
+        live.advance(1.0)
+
+
 def test_what_makes_no_sense_changes_nothing():
     live = begun()
     live.advance(0.1)

@@ -148,7 +148,7 @@ def test_the_values_of_every_condition_make_sense():
         ("vp", {"n_starts": 0}, "at least 1"),
         ("vp", {"window": "long"}, "valid names: walk, start"),
         ("vp", {"conditions": Conditions.of(vp=20.0)}, "vp = 20.0; expected values, which takes all of them"),
-        ("vp", {"controller": ReadsLegs(LDVS)}, "a controller that reads the legs; expected another"),
+        ("vp", {"controller": ReadsLegs(LDVS)}, "reads the legs; expected a controller that does not"),
     ],
 )
 def test_bad_input_is_refused(over, changed, message):

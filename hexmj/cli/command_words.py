@@ -6,6 +6,7 @@ from contextvars import ContextVar
 from os.path import isfile
 from pathlib import Path
 from types import MappingProxyType
+from typing import get_args
 
 from hexmj.errors import LONGEST, InputError
 from hexmj.storage.files import digest_of, read_toml
@@ -104,4 +105,16 @@ def files(words: Sequence[str]) -> list[Path]:
     """Files that words name, as they name them: `mine.py` of `mine.py:Tripod`, weights, recordings."""
     wheres = ((name, *name.rpartition(":")[::2]) for name in named(words))
     paths = (where if what and where.endswith(".py") else name for name, where, what in wheres)
-    return [Path(path) for path in dict.fromkeys(paths) if isfile(path)]
+    return [Path(path) for path in dict.fromkeys(paths) if isfile(path) and not _means_no_file(path)]
+
+
+def _means_no_file(word: str) -> bool:
+    """Whether a word is a number or a name that the package knows, whatever lies in the folder."""
+    from hexmj.conditions import GroundKind
+    from hexmj.controllers.named import known_names
+    from hexmj.timing import WINDOWS
+
+    with suppress(ValueError):
+        float(word)
+        return True
+    return word in {*known_names(), *WINDOWS, *get_args(GroundKind)}

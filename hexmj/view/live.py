@@ -13,6 +13,7 @@ from hexmj.checks import given, numbers, typed
 from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.measured import measured_walk
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
@@ -167,7 +168,8 @@ class LiveWalk:
             What is seen then; of an insect that has fallen, what was seen last.
 
         Raises:
-            InputError: no time or a minute at once, it walks off the ground that was laid, or its controller fails.
+            InputError: no time or a minute at once, more than `MOST_STEPS` in all, it walks off the ground that was
+                laid, or its controller fails.
             SimulationError: the simulation diverged.
         """
         AT_ONCE.check("seconds", seconds := typed("seconds", seconds, float))
@@ -178,6 +180,8 @@ class LiveWalk:
         self._left -= steps * step
         while steps > 0 and not self.fell_on:
             now = min(steps, steps_in_chunk(self.settled.substeps), self._lasts - self._plan.done % self._lasts)
+            if self._plan.done + now >= MOST_STEPS:
+                raise InputError(f"a walk of {MOST_STEPS:g} steps has come to its end; expected it to begin again")
             self._walk(now)
             steps -= now
         return self.moment
@@ -197,7 +201,7 @@ class LiveWalk:
             if self._plan.reads:
                 self._plan.sense(self._insects.sensed(ONLY))
             orders = self._orders.ahead(ONLY, part)
-            assert orders, "a walk of MOST_STEPS outlives who looks at it"
+            assert orders, "`advance` sees to it that no walk is longer"
             yield orders
 
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:

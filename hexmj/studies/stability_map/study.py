@@ -67,7 +67,8 @@ class StabilityMap(SameStarts):
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
         if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), ReadingPlan):
             raise InputError(
-                "a controller that reads the legs; expected another: mechanisms are told from the plan alone"
+                f"{self.controller.name} reads the legs; expected a controller that does not: mechanisms are told"
+                " from the plan alone"
             )
 
     @property
