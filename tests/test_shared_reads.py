@@ -149,6 +149,18 @@ def test_what_is_sent_of_a_file_that_was_edited_since_is_not_kept(computed: Call
     assert not [*Path("kept").glob("*.nc")]
 
 
+def test_a_folder_that_was_looked_for_before_it_was_made_is_no_data_of_a_worker_s(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    Path("reader.py").write_text(READER.format(gain="1.0"))
+    reader = importable("reader.py")
+    assert reader.tried("kept/made") == 0.0
+    Path("kept/made").mkdir(parents=True)
+    with ProcessPoolExecutor(1) as pool:
+        run([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
+    assert what_was_read() == set()
+
+
 def test_a_worker_elsewhere_may_have_a_field_s_file_of_its_own(computed: Callable[..., tuple[float, int]]) -> None:
     Path("two/gain.txt").write_text("2.0")
     Path("gain.txt").write_text("2.0")

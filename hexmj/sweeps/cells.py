@@ -85,7 +85,8 @@ class Cell:
     def opened(self, held: Callable[[str], str]) -> dict[str, str]:
         """What its code has opened so far in this program, and may remember: file -> digest of what it held then, which
         `held` tells, or `CHANGED`."""
-        files = opened_by(sources_of_users(self._modules()))
+        sources = sources_of_users(self._modules())
+        files = _beyond(opened_by(sources), sources)
         outdated = changed({*files, *self._told_files()})
         return {file: held(file) for file in files.difference(outdated)} | dict.fromkeys(outdated, CHANGED)
 
