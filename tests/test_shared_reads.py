@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, KeptValues, finish, run
+from hexmj.sweeps import Cell, KeptValues, cells, finish, run
 from hexmj.sweeps.cells import unlike
 from hexmj.user_code.loaded import importable
 from hexmj.user_code.opened_files import heard, spelled
@@ -251,7 +252,8 @@ def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert computed('remembered(at + "/gain")') == (1.0, 1)
-    monkeypatch.setattr(Cell, "read", lambda *_: ({os.path.abspath("one/gain"): "of another machine"}, ""))
+    here, really = threading.get_ident(), cells._held
+    monkeypatch.setattr(cells, "_held", lambda file: really(file) if threading.get_ident() == here else "another")
     with (
         ThreadPoolExecutor(1) as pool,
         pytest.raises(InputError, match=r"worker has another .*one.gain than the sender"),

@@ -109,21 +109,20 @@ class Cell:
         """
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
-            unheard, others = data_of_users(self._modules())
-            files = _beyond(opened_by(sources) | unheard | heard(others), {*told, *sources})
+            unheard, named = data_of_users(self._modules())
+            files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
                 return {}, (
                     f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
                     " expected an import, or a field that names it"
                 )
-            read = dict.fromkeys(_beyond(others, told), _THERE) | {file: _held(file) for file in files}
+            read = dict.fromkeys(_beyond(named, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
-        outdated = changed({*told, *files})
-        outdated += [file for file, held in (sent or {}).items() if held == CHANGED or held != read.get(file, held)]
-        if outdated:
+        others = [file for file, held in (sent or {}).items() if held == CHANGED or held != read.get(file, held)]
+        if outdated := others + changed({*told, *files}):
             since = f"{outdated[0]} has changed since it was opened first, and code may remember it"
-            return {}, f"{self.name} is not kept: {since}; start the program again"
+            return read if others else {}, f"{self.name} is not kept: {since}; start the program again"
         return (read | {_HERE: os.getcwd()} if read else {}), ""
 
     def would_read(self, read: Mapping[str, str]) -> bool:
