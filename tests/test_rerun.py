@@ -284,7 +284,7 @@ def test_words_that_decide_nothing_are_left_out(tmp_path, monkeypatch):
 
 def test_files_that_are_named_like_a_window_a_number_or_a_controller_do_not_count(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("start", "0.3", "ldvs", "step", "mine"):
+    for name in ("walk", "start", "0.3", "ldvs", "step", "mine"):
         Path(name).write_text("")
     words = ["walk", "--window", "start", "--velocity=0.3", "--model", "ldvs", "--ground", "step", "--beside", "mine"]
     assert files(words) == [Path("mine")]

@@ -150,6 +150,20 @@ def test_what_is_sent_of_a_file_that_was_edited_since_is_not_kept(computed: Call
     assert not [*Path("kept").glob("*.nc")]
 
 
+def test_a_worker_that_outlives_a_program_knows_nothing_of_what_that_has_opened(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("reader.py").write_text(READER.format(gain="1.0"))
+    with ProcessPoolExecutor(1) as pool:
+        pool.submit(os.getpid).result()
+        for gain in (1.0, 2.0):
+            Path("one/gain").write_text(str(gain))
+            reader = importable("reader.py")
+            assert reader.tried("one/gain") == gain
+            run([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
+            another_program(monkeypatch)
+
+
 def test_a_folder_that_was_looked_for_before_it_was_made_is_no_data_of_a_worker_s(
     computed: Callable[..., tuple[float, int]],
 ) -> None:
@@ -166,7 +180,9 @@ def test_a_worker_elsewhere_may_have_a_field_s_file_of_its_own(computed: Callabl
     Path("two/gain.txt").write_text("2.0")
     Path("gain.txt").write_text("2.0")
     Path("reader.py").write_text(READER.format(gain="float(Path(self.file).read_text())"))
-    reader = importable("reader.py").Reader(file="gain.txt")
+    module = importable("reader.py")
+    reader = module.Reader(file="gain.txt")
+    assert module.tried("gain.txt") == 2.0
     with ProcessPoolExecutor(1, initializer=os.chdir, initargs=("two",)) as pool:
         (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
     assert data.gain == 2.0

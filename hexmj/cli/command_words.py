@@ -102,8 +102,8 @@ def named(words: Sequence[str]) -> Iterator[str]:
 
 
 def files(words: Sequence[str]) -> list[Path]:
-    """Files that words name, as they name them: `mine.py` of `mine.py:Tripod`, weights, recordings."""
-    wheres = ((name, *name.rpartition(":")[::2]) for name in named(words))
+    """Files that words behind a command name, as they name them: `mine.py` of `mine.py:Tripod`, weights, recordings."""
+    wheres = ((name, *name.rpartition(":")[::2]) for name in named(words[1:]))
     paths = (where if what and where.endswith(".py") else name for name, where, what in wheres)
     return [Path(path) for path in dict.fromkeys(paths) if isfile(path) and not _means_no_file(path)]
 

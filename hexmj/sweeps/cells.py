@@ -85,9 +85,9 @@ class Cell:
     def opened(self, held: Callable[[str], str]) -> dict[str, str]:
         """What its code has opened so far in this program, and may remember: file -> digest of what it held then, which
         `held` tells, or `CHANGED`."""
-        sources = sources_of_users(self._modules())
-        files = _beyond(opened_by(sources), sources)
-        outdated = changed({*files, *self._told_files()})
+        sources, told = sources_of_users(self._modules()), self._told_files()
+        files = _beyond(opened_by(sources), {*sources, *told})
+        outdated = changed({*files, *told, *data_of_users(self._modules())[0]})
         return {file: held(file) for file in files.difference(outdated)} | dict.fromkeys(outdated, CHANGED)
 
     def knows(self, opened: Mapping[str, str]) -> None:
@@ -97,7 +97,9 @@ class Cell:
     def tell(self, read: Mapping[str, str]) -> None:
         """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
         if computes():
-            also_opened({*_files(read), *map(spelled, self._told_files())})
+            files = _beyond({*_files(read), *map(spelled, self._told_files())}, ())
+            also_opened(files)
+            seen(files)
 
     def read(self, sent: Mapping[str, str] | None = None) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or

@@ -66,8 +66,8 @@ _NOTHING = set[str](), set[str]()
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
 
-_WRITTEN = set[str]()
-"""What was written while cells were computed."""
+_LOGS = set[str]()
+"""What was opened to be appended to."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
@@ -100,7 +100,6 @@ def opened_by(sources: set[str]) -> set[str]:
 def also_opened(files: Iterable[str], sources: Iterable[str] = ()) -> None:
     """Note for whose code is being called, and for some sources, what was opened elsewhere that they may know."""
     new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
-    seen(new)
     for one in {*_callers(sys._getframe(1)), *sources, *_COMPUTING.get(threading.get_ident(), _NOTHING)[1]}:
         _OPENED.setdefault(one, set()).update(new)
 
@@ -112,8 +111,9 @@ def seen(files: Iterable[str]) -> None:
 
 
 def heard(files: set[str]) -> set[str]:
-    """Those of some files that anybody in this program has opened, but for what its cells write."""
-    return {one for one in files - _WRITTEN if not _AT_FIRST.keys().isdisjoint((one, os.path.realpath(one)))}
+    """Those of some files that anybody in this program has opened, but for logs."""
+    names = {one: {one, os.path.realpath(one)} for one in files}
+    return {one for one, its in names.items() if its & _AT_FIRST.keys() and not its & _LOGS}
 
 
 def remembered(file: str) -> bool:
@@ -153,8 +153,8 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
         writes = event == "open" and _writes(file, arguments[2])
-        if writes and _COMPUTING:
-            _WRITTEN.add(file)
+        if writes and arguments[2] & os.O_APPEND:
+            _LOGS.add(os.path.realpath(file))
         reads = not (writes or (event == "open" and _reads_a_source(file, sys._getframe(1))))
         if reads and _is_data(file):
             _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
