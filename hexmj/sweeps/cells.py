@@ -88,7 +88,7 @@ class Cell:
         sources, told = sources_of_users(self._modules()), self._told_files()
         files = _beyond(opened_by(sources), {*sources, *told})
         outdated = changed({*files, *told, *data_of_users(self._modules())[0]})
-        return {file: held(file) for file in files.difference(outdated)} | dict.fromkeys(outdated, CHANGED)
+        return {file: held(file) for file in sorted(files.difference(outdated))} | dict.fromkeys(outdated, CHANGED)
 
     def knows(self, opened: Mapping[str, str]) -> None:
         """Note what its code has opened in the program that has sent it, but for what its settings name."""
