@@ -225,7 +225,7 @@ def _held(file: str) -> str:
     return digest_of(Path(file)) if os.path.exists(file) else ""
 
 
-def held_then(file: str) -> str:
+def held_or_changed(file: str) -> str:
     """A digest of a file, or `CHANGED` where it cannot be read."""
     with suppress(InputError):
         return _held(file)

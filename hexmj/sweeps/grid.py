@@ -18,7 +18,7 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_unchanged, difference, held_then, holds, unlike
+from hexmj.sweeps.cells import Cell, check_unchanged, difference, held_or_changed, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
 from hexmj.user_code.opened_files import remembered
@@ -209,7 +209,7 @@ def _elsewhere(
     executor: Executor, tasks: Sequence[_Task], folder: Path | None, threads: int
 ) -> Iterator[tuple[int, "Made"]]:
     """What is kept, and then what an executor's workers make of the rest."""
-    parcels, held = dict[int, _Parcel](), cache(held_then)
+    parcels, held = dict[int, _Parcel](), cache(held_or_changed)
     for i, (cell, record, path) in enumerate(tasks):
         if path and (kept := _kept(cell, record, path)):
             yield i, kept
