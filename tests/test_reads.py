@@ -1,6 +1,7 @@
 """What a cell's code reads beyond what the cell's name tells is kept with it: with other files it is another cell."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -286,6 +287,44 @@ def test_a_log_that_cells_write_does_not_count_if_the_program_looks_at_it(
         assert computed(f"logged(Path('logs/it.csv').resolve(), '{calls}')") == (1.0, calls)
         assert Path("logs/it.csv").read_text() == "12"[:calls]
     assert len([*Path("kept").glob("*.nc")]) == 2
+
+
+def test_a_table_that_the_program_appends_to_is_no_log(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("reader.py").write_text(
+        READER.format(gain="float(cached('gains.csv').sum())") + "cached = functools.cache(np.loadtxt)"
+    )
+    for row, total in (("1.0\n", 1.0), ("10.0\n", 11.0)):
+        with Path("gains.csv").open("a") as file:
+            file.write(row)
+        module = importable("reader.py")
+        module.cached("gains.csv")
+        (data,) = run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+        assert data.gain == total
+        another_program(monkeypatch)
+
+
+def test_what_it_makes_and_reads_by_one_handle_counts(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = "[it := open('a gain', 'a+'), it.seek(0), text := it.read() or '1.0', it.close(), float(text)][-1]"
+    assert computed(gain) == (1.0, 1)
+    Path("a gain").write_text("7.0")
+    another_program(monkeypatch)
+    assert computed(gain) == (7.0, 2)
+
+
+def test_sources_that_a_thread_opens_for_nobody_are_no_reason_to_keep_nothing(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    """As one that watches them for edits."""
+    Path("script.py").write_text("")
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(Path("script.py").read_bytes).result()
+    assert computed("1.0") == (1.0, 1)
+    assert what_was_read() == set()
 
 
 def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(

@@ -126,27 +126,60 @@ def test_a_cell_that_sweeps_has_read_what_its_cells_have_and_tell(
     assert what_was_read() == {"one/gain"}
 
 
-def test_what_a_cell_brings_along_to_a_worker_counts_there(computed: Callable[..., tuple[float, int]]) -> None:
+@pytest.mark.parametrize("edited", [False, True])
+def test_what_an_object_remembers_is_not_sent_to_workers(
+    computed: Callable[..., tuple[float, int]], edited: bool
+) -> None:
     with ProcessPoolExecutor(1) as pool:
         pool.submit(os.getpid).result()
         Path("reader.py").write_text(READER.format(gain="self.known"))
         reader = importable("reader.py").Reader()
         assert reader.known == 1.0
-        run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+        if edited:
+            Path("one/gain").write_text("7.0")
+        (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+    assert data.gain == (7.0 if edited else 1.0)
+    assert reader.known == 1.0
     assert what_was_read() == {"one/gain"}
 
 
-def test_what_is_sent_of_a_file_that_was_edited_since_is_not_kept(computed: Callable[..., tuple[float, int]]) -> None:
-    """A worker that has never opened the file takes over what the object remembers of it."""
+def test_a_worker_that_outlives_a_program_keeps_nothing_of_what_it_remembers(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = "doubled(self)"
+    Path("reader.py").write_text(
+        f"{READER.format(gain=gain)}\n@functools.cache\ndef doubled(reader):\n    return 2 * reader.known"
+    )
+    reader = importable("reader.py").Reader()
     with ProcessPoolExecutor(1) as pool:
         pool.submit(os.getpid).result()
-        Path("reader.py").write_text(READER.format(gain="self.known"))
-        reader = importable("reader.py").Reader()
         assert reader.known == 1.0
+        run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+        another_program(monkeypatch)
         Path("one/gain").write_text("7.0")
+        reader = importable("reader.py").Reader()
+        assert reader.known == 7.0
         with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
-            (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
-    assert data.gain == 1.0
+            run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+
+
+@pytest.mark.parametrize(
+    ("gain", "told"),
+    [
+        ("runpy.run_path('values' + '.py')['GAIN']", "runs .*values.py, of which an edit"),
+        ("[float(Path('one/gain').read_text()), Path('one/gain').write_text('7.0')][0]", "one.gain has changed"),
+    ],
+)
+def test_a_cell_that_sweeps_in_processes_is_no_more_kept_than_what_it_sweeps(
+    computed: Callable[..., tuple[float, int]], gain: str, told: str
+) -> None:
+    Path("values.py").write_text("GAIN = 1.0")
+    Path("inner_reader.py").write_text(READER.format(gain=gain))
+    pool = "__import__('concurrent.futures').futures.ProcessPoolExecutor(1)"
+    inner = "hexmj.sweeps.Cell('inner', importable('inner_reader.py').Reader().cell, {})"
+    gain = f"hexmj.sweeps.run([{inner}], executor={pool})[0].gain.item()"
+    with pytest.warns(UserWarning, match=f"inner is not kept: .*{told}"):
+        assert computed(f"[importable := hexmj.user_code.loaded.importable, {gain}][1]") == (1.0, 2)
     assert not [*Path("kept").glob("*.nc")]
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from inspect import signature
@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import OPEN_BY_THEMSELVES, code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import also_opened, changed, computes, computing, heard, opened_by, seen, spelled
+from hexmj.user_code.opened_files import also_read, changed, computing, heard, opened_by, seen, spelled
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -26,9 +26,6 @@ _HERE = "."
 
 _THERE = "there"
 """Stands for the digest of a file that a text names and nobody was heard to open: a log, or one that code looks for."""
-
-CHANGED = "changed"
-"""Stands for the digest of what a file held as it was opened first, where it has changed since or cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -78,37 +75,25 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def computing(self) -> AbstractContextManager[None]:
-        """While it is computed: what it opens beyond what its settings name is noted."""
+    def computing(self) -> AbstractContextManager[list[str]]:
+        """While it is computed: what it opens beyond what its settings name is noted; gives `doubts`, see `read`."""
         return computing(self._told_files(), files_of_classes(self._modules()))
 
-    def opened(self, held: Callable[[str], str]) -> dict[str, str]:
-        """What its code has opened so far in this program, and may remember: file -> digest of what it held then, which
-        `held` tells, or `CHANGED`."""
-        sources, told = sources_of_users(self._modules()), self._told_files()
-        files = _beyond(opened_by(sources), {*sources, *told})
-        outdated = changed({*files, *told, *data_of_users(self._modules())[0]})
-        return {file: held(file) for file in sorted(files.difference(outdated))} | dict.fromkeys(outdated, CHANGED)
+    def tell(self, read: Mapping[str, str], not_kept: str) -> None:
+        """Let the cell that sweeps this one, if one does, know what this one has read, what its settings name, and why
+        it is not kept, unless it is."""
+        also_read(_beyond({*_files(read), *map(spelled, self._told_files())}, ()), not_kept)
 
-    def knows(self, opened: Mapping[str, str]) -> None:
-        """Note what its code has opened in the program that has sent it, but for what its settings name."""
-        also_opened(_beyond(set(opened), self._told_files()), sources_of_users(self._modules()))
-
-    def tell(self, read: Mapping[str, str]) -> None:
-        """Let the cell that sweeps this one, if one does, know what this one has read, and what its settings name."""
-        if computes():
-            files = _beyond({*_files(read), *map(spelled, self._told_files())}, ())
-            also_opened(files)
-            seen(files)
-
-    def read(self, sent: Mapping[str, str] | None = None) -> tuple[dict[str, str], str]:
+    def read(self, doubts: Sequence[str]) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
         `_THERE`; with the folder from which they were looked for, `_HERE`.  And why it cannot be kept, in a sentence,
         else empty.
 
         Args:
-            sent: what was opened where the cell was sent from, see `opened`.
+            doubts: why cells that it has swept are not kept.
         """
+        if doubts:
+            return {}, doubts[0]
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             unheard, named = data_of_users(self._modules())
@@ -121,10 +106,9 @@ class Cell:
             read = dict.fromkeys(_beyond(named, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
-        others = [file for file, held in (sent or {}).items() if held == CHANGED or held != read.get(file, held)]
-        if outdated := others + changed({*told, *files}):
+        if outdated := changed({*told, *files}):
             since = f"{outdated[0]} has changed since it was opened first, and code may remember it"
-            return read if others else {}, f"{self.name} is not kept: {since}; start the program again"
+            return {}, f"{self.name} is not kept: {since}; start the program again"
         return (read | {_HERE: os.getcwd()} if read else {}), ""
 
     def would_read(self, read: Mapping[str, str]) -> bool:
@@ -223,13 +207,6 @@ def holds(file: str, digest: str) -> bool:
 def _held(file: str) -> str:
     """A digest of a file; empty if it is not there."""
     return digest_of(Path(file)) if os.path.exists(file) else ""
-
-
-def held_or_changed(file: str) -> str:
-    """A digest of a file, or `CHANGED` where it cannot be read."""
-    with suppress(InputError):
-        return _held(file)
-    return CHANGED
 
 
 def difference(one: str, other: str) -> str:

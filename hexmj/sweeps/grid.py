@@ -7,7 +7,8 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import nullcontext
-from functools import cache, partial
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
@@ -18,9 +19,10 @@ from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
 from hexmj.storage.files import marked, prepare, remove_leftovers
-from hexmj.sweeps.cells import Cell, check_unchanged, difference, held_or_changed, holds, unlike
+from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
+from hexmj.sweeps.plain_settings import field_names, is_computed_once
 from hexmj.user_code.opened_files import remembered
 
 if TYPE_CHECKING:
@@ -127,8 +129,8 @@ def finish(
         made = _elsewhere(executor, tasks, folder, threads or 1)
     before: dict[str, str] = {}
     for i, (data, read, not_kept) in made:
-        cells[i].tell(read)
-        if (told := unlike(cells[i].name, before, read) or not_kept) and not warned:
+        cells[i].tell(read, not_kept)
+        if (told := unlike(cells[i].name, before, read) or (not_kept if folder else "")) and not warned:
             warned = True
             warn(told, stacklevel=2)
         tell(i, 1.0 - done[i])
@@ -162,30 +164,24 @@ def _kept(cell: Cell, record: str, path: Path) -> "Made | None":
     return (*found, "") if found and cell.would_read(found[1]) else None
 
 
-def _made(
-    cell: Cell, record: str, path: Path | None, sent: Mapping[str, str] | None = None, **execution: Any
-) -> "Made":
+def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made":
     """A cell, computed and kept unless another run has done so; what is kept is given as it will be read."""
     import xarray as xr
 
     if path and (kept := _kept(cell, record, path)):
         return kept
     before = record if path else cell.settings_now()
-    with cell.computing():
+    with cell.computing() as doubts:
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    read, not_kept = cell.read(sent) if record else ({}, "")
-    if path and not not_kept:
-        return write(path, record, read, data), read, ""
-    return data, read, not_kept if path else ""
+    read, not_kept = cell.read(doubts) if record else ({}, "".join(doubts[:1]))
+    return write(path, record, read, data) if path and not not_kept else data, read, not_kept
 
 
-def _made_by_a_worker(
-    pickled: bytes, record: str, path: Path | None, threads: int, opened: dict[str, str], mark: Path | None
-) -> "Made":
+def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
-    long as somebody waits.  What its code has opened where it was sent from it may have brought along."""
+    long as somebody waits."""
     here = f"a worker on {socket.gethostname()}"
     try:
         cell = pickle.loads(pickled)
@@ -201,22 +197,19 @@ def _made_by_a_worker(
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    cell.knows(opened)
-    return _made(cell, record, path, opened, threads=threads)
+    return _made(cell, record, path, threads=threads)
 
 
 def _elsewhere(
     executor: Executor, tasks: Sequence[_Task], folder: Path | None, threads: int
 ) -> Iterator[tuple[int, "Made"]]:
     """What is kept, and then what an executor's workers make of the rest."""
-    parcels, held = dict[int, _Parcel](), cache(held_or_changed)
+    parcels = dict[int, _Parcel]()
     for i, (cell, record, path) in enumerate(tasks):
         if path and (kept := _kept(cell, record, path)):
             yield i, kept
         else:
-            parcels[i] = partial(
-                _made_by_a_worker, _pickled(cell), record or cell.record(), path, threads, cell.opened(held)
-            )
+            parcels[i] = partial(_made_by_a_worker, _pickled(cell), record or cell.record(), path, threads)
     yield from _by_others(executor, parcels, folder)
 
 
@@ -265,7 +258,23 @@ def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Futur
 
 
 def _pickled(cell: Cell) -> bytes:
+    parcel = BytesIO()
     try:
-        return pickle.dumps(cell)
+        _WithoutMemory(parcel, pickle.HIGHEST_PROTOCOL).dump(cell)
     except Exception as error:
         raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None
+    return parcel.getvalue()
+
+
+class _WithoutMemory(pickle.Pickler):
+    """Of settings without what they have computed once, which may come of a file as it was: workers compute it anew."""
+
+    def reducer_override(self, one: Any) -> Any:
+        if field_names(one) is None:
+            return NotImplemented
+        match one.__reduce_ex__(pickle.HIGHEST_PROTOCOL):
+            case (made, arguments, dict(state), *rest):
+                state = {name: held for name, held in state.items() if not is_computed_once(type(one), name)}
+                return made, arguments, state, *rest
+            case other:
+                return other

@@ -39,6 +39,7 @@ class KeptValues:
         self._cell, self._threads = cell, threads
         self._values: dict[bytes, float] = {}
         self._read: dict[str, str] = {}
+        self._not_kept = ""
         self._path, self._seed = None, 0
         if folder:
             self._record = record = cell.record()
@@ -58,21 +59,21 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            with self._cell.computing():
+            with self._cell.computing() as doubts:
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
-                read, not_kept = self._cell.read()
+                read, self._not_kept = self._cell.read(doubts)
                 if told := unlike(self._cell.name, self._read, read):
                     warn(told, stacklevel=2)
-                if not_kept:
-                    warn(not_kept, stacklevel=2)
+                if self._not_kept:
+                    warn(self._not_kept, stacklevel=2)
                     self._path = None
                 else:
                     lines = (self._line(*one, read) for one in zip(new, values.tolist(), strict=True))
                     _add(self._path, "".join(lines))
             self._values |= zip(new, values.tolist(), strict=True)
-        self._cell.tell(self._read)
+        self._cell.tell(self._read, self._not_kept)
         return np.array([self._values[key] for key in keys])
 
     @property

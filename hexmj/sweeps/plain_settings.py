@@ -173,8 +173,13 @@ def _check_fields(value: Any, names: tuple[str, ...]) -> None:
     kind = type(value)
     slots = {name for base in kind.__mro__ for name, one in vars(base).items() if isinstance(one, MemberDescriptorType)}
     beside = {*getattr(value, "__dict__", ()), *(name for name in slots if hasattr(value, name))} - set(names)
-    if hidden := {name for name in beside if not isinstance(getattr_static(kind, name, None), cached_property)}:
+    if hidden := {name for name in beside if not is_computed_once(kind, name)}:
         raise InputError(f"{label(kind)} keeps {min(hidden)!r} beside its fields; expected all settings as fields")
+
+
+def is_computed_once(kind: type, name: str) -> bool:
+    """Whether objects of a class keep under a name what they have computed of their fields."""
+    return isinstance(getattr_static(kind, name, None), cached_property)
 
 
 def field_names(value: Any) -> tuple[str, ...] | None:

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from traceback import walk_stack
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 from hexmj.user_code.sources_as_run import INSTALLED, is_users
@@ -55,41 +55,50 @@ _OPENED: dict[str, set[str]] = {}
 """Source, or `_ANYBODY` -> what was opened or ran while a function or module of it was called, if no cell told it."""
 
 _ANYBODY = ""
-"""Stands for a source where a thread opens something of which no function is a user's."""
+"""Stands for a source where a thread opens data of which no function is a user's."""
 
-_COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
-"""Thread that computes a cell -> files that the cell tells by itself, as they really are, and those of its classes."""
 
-_NOTHING = set[str](), set[str]()
+class _Computed(NamedTuple):
+    """A cell that is being computed."""
+
+    told: set[str]
+    """Files that it tells by itself, as they really are."""
+    sources: set[str]
+    """Of its classes."""
+    doubts: list[str]
+    """Sentences on why a cell that it has swept is not kept."""
+
+
+_COMPUTING: dict[int, _Computed] = {}
+"""Thread -> the cell that it computes."""
+
+_NOTHING = _Computed(set(), set(), [])
 """The same of a thread that computes none."""
 
 _TEMPORARY = set[str]()
 """What cells have had made as they were computed, to be used and thrown away."""
 
 _LOGS = set[str]()
-"""What was opened to be appended to."""
+"""What was opened to be appended to as a cell was computed."""
 
 _AT_FIRST: dict[str, tuple[int, ...]] = {}
 """File -> its size, time and place on the disk as anybody opened it first, but for a sweep that looks what it holds."""
 
 
 @contextmanager
-def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
-    """While this thread computes a cell that tells some files by itself and whose classes stand in some sources."""
+def computing(told: Iterable[Path], sources: set[str]) -> Iterator[list[str]]:
+    """While this thread computes a cell that tells some files by itself and whose classes stand in some sources; gives
+    what `doubted` notes."""
     mine = threading.get_ident()
     outer = _COMPUTING.get(mine)
-    _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | (outer[1] if outer else set())
+    this = _Computed({os.path.realpath(file) for file in told}, sources | (outer or _NOTHING).sources, [])
+    _COMPUTING[mine] = this
     try:
-        yield
+        yield this.doubts
     finally:
         del _COMPUTING[mine]
         if outer:
             _COMPUTING[mine] = outer
-
-
-def computes() -> bool:
-    """Whether this thread computes a cell."""
-    return threading.get_ident() in _COMPUTING
 
 
 def opened_by(sources: set[str]) -> set[str]:
@@ -97,11 +106,15 @@ def opened_by(sources: set[str]) -> set[str]:
     return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
-def also_opened(files: Iterable[str], sources: Iterable[str] = ()) -> None:
-    """Note for whose code is being called, and for some sources, what was opened elsewhere that they may know."""
-    new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
-    for one in {*_callers(sys._getframe(1)), *sources, *_COMPUTING.get(threading.get_ident(), _NOTHING)[1]}:
-        _OPENED.setdefault(one, set()).update(new)
+def also_read(files: set[str], not_kept: str) -> None:
+    """Note for the cell that this thread computes, if it does, what one that it has swept has read, and why that is not
+    kept, unless it is."""
+    if computed := _COMPUTING.get(threading.get_ident()):
+        new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
+        for one in _callers(sys._getframe(1)) | computed.sources:
+            _OPENED.setdefault(one, set()).update(new)
+        seen(files)
+        computed.doubts.extend([not_kept] if not_kept else [])
 
 
 def seen(files: Iterable[str]) -> None:
@@ -152,12 +165,14 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
-        writes = event == "open" and _writes(file, arguments[2])
-        if writes and arguments[2] & os.O_APPEND:
+        opens = event == "open"
+        writes = opens and _writes(arguments[2])
+        if writes and _COMPUTING and arguments[2] & os.O_APPEND:
             _LOGS.add(os.path.realpath(file))
-        reads = not (writes or (event == "open" and _reads_a_source(file, sys._getframe(1))))
+        reads = not (writes or (opens and _reads_a_source(file, sys._getframe(1))))
         if reads and _is_data(file):
-            _note(file, sys._getframe(1), read=event != "sqlite3.connect" or os.path.exists(file))
+            may_make = not opens or arguments[2] & os.O_CREAT
+            _note(file, sys._getframe(1), read=not may_make or os.path.exists(file))
 
 
 def _note(file: str, opener: FrameType, read: bool) -> None:
@@ -165,12 +180,11 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
         return
     really = os.path.realpath(file)
     if read:
-        for one in {file, really} - _AT_FIRST.keys():
-            _AT_FIRST[one] = _stamp(file)
+        seen((file, really))
     if _counts_by_itself(really):
         return
-    callers = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
-    if not callers and threading.current_thread() is not threading.main_thread():
+    callers = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING).sources
+    if not (callers or file.endswith(".py") or threading.current_thread() is threading.main_thread()):
         callers.add(_ANYBODY)
     for one in callers:
         _OPENED.setdefault(one, set()).add(file)
@@ -178,7 +192,7 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
 
 def _counts_by_itself(really: str) -> bool:
     """Whether the cell that this thread computes tells a file, or it was made to be thrown away."""
-    told, _ = _COMPUTING.get(threading.get_ident(), _NOTHING)
+    told = _COMPUTING.get(threading.get_ident(), _NOTHING).told
     return really in told or (bool(_TEMPORARY) and not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))))
 
 
@@ -234,10 +248,9 @@ def _reads_a_source(file: str, by: FrameType) -> bool:
     return file.endswith(".py") and by.f_code.co_filename.endswith(_READS_SOURCES)
 
 
-def _writes(file: str, flags: int) -> bool:
-    """Whether a file is opened to be written or made, not to be read."""
-    only = flags & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY
-    return only or bool(flags & os.O_TRUNC) or (bool(flags & os.O_CREAT) and not os.path.exists(file))
+def _writes(flags: int) -> bool:
+    """Whether a file is opened to be written, not to be read."""
+    return bool(flags & (os.O_WRONLY | os.O_TRUNC | os.O_EXCL))
 
 
 sys.addaudithook(_hear)
