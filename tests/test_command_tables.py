@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hexmj import LDVS, load
-from hexmj.cli.tables import interval
+from hexmj.cli.tables import difference, interval
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
 from hexmj.studies.stability_map.study import StabilityMap
@@ -17,6 +17,11 @@ def test_what_nobody_reached_has_no_frequency() -> None:
     known = {"flss": 0.5, "flss_low": 0.25, "flss_high": 0.75}
     assert interval(xr.Dataset(known), "flss") == "0.500 (.25-.75)"
     assert interval(xr.Dataset(dict.fromkeys(known, np.nan)), "flss") == "-"
+    assert difference(xr.Dataset(dict.fromkeys(known, np.nan)), "flss") == "-"
+
+
+def test_a_difference_has_its_signs() -> None:
+    assert difference(xr.Dataset({"lost": -0.5, "lost_low": -0.79, "lost_high": 0.04}), "lost") == "-.50 (-.79 to +.04)"
 
 
 def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:

@@ -11,6 +11,7 @@ import xarray as xr
 from hexmj import HWS, LDVS, Cruse1998, InputError, ReadsLegs, Stride
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998.weights import general
+from hexmj.measures.captions import caption
 from hexmj.measures.kinematic import first_loss
 from hexmj.studies.disturbance import disturbances
 from hexmj.studies.disturbance.cases import Case, every_case
@@ -186,7 +187,10 @@ def test_any_weights_can_be_disturbed():
     """General weights have no hash."""
     controller = Cruse1998(general(HWS.weights))
     study = DisturbedWalks(controller, disturbances=["halt"], strategies=["reorganise"], physical=False, **FEW)
-    assert np.isfinite(conduct(study).kinematic.sel(window="whole")).all()
+    result = conduct(study)
+    assert np.isfinite(result.kinematic.sel(window="whole")).all()
+    assert "V_p" not in caption(result), "nobody has walked"
+    assert "V_p" in caption(result.assign_attrs(physical=1))
 
 
 def test_the_command_prints_one_object_and_refuses_with_exit_code_2(tmp_path, run):

@@ -24,6 +24,8 @@ def test_fewer_starts_on_paper_are_all_that_walk_unless_more_are_asked_for() -> 
     for command in ("league", "ablate"):
         with pytest.raises(InputError, match="n_physical = 4; expected at most n_starts = 2"):
             options_of([command, "--starts", "2", "--physical-starts", "4"]).study()
+        with pytest.raises(InputError, match="n_physical = 0; expected a whole number of at least 1"):
+            options_of([command, "--physical-starts", "0"]).study()
 
 
 def test_a_quick_look_obeys_what_else_is_asked() -> None:

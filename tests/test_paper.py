@@ -267,7 +267,7 @@ def test_other_readings_stand_beside(tmp_path):
     assert line.count("|") - 2 == head.count("|") - 1
     with pytest.raises(InputError, match="reading = 'wrong'; valid names: printed, lasting"):
         reproduce(tmp_path, TINY, only=keys, beside=("wrong",))
-    with pytest.raises(InputError, match="readings beside"):
+    with pytest.raises(InputError, match="beside itself"):
         reproduce(tmp_path, TINY, only=keys, beside=("printed",))
 
 

@@ -1,6 +1,6 @@
 """`hexmj disturb`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
-from hexmj.cli.tables import interval, table
+from hexmj.cli.tables import difference, interval, table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.measures.captions import starts_in_words
@@ -119,22 +119,22 @@ def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
     parts: list[str | Table] = [
         f"{measure} FLSS from the disturbance on, at least {starts_in_words(least)}, with 95 % intervals"
         + (", to the end of the window, which begins at full velocity again" if slow else ""),
-        _table(result.sel(window="whole").isel(case=shown), measure),
+        _table(result.sel(window="whole").isel(case=shown), measure, interval),
     ]
     if slow:
-        short = _table(result.sel(window="short").isel(case=slow), measure)
+        short = _table(result.sel(window="short").isel(case=slow), measure, interval)
         parts += ["The same if the window begins with the disturbance", short]
     if answered:
-        buys = _table(result.sel(window="whole").isel(case=answered), f"{measure}_buys")
+        buys = _table(result.sel(window="whole").isel(case=answered), f"{measure}_buys", difference)
         parts += [f"What a strategy takes off the {measure} FLSS", buys]
     return parts
 
 
-def _table(result: "xr.Dataset", name: str) -> "Table":
-    """A row for each case, a column for each velocity."""
+def _table(result: "xr.Dataset", name: str, told: "Callable[[xr.Dataset, str], str]") -> "Table":
+    """A row for each case, a column for each velocity, in which a number is told with its ends."""
     rows = []
     for case in range(result.sizes["case"]):
         row = result.isel(case=case)
-        cells = (interval(row.sel(velocity=v), name) for v in result.velocity.values)
+        cells = (told(row.sel(velocity=v), name) for v in result.velocity.values)
         rows.append((row.disturbance.item(), row.strategy.item().replace("_", " "), *cells))
     return table(("disturbance", "strategy", *(f"V = {v:g}" for v in result.velocity.values)), rows)

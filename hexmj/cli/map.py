@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 
 from hexmj.cli.options import Controlled, ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
-from hexmj.cli.tables import interval, table
+from hexmj.cli.tables import difference, interval, table
 from hexmj.errors import InputError
 from hexmj.measures.captions import starts_in_words
 from hexmj.measures.compare import MEASURES
@@ -91,7 +91,7 @@ def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
         for v in result.velocity.values:
             one, at = result.sel(value=value, velocity=v), (f"{value:g}", f"{v:g}")
             measures.append((*at, f"{one.froude.item():.2g}", *(interval(one, name) for name in MEASURES)))
-            changes = (_difference(one, name) for name in DIFFERENCES)
+            changes = (difference(one, name) for name in DIFFERENCES)
             saved = interval(one, "saved") if one.static.item() else "none lost"
             differences.append((*at, f"{one.static.item():.3f}", saved, *changes))
     heads = ("value", "V", "Froude", *MEASURES), ("value", "V", "static", "saved", *DIFFERENCES)
@@ -108,8 +108,3 @@ def _reasons(result: "xr.Dataset") -> "Table":
         toppled = (result.topple.sel(velocity=v) < float("inf")).sum("start")
         rows.append((f"{v:g}", "toppled, of all", *map(str, toppled.values)))
     return table(("V", "starts that", *(f"{value:g}" for value in result.value.values)), rows)
-
-
-def _difference(one: "xr.Dataset", name: str) -> str:
-    middle, low, high = (one[name + end].item() for end in ("", "_low", "_high"))
-    return f"{middle:+.2f} ({low:+.2f} to {high:+.2f})".replace("0.", ".")

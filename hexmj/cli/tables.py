@@ -41,6 +41,12 @@ def interval(one: "xr.Dataset", measure: str) -> str:
     return "-" if flss != flss else f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
 
 
+def difference(one: "xr.Dataset", measure: str) -> str:
+    """The same of a difference of two frequencies, with its signs."""
+    middle, low, high = (one[measure + end].item() for end in ("", "_low", "_high"))
+    return "-" if middle != middle else f"{middle:+.2f} ({low:+.2f} to {high:+.2f})".replace("0.", ".")
+
+
 def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path: Path) -> Path:
     """Draw some data and write the figure; no date stands in it."""
     from hexmj.pictures import as_shipped

@@ -60,9 +60,8 @@ def caption(result: "xr.Dataset") -> str:
     """
     told = settings(result)
     told["controllers"] = _shown(result, told)
-    return "; ".join(
-        filter(None, [controllers(told), *_walks(told), _stride(told.get("stride") or {}), conditions(told)])
-    )
+    of_bodies = conditions(told) if told.get("physical", True) else ""
+    return "; ".join(filter(None, [controllers(told), *_walks(told), _stride(told.get("stride") or {}), of_bodies]))
 
 
 def caption_of_at_least(least: int, result: "xr.Dataset") -> str:

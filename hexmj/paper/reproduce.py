@@ -52,7 +52,10 @@ def reproduce(
         raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
     if not only and protocol.samples != SAMPLES:
         raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, as the figures draw, or keys of claims")
-    check_distinct("readings beside", ["printed", *beside])
+    if beside:
+        check_distinct("readings beside", beside)
+    if "printed" in beside:
+        raise InputError("reading 'printed' beside itself; expected others, beside which it stands anyway")
     readings = {name: named_reading(name) for name in beside}
     results_folder(out := path_of(out), TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]

@@ -68,7 +68,7 @@ class Effort:
             raise without_extra("search", "cmaes, which the algorithm of this name needs,")
         whole("population", self.population, 4 if self.algorithm == "cmaes" else 2, MOST, " individuals")
         check_draw(self.starts, self.seed)
-        check_draw(self.refine_starts, self.seed)
+        check_draw(self.refine_starts, self.seed, "refine_starts")
         if self.begin is not None:
             check_controller_type(self.begin)
         if self.budget < self.population:

@@ -50,7 +50,7 @@ REGIMES = 50
 def check_counts(study: Any, *names: str) -> None:
     """Refuse numbers of starts that make no sense, and more in physics, by the names of their fields, than on paper."""
     for name in ("n_starts", *names):
-        check_draw(getattr(study, name), study.seed)
+        check_draw(getattr(study, name), study.seed, name)
         if getattr(study, name) > study.n_starts:
             raise InputError(f"{name} = {getattr(study, name)}; expected at most n_starts = {study.n_starts}")
 
