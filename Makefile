@@ -1,6 +1,7 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       the tests, but for those that take their time
-# make slow       the others: kills at every write, the soak's sample, all commands of the documents, examples
+# make slow       others: kills at every write, the soak's sample, README and examples, whatever takes seconds
+# make thorough   those for which .ci/run has no time: all commands of the documents, notebooks, larger numbers of starts
 # make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
 # make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types
@@ -15,18 +16,21 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
-.PHONY: compare test slow soak bench lint docs gallery system browser
+.PHONY: compare test slow thorough soak bench lint docs gallery system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
 	.venv/bin/hexmj compare --out results/compare $(ARGS)
 
-test slow: export MUJOCO_GL ?= $(GL)
+test slow thorough: export MUJOCO_GL ?= $(GL)
 test: .venv/dev system
-	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
+	.venv/bin/python -m pytest -m "not (slow or thorough)" $(TWO_AT_ONCE) $(ARGS)
 
 slow: .venv/dev system browser .venv/rl
-	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
+	.venv/bin/python -m pytest -m "slow and not thorough" $(TWO_AT_ONCE) $(ARGS)
+
+thorough: .venv/dev system
+	.venv/bin/python -m pytest -m thorough $(TWO_AT_ONCE) $(ARGS)
 
 soak: export MUJOCO_GL ?= $(GL)
 soak: .venv/dev system

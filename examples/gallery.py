@@ -4,7 +4,7 @@
 """
 
 import subprocess
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -45,7 +45,9 @@ def film(recordings: list[Dataset], path: Path, how: hexmj.Film, body: hexmj.Bod
 
 
 def main() -> None:
-    out = Path(sys.argv[1] if sys.argv[1:] else "results/gallery")
+    words = ArgumentParser(description=__doc__)
+    words.add_argument("out", nargs="?", type=Path, default="results/gallery", help="folder of the films")
+    out = words.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     film([planned("ldvs", 0.4, 140.0), walked("ldvs", 0.4, 140.0)], out / "walk.webp", FILM)
     film([walked("uncoordinated", 0.5, 60.0), walked("ldvs", 0.5, 60.0)], out / "fall.webp", FILM)

@@ -156,7 +156,7 @@ class LargerPlan:
         return replace(walk, **lengths)
 
 
-def fallen(walks: dict[float, dict[str, Any]], velocity: float = 0.5, n_starts: int = 40) -> xr.Dataset:
+def fallen(walks: dict[float, dict[str, Any]], n_starts: int, velocity: float = 0.5) -> xr.Dataset:
     """Three answers of the same starts at some swing velocities V_p [mm/s], by what `hexmj.compare` takes for each."""
     found = [hexmj.compare(velocities=velocity, n_starts=n_starts, **how) for how in walks.values()]
     return xr.concat([one.squeeze() for one in found], xr.Variable("vp", list(walks)), combine_attrs="drop_conflicts")
@@ -169,7 +169,7 @@ def tilting(body: hexmj.Body) -> xr.Dataset:
     return hexmj.record(walked, title="servo hexapod")
 
 
-def main() -> None:
+def main(n_starts: int = 40) -> None:
     """Walk insect and robot ever more slowly, draw what becomes of them, and film the robot."""
     out = Path("results/examples")
     out.mkdir(parents=True, exist_ok=True)
@@ -186,7 +186,7 @@ def main() -> None:
     }
     figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
     for axes, (name, at) in zip(panels, walks.items(), strict=True):
-        answers = fallen(at)
+        answers = fallen(at, n_starts)
         for answer, look, says in (
             ("kinematic", "k--", "lost stability on paper"),
             ("toppled", "s-", "tilted by more than 0.1 rad"),
@@ -197,7 +197,7 @@ def main() -> None:
         axes.set(title=f"{name}, V = 0.5", xscale="log", xlabel="swing velocity V_p [mm/s]", ylim=(-0.03, 1))
         axes.set_xticks(list(at), [f"{vp:g}" for vp in at], minor=False)
         axes.minorticks_off()
-    panels[0].set_ylabel("part of 40 starts")
+    panels[0].set_ylabel(f"part of {n_starts} starts")
     panels[1].legend(frameon=False)
     figure.savefig(out / "servo_hexapod.png", dpi=150)
     hexmj.render([tilting(body)], out / "servo_hexapod.mp4", body=body)

@@ -1,5 +1,6 @@
 """Run the notebooks anew and store what they show: `python notebooks/run.py`."""
 
+from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ def executed(path: Path) -> Any:
 
 
 if __name__ == "__main__":
+    ArgumentParser(description=__doc__).parse_args()
     for path in sorted(FOLDER.glob("*.ipynb")):
         nbformat.write(executed(path), path)
         print(path.name, f"{path.stat().st_size / 1000:.0f} kB")

@@ -66,6 +66,7 @@ def test_what_cannot_be_switched_is_refused_in_a_sentence(name: str, said: str) 
         hexmj.load_controller(name)
 
 
+@pytest.mark.slow
 def test_without_a_part_is_a_controller_like_any_other() -> None:
     check_controller(hexmj.load_controller("walknet-without-2"))
 
@@ -97,6 +98,7 @@ def test_a_contact_gap_is_refused_where_nobody_reads_it() -> None:
     options_of(["ablate", "--contact-gap", "5", "--models", "ldvs", "walknet-load"]).study()
 
 
+@pytest.mark.thorough
 def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     study = Ablation({"walknet": switched("walknet")}, (0.5,), n_starts=20, n_physical=2, periods=12)
     result = conduct(study)

@@ -61,7 +61,7 @@ def test_a_ratio_above_one_is_in_our_favour():
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_small_bench_prints_its_table(tmp_path):
     """Two of the figures, through pytest-benchmark into the table."""
     command = [sys.executable, "-m", "pytest", "benchmarks", "--override-ini", "python_files=bench_*.py"]
@@ -86,7 +86,7 @@ def test_solver_settings_of_a_few_starts(tmp_path, capsys, monkeypatch):
     assert "time step / 4" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_scaling_of_a_few_starts(tmp_path):
     command = [sys.executable, "-m", "benchmarks.scaling", "--out", str(tmp_path), "--share", "0.01"]
     subprocess.run(command, cwd=ROOT, check=True)

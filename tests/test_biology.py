@@ -151,6 +151,7 @@ def test_a_leg_that_is_lifted_in_the_first_row_begins_its_strides_with_the_next(
     assert np.isfinite(list(quantities(strides, settled.compiled).values())).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vp", [80.0, 500.0, 800.0])
 def test_swings_are_told_from_hops_however_fast_legs_are(vp):
     """Swings of 24 ms at V_p = 800 mm/s are shorter than what is a hop at 80."""
@@ -294,6 +295,7 @@ def test_strides_that_do_not_fit_into_memory_are_refused_before_anybody_walks():
         conduct(Biology(LDVS, n_starts=10**6))
 
 
+@pytest.mark.slow
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     words = ("biology", "--starts", 2, "--periods", 4, "--out", tmp_path)
     code, text, _ = run(*words, "--json")

@@ -54,6 +54,7 @@ def test_threads_that_overlap_share_a_callback_until_the_last_has_left():
     assert mujoco.get_mju_user_warning() is None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unheard")
 @pytest.mark.parametrize("walking", [StickInsect(actions="tips"), StickInsects(1, actions="tips")], ids=["one", "many"])
 def test_one_that_diverges_writes_nothing_and_says_what_happened(walking: Any, tmp_path, monkeypatch, capfd):

@@ -95,6 +95,7 @@ def test_the_name_is_of_the_code_within_reach_and_no_other(toy: Path, unedited: 
     assert toy_record(toy) == unedited
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -155,6 +156,7 @@ def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_pa
     assert found[0][1] == np.__version__ and found[0][0].startswith("1.0@")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["my_helper.py", "my_helper/__init__.py", "my_helper/inner/gains.py", "my_helper/gains.txt"]
 )

@@ -93,12 +93,17 @@ def test_weights_of_a_controller_of_ones_own_are_no_preset_s(run, tmp_path):
     ("words", "told"),
     [
         (["--model", "lasting-0.1"], "; lasting-0.1: reading lasting"),
-        (["--model", "sums.py:X"], "; sums.py:X: order sequential, reading cap sum"),
-        (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
+        *(
+            pytest.param(*one, marks=pytest.mark.thorough)
+            for one in (
+                (["--model", "sums.py:X"], "; sums.py:X: order sequential, reading cap sum"),
+                (["--model", "sums.py:X", "--order", "undelayed"], "; order undelayed; sums.py:X: reading cap sum"),
+                (["--model", "mine.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+            )
+        ),
         (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "own-0.4-without-3"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "copy.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
-        (["--model", "mine.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--pep0", -9, "--geometry", "centred"], "; seed 0; pep0 -9.0; geometry centred"),
     ],
 )
@@ -134,7 +139,7 @@ def test_the_last_line_tells_of_a_ground_that_nobody_gets_to(run, tmp_path, word
     assert ("nobody" in out) == told
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
     words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]
     out = run(*words, "--out", tmp_path)[1].replace("\n", " ").replace("  ", " ")

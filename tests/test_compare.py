@@ -86,6 +86,7 @@ STUDIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
     here = conduct(STUDIES[name], threads=2)

@@ -36,6 +36,7 @@ def test_every_shell_is_told_what_each_command_does(run, shell):
     assert not [name for name in COMMANDS if f"'{name}': {{'description': '{name}'" in script]
 
 
+@pytest.mark.thorough
 def test_fish_completes_by_a_pipe_since_no_argument_may_be_so_long(run, tmp_path):
     code, script, _ = run("--completion", "fish")
     assert code == 0

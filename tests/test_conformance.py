@@ -17,6 +17,7 @@ from waiting_legs import OWN
 LDVS = hexmj.LDVS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["printed", "undelayed", "sequential"])
 @pytest.mark.parametrize("name", ["ldvs", "uncoordinated", "own-0.1", "own"])
 def test_the_network_conforms(name, order):
@@ -25,6 +26,7 @@ def test_the_network_conforms(name, order):
     assert controller.mirrored == (order != "sequential" and name != "own-0.1")
 
 
+@pytest.mark.slow
 def test_other_controllers_conform():
     check_controller(hexmj.ReadsLegs(LDVS))
     check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))

@@ -175,6 +175,7 @@ def test_planned_losses_are_those_of_the_network():
     assert 0 < np.isfinite(times).sum() < 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
 @pytest.mark.parametrize("strategy", ["none", "reorganise", "slow_down"])
 def test_a_disturbed_plan_that_senses_nothing_goes_on_by_itself(kind, strategy, postures):

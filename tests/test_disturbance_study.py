@@ -106,7 +106,7 @@ def test_only_losses_after_the_disturbance_and_within_the_window_count():
 FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "window": 30.0}
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_disturbed_walks_can_read_their_legs():
     halted: dict[str, Any] = FEW | {
         "disturbances": ["halt"],
@@ -119,6 +119,7 @@ def test_disturbed_walks_can_read_their_legs():
     assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
 
 
+@pytest.mark.slow
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
     pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "window": 45.0}
     study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)

@@ -1,9 +1,10 @@
 """Every command and snippet of README and docs, and every example, runs; the site is whole and needs no other.
 
 A command stands on a line of its own, indented by four blanks.  Behind `# long` it is parsed and not run, behind
-`# refused` it ends with exit code 2.
+`# refused` it ends with exit code 2.  Those of `LONGER` are run by `make thorough` alone.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -27,6 +28,8 @@ PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for
 LINES = dict.fromkeys(
     line for text in PAGES.values() for line in re.findall(r"^    hexmj (.+?)(?: +# (.+))?$", text, flags=re.MULTILINE)
 )
+LONGER = "biology", "converge", "disturb", "map", "reproduce", "search", "terrain"
+"""Names of commands that take long even when they are given little to do; none of them stands in the README."""
 COMMANDS = [command for command, told in LINES if not told]
 LONG = [command for command, told in LINES if told.startswith("long")]
 REFUSED = [command for command, told in LINES if told == "refused"]
@@ -34,6 +37,7 @@ FIRST = {command.split()[0]: command for command in reversed(COMMANDS)}
 """Name of a command -> the first line that has it."""
 EXAMPLES = sorted(one for one in (ROOT / "examples").glob("*.py") if not one.name.startswith("train_"))
 """Those that train for minutes are in `test_learned`, made small."""
+LONG_EXAMPLE = "servo_hexapod"
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -66,7 +70,13 @@ def test_there_is_something_to_run():
     assert all(told in ("", "refused") or told.startswith("long") for _, told in LINES)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+def as_tiers(commands):
+    """With the longer ones marked."""
+    marks = {True: pytest.mark.thorough, False: ()}
+    return [pytest.param(one, id=one, marks=marks[one.split()[0] in LONGER]) for one in commands]
+
+
+@pytest.mark.parametrize("command", as_tiers(COMMANDS))
 def test_command(command, here, run):
     """The first of each name in a new process, as it is typed; the others here, where all is imported."""
     if command in FIRST.values():
@@ -90,6 +100,7 @@ def test_commands_within_sentences_have_options_that_exist():
         assert options_of(checked(command.split())), command
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("command", REFUSED)
 def test_refused(command, here, run):
     assert run(*command.split())[0] == 2
@@ -128,9 +139,21 @@ def test_parameter_file(tmp_path):
     assert read.weights == LDVS.weights
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(one, id=one.stem, marks=pytest.mark.thorough if one.stem == LONG_EXAMPLE else ())
+        for one in EXAMPLES
+    ],
+)
 def test_example(example, folder):
     subprocess.run([sys.executable, str(example)], cwd=folder, check=True)
+
+
+def test_a_long_example_from_fewer_starts(tmp_path):
+    small = f"import {LONG_EXAMPLE}; {LONG_EXAMPLE}.main(n_starts=4)"
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")])
+    subprocess.run([sys.executable, "-c", small], cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, check=True)
 
 
 def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):

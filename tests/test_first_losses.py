@@ -17,6 +17,7 @@ STRIDE = hexmj.Stride()
 LDVS = hexmj.LDVS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["printed", "undelayed", "sequential"])
 @pytest.mark.parametrize("name", hexmj.PRESETS)
 def test_fast_losses_are_those_of_the_plan(name, order):

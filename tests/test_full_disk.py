@@ -172,6 +172,7 @@ def hexmj_into(stream: str, *words: str) -> subprocess.CompletedProcess[bytes]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("--help",), ("flss", "--starts", "5", "--json")], ids=" ".join)
 def test_standard_output_that_is_full_or_gone(words):
     full = hexmj_into("> /dev/full", *words)

@@ -255,6 +255,7 @@ def test_limit_gait_is_the_gait_of_the_whole_walk(controller, v, acceleration, m
     assert found.stable.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "phase", "printed"), [(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)])
 def test_hard_wired_phases(v, phase, printed):
     """An independent simulation gave 0.655 and 0.714 with the default constants; the paper prints 0.65 and 0.7."""

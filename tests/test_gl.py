@@ -77,6 +77,7 @@ def test_a_child_that_was_forked_after_something_was_drawn_draws_nothing():
     subprocess.run([sys.executable, "-c", FORKED], env=KEPT, check=True, timeout=120)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draws", [FRAME, ENVIRONMENT], ids=["frame", "dm_env"])
 @drawing
 def test_triton_is_there_before_a_context(draws, tmp_path):
@@ -98,6 +99,7 @@ def without_libraries(name: str) -> None:
     raise OSError(f"{name}: cannot open shared object file")
 
 
+@pytest.mark.slow
 @drawing
 @pytest.mark.parametrize("script", [FRAME, ENVIRONMENT], ids=["film", "environment"])
 def test_without_a_screen_frames_are_rendered_though_nobody_asked_for_egl(script):
@@ -196,6 +198,7 @@ assert (theirs() == first).all(), "dropped"
 """
 
 
+@pytest.mark.slow
 @drawing
 def test_dm_control_films_and_environments_draw_in_one_program(tmp_path):
     """dm_control takes for granted that its context is current, and frees it at the exit."""

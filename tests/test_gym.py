@@ -208,6 +208,7 @@ def walk_alone(seed: int, done: np.ndarray, mode: AutoresetMode, **task: Any) ->
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", AutoresetMode)
 @pytest.mark.parametrize(("count", "threads"), [(1, 1), (3, 1), (3, 2)])
 def test_many_insects_are_single_ones_to_the_last_bit(mode, count, threads):
@@ -266,6 +267,7 @@ def test_some_insects_begin_anew_and_the_others_go_on():
     assert many.np_random_seed == (0, 6, 2)
 
 
+@pytest.mark.slow
 def test_make_finds_them_in_whatever_order_of_imports():
     """In a process of its own, as a script would; and neither dm_control nor a GL is there."""
     script = (

@@ -52,12 +52,14 @@ def random_joints(chains: HingeChains, count: int, share: float = 1.0) -> np.nda
     return np.random.default_rng(1998).uniform(low, high, (count, *low.shape))
 
 
+@pytest.mark.slow
 def test_it_is_the_closed_form_over_the_whole_step_range(closed: ThreeHinges, numeric: HingeChains):
     tips = step_range()
     for wanted, found in zip(closed.inverse(tips), numeric.inverse(tips), strict=True):
         assert_allclose(found, wanted, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_it_reaches_what_the_closed_form_reaches(closed: ThreeHinges, numeric: HingeChains):
     """And besides only tips beyond the thorax-coxa axis, which belong to another protraction in the closed form."""
     rng = np.random.default_rng(1998)

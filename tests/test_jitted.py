@@ -27,6 +27,7 @@ def ran(folder: Path) -> list[float]:
     return [float(word) for word in done.stdout.split()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "told"), [("+ 1.0", "+ 5.0", 12.0), ("FACTOR = 2.0", "FACTOR = 3.0", 6.0), ("", "", 4.0)]
 )

@@ -49,7 +49,7 @@ def result(league: League, data) -> xr.Dataset:
     return league.result([*data.values()])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
     table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=40.0)
     assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)
@@ -71,11 +71,13 @@ def test_the_way_is_what_was_walked_in_whole_steps() -> None:
     np.testing.assert_allclose(found.way[upright], walked[upright], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_everything_tells_its_units(result) -> None:
     assert {values.attrs["units"] for values in result.values()} == {"1", "mm/s", "time unit"}
     assert (result.slip.units, result.reached.units, result.cost.units) == ("mm/s", "time unit", "1")
 
 
+@pytest.mark.slow
 def test_differences_are_those_on_the_same_starts(result) -> None:
     assert result.attrs["reference"] == "ldvs"
     assert not result.kinematic_above.sel(entrant="ldvs").any()
@@ -88,6 +90,7 @@ def test_differences_are_those_on_the_same_starts(result) -> None:
     assert np.allclose(ends, paired_difference(lost, of_ldvs))
 
 
+@pytest.mark.slow
 def test_what_cannot_be_asked_is_not_known(result) -> None:
     still, ideal = (result.sel(entrant=name) for name in ("still", "graham-ideal"))
     assert np.isnan(still.fell.sel(trial=["halt", "leg", "push", "reads", "noise", "late"])).all()
@@ -134,6 +137,7 @@ def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(wind
     assert np.array_equal(found.lost, np.isfinite(lost))
 
 
+@pytest.mark.slow
 def test_tables_and_figure_show_every_entrant(result) -> None:
     text = league_markdown(result)
     for table in tables(result):
@@ -151,6 +155,7 @@ def marks(figure) -> list[list[str]]:
     return [[text.get_text() for text in axes.texts] for axes in figure.axes]
 
 
+@pytest.mark.slow
 def test_figures_say_where_walks_are_missing_and_where_nothing_is_known(result) -> None:
     assert not result.missing.any()
     assert FEWER not in str(marks(league_figure(result))) + league_figure(result).get_supxlabel()
@@ -168,6 +173,7 @@ def test_figures_say_where_walks_are_missing_and_where_nothing_is_known(result) 
     assert FEWER in marks(walks_figure(fewer))[3]
 
 
+@pytest.mark.slow
 def test_titles_and_panels_keep_clear_of_each_other(result) -> None:
     for draw in (league_figure, walks_figure):
         for shown in (result, result.isel(velocity=[0], entrant=[0]).assign_attrs(velocities="[0.3]")):
@@ -179,6 +185,7 @@ def test_titles_and_panels_keep_clear_of_each_other(result) -> None:
             assert boxes[0].x0 >= 0 and boxes[-1].x1 <= figure.bbox.width
 
 
+@pytest.mark.slow
 def test_a_set_that_is_not_read_as_printed_is_told_everywhere(league: League, data) -> None:
     """Whatever it did: here all of them did what ldvs does."""
     others = replace(league, entrants=entrants(("lasting", "ldvs", "walknet", "walknet-reacog")))

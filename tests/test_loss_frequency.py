@@ -102,6 +102,7 @@ def test_slabs_are_one_stream():
     assert over_range == np.isfinite(first_loss(starts, LDVS, v, 40.0)).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("range_of", [1, 700, 1000, 1234, SLAB, SLAB + 1999, SLAB + 2000])
 def test_any_cut_counts_what_one_run_counts(tmp_path, range_of):
     """Whatever the ranges' size and the order in which they are computed, and whoever computes them."""

@@ -32,6 +32,7 @@ def result(folder):
     return conduct(StabilityMap(LDVS, "vp", **SMALL), folder)
 
 
+@pytest.mark.slow
 def test_cells_are_those_of_the_comparison(result):
     for vp in result.value.values:
         alone = compare(LDVS, [0.5, 0.7], n_starts=12, window=60.0, conditions=Conditions.of(vp=vp)).isel(controller=0)
@@ -98,6 +99,7 @@ def test_starts_whose_tips_are_out_of_reach_at_rest_are_left_out():
     assert 0 < result.stand.item() == result.sizes["start"] < 8
 
 
+@pytest.mark.slow
 def test_starts_whose_tips_are_out_of_reach_are_left_out_everywhere():
     few: dict[str, Any] = {"velocities": [0.5, 0.7], "n_starts": 9}
     low = conduct(StabilityMap(LDVS, "standing_height", [6.0, 10.0], **few))

@@ -49,6 +49,7 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
     return rng.uniform(-10.0, 10.0, (size, 6))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),

@@ -14,7 +14,10 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(one, id=one.stem, marks=pytest.mark.thorough if i else ()) for i, one in enumerate(NOTEBOOKS)],
+)
 def test_a_notebook_runs(path: Path):
     words = [sys.executable, "-m", "pytest", "--nbmake", "-p", "no:cacheprovider", "-o", "filterwarnings=", str(path)]
     paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])

@@ -86,6 +86,7 @@ def test_a_body_of_other_names_and_lengths_stands(tmp_path: Path):
     assert np.linalg.norm(data.qvel[:3]) < body.lengths.speed_at_rest
 
 
+@pytest.mark.slow
 def test_names_alone_change_no_bit(tmp_path: Path):
     """Of the model and of a walk, whether its plan reads the legs or not."""
     body, insect = renamed(tmp_path, 1.0), compile_body(conditions())

@@ -44,10 +44,12 @@ def own(request):
     return hexmj.load_controller(OWN[request.param])
 
 
+@pytest.mark.slow
 def test_it_keeps_the_protocol(own):
     check_controller(own)
 
 
+@pytest.mark.slow
 def test_both_measures_beside_ldvs(own):
     """At V = 0.4 each of them loses less than LDVS on paper, and no more of them fall."""
     table = hexmj.flss(own, [0.1, 0.4], n_starts=200)
@@ -283,7 +285,7 @@ class Chatty:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [(), ("--processes", "2")])
+@pytest.mark.parametrize("more", [(), pytest.param(("--processes", "2"), marks=pytest.mark.thorough)])
 def test_what_a_controller_prints_is_no_answer(tmp_path, more):
     (tmp_path / "mine.py").write_text(CHATTY)
     words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--window", "3"]

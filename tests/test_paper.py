@@ -125,7 +125,7 @@ def test_rows_of_another_protocol_are_kept_apart(tmp_path):
     assert len(list(tmp_path.iterdir())) == 4
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_everything_is_written(tmp_path):
     told = []
     rows, files = reproduce(tmp_path, TINY, progress=told.append)
@@ -279,6 +279,7 @@ def test_a_rows_command_tells_starts_and_readings():
     assert f"`{claim.command}`" in claims_markdown([Row(claim, {})], asdict(FULL))
 
 
+@pytest.mark.slow
 def test_reproduce_judges_chosen_claims(run, tmp_path):
     words = ["reproduce", "--quick", "--only", "ldvs-accelerated", "--json", "--out", tmp_path]
     code, text, _ = run(*words)

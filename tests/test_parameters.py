@@ -193,6 +193,7 @@ def test_weights_copy_their_input():
     assert not weights.p1.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("window", "names", "velocities"),
     [

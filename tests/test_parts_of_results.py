@@ -66,6 +66,7 @@ def pixels(result: xr.Dataset, which: str) -> bytes:
     return drawn.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_the_order_of_the_axes_changes_nothing(name: str):
     result = made(name)

@@ -22,6 +22,7 @@ def test_a_table_of_phases_says_the_same_of_every_pair_of_legs(name: str) -> Non
     assert np.allclose(around, np.round(around))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GAITS)
 @pytest.mark.parametrize("velocity", [0.3, 0.7])
 def test_legs_come_to_swing_as_the_table_says_and_for_the_usual_time(name: str, velocity: float) -> None:

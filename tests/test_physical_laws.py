@@ -94,6 +94,7 @@ def test_mirrored_starts_walk_mirrored_paths():
     assert np.array_equal(one.measured.stance, other.measured.stance[..., mirror])
 
 
+@pytest.mark.thorough
 def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
     """`test_physics` has the half of it, over the window `walk`."""
     conditions = (Conditions.of(longest_substep=ms) for ms in (0.625, 0.15625))

@@ -130,6 +130,7 @@ def test_nothing_is_measured_after_a_fall():
     assert (walked.outcomes.clearance < 0.01).all()
 
 
+@pytest.mark.thorough
 def test_speed_keeps_to_the_command(hundred):
     """0.95 to 1.05 of the commanded speed over the window `walk` where the start did not fall."""
     slow = compare(LDVS, [0.3], n_starts=40)
@@ -138,7 +139,7 @@ def test_speed_keeps_to_the_command(hundred):
     assert ((speed > 0.95) & (speed < 1.05)).all()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
     result = compare(LDVS, [0.5], n_starts=100, conditions=Conditions.of(vp=20.0))
@@ -321,6 +322,7 @@ def test_comparison_holds_every_answer():
     assert ((result.physical_low <= result.physical) & (result.physical <= result.physical_high)).all()
 
 
+@pytest.mark.thorough
 def test_halving_the_physics_step_hardly_changes_physical_flss(hundred):
     """Measured with 200 starts at V = 0.3, 0.5, 0.7: 0.155, 0.365, 0.690 became 0.160, 0.365, 0.695."""
     assert Conditions().numerics.longest_substep == 0.625

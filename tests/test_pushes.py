@@ -105,6 +105,7 @@ def test_a_push_begins_when_told(vp):
         assert (ends[0][start, begins + 1] != ends[1][start, begins + 1]).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vp", [80.0, 130.0])
 def test_a_push_depends_on_no_start_beside(vp):
     """To the last bit, however their pushes cut the chunks."""

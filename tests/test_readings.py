@@ -55,7 +55,7 @@ def test_where_the_claims_come_from_that_decide():
     assert {*REFINED_BY} <= CALIBRATED
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("controller", [HWS, LDVS])
 def test_what_only_acceleration_knows_changes_no_other_walk(controller):
     starts, final = draw_starts(20, 3), replace(controller, reading=Reading(neutral="final"))
@@ -88,6 +88,7 @@ def test_a_margin_leaves_out_the_ends_of_s():
         lost(10.0)
 
 
+@pytest.mark.slow
 def test_refined_constants_miss_no_more(monkeypatch):
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", (({"aep0": 9.0, "pep0": -9.0},), ({"pep_min": -25.0},)))
     better, claims = refined(SMALL, threads=1), [claim for claim in CLAIMS if claim.key in REFINED_BY]
@@ -194,7 +195,7 @@ def test_bad_options_are_refused(words, tmp_path):
         options_of(["readings", *words, "--out", str(tmp_path)]).run()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_command(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", ())
     monkeypatch.setattr("hexmj.paper.scores.IDEAL", replace(IDEAL, budget=12))

@@ -85,6 +85,7 @@ PROGRAMS = {
 """Who opens the file `gain`, of which no name tells -> the files of such a program."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_what_programs_open_is_noticed(tmp_path: Path, program: str) -> None:
     (tmp_path / "gain").write_text("2.0")
@@ -100,6 +101,7 @@ def test_profiled_modules_are_heard_too(tmp_path: Path) -> None:
         assert sweep(tmp_path, "-m", "cProfile", "-o", os.devnull, **PROGRAMS["a module"]) == (gain, 1, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "first"), [("gain.toml", "import hexmj"), ("GAIN.CSV", "")])
 def test_a_file_of_data_counts_that_a_text_names(tmp_path: Path, name: str, first: str) -> None:
     """Whoever is imported first; another in a folder that another text names."""
@@ -151,6 +153,7 @@ OTHER = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["'best.toml'", "__import__('glob').glob('best*')[0]"])
 def test_what_a_script_loads_its_own_controllers_may_use(tmp_path: Path, name: str) -> None:
     script = f"import hexmj\n{NEW}BASE = hexmj.load_controller({name})\n"
@@ -160,6 +163,7 @@ def test_what_a_script_loads_its_own_controllers_may_use(tmp_path: Path, name: s
         assert sweep(tmp_path, script=script, other=OTHER) == (gain, 1, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", ["None", "ProcessPoolExecutor(1, get_context('spawn'))"])
 def test_a_controller_that_a_script_loads_is_no_reason_to_refuse_its_own(tmp_path: Path, executor: str) -> None:
     script = f"import hexmj\n{NEW}BASE = hexmj.load_controller('other.py:Other')\n"
@@ -191,6 +195,7 @@ def test_an_mjcf_counts_that_a_text_names_with_what_it_includes(tmp_path: Path, 
         assert sweep(tmp_path, mine=mine, script=SCRIPT) == (mass, 1, "")
 
 
+@pytest.mark.slow
 def test_a_command_says_in_one_line_what_is_not_kept(tmp_path: Path) -> None:
     (tmp_path / "gain.py").write_text("GAIN = 2.0")
     tripod = (Path(__file__).parents[1] / "examples" / "tripod.py").read_text()

@@ -68,6 +68,7 @@ def edit(path: Path, **changed: object) -> None:
     path.write_text(json.dumps(told | changed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_result_made_again_is_equal_to_the_last_bit(run, tmp_path, name):
     workers = ["--threads", 1, "--json"]
@@ -144,6 +145,7 @@ def test_what_differs_is_named_even_where_all_numbers_are_equal(run, flss):
     assert "processor (AVX1024 then, not now), settings (seed)" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("toml", ["fields.toml", "fields.conf"])
 def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch, toml):
     monkeypatch.chdir(tmp_path)

@@ -88,7 +88,11 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "recording": recorded,
     "search": searched,
 }
-STUDIES = [name for name in FIGURES if name not in MADE and name != "readings"]  # which takes minutes
+STUDIES = [
+    pytest.param(name, marks=pytest.mark.thorough if name in ("biology", "disturb", "league", "variants") else ())
+    for name in FIGURES
+    if name not in MADE and name != "readings"  # which takes minutes
+]
 
 
 def check_it_stays_the_same(result: xr.Dataset, folder: Path) -> None:
@@ -136,6 +140,7 @@ def test_a_recordings_legs_stand_in_their_order_however_they_are_sorted():
         hexmj.plot(recording.isel(leg=slice(3)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(MADE[name](), tmp_path)
@@ -147,6 +152,7 @@ def test_a_study_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(study(name), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["terrain", "league"])
 def test_a_part_of_a_result_is_drawn_or_refused_in_a_sentence(name: str):
     result, refused = study(name), 0
@@ -292,7 +298,7 @@ def test_a_name_that_would_not_come_back_is_refused(old: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("form", ["svg", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("png", "pdf"))])
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
     words = ["compare", "--starts", "2", "--window", "10", "--no-video", "--format", form, "--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)

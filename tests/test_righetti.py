@@ -19,6 +19,7 @@ def state(x: float, y: float) -> Hopf:
     return Hopf(np.full((1, 6), x), np.full((1, 6), y))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.4, 0.7])
 def test_two_tripods_move_in_anti_phase(velocity: float) -> None:
     found = gait(walk(hexmj.draw_starts(6, 2), RIVALS["righetti"], velocity, 30 * Stride().periods(velocity)))

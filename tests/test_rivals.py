@@ -21,7 +21,10 @@ from hexmj.walks import PLANNED
 SLOW = "walknet-load", "walknet-reacog"
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] if one in SLOW else []) for one in RIVALS])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.thorough if one in SLOW else ()) for one in RIVALS]
+)
 def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
     assert hexmj.load_controller(name) is RIVALS[name]
     check_controller(RIVALS[name])
@@ -42,6 +45,7 @@ def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
     assert np.array_equal(again.velocity, first.velocity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wave", "name"), [("wilson", "wilson"), ("graham", "graham")])
 @pytest.mark.parametrize("velocity", [0.1, 0.35, 0.8])
 def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_one(wave, name, velocity) -> None:

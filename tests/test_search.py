@@ -34,6 +34,7 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
     assert hexmj.plot(history).axes[0].get_lines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
 @pytest.mark.parametrize("stop", [0.05, 0.3, 0.7])
 def test_a_stopped_search_goes_on_to_the_same_bits(tmp_path, algorithm, stop):

@@ -101,6 +101,7 @@ POOLS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", POOLS)
 def test_while_a_pool_of_processes(when, tmp_path):
     """Its semaphores are left to nobody, who would be told of them."""
@@ -131,6 +132,7 @@ def test_while_c_code_calls_back():
     assert (done.returncode, done.stdout, done.stderr.strip()) == (130, b"", b"hexmj: stopped")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", ["SystemError", "RuntimeError", "OSError", "MemoryError", "SystemExit"])
 def test_while_something_makes_another_exception_of_it(tmp_path, other):
     """As C code that is being called does, and a class that is being made; in a sweep, too, whose workers end."""

@@ -22,6 +22,7 @@ def slower(tmp_path_factory):
     return folder, conduct(StaticLimit(LDVS, vps=(400.0, 100.0, 25.0), **FEW), folder)
 
 
+@pytest.mark.thorough
 def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
     _, result = slower
     fast, slow = result.sel(vp=400.0), result.sel(vp=25.0)
@@ -34,6 +35,7 @@ def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
     assert (fast.physical < slow.physical / 2).all()  # dynamics saves fast walks
 
 
+@pytest.mark.slow
 def test_the_feet_at_the_ground_give_the_planned_answer_where_those_that_carry_do_not(slower):
     """With 30 starts over the window `walk` at 20 mm/s: 0.467 planned, 0.600 carried, 0.467 at the ground."""
     _, result = slower
@@ -46,6 +48,7 @@ def test_the_feet_at_the_ground_give_the_planned_answer_where_those_that_carry_d
     assert (result.same_feet_grounded.mean("start") >= result.same_feet.mean("start")).all()
 
 
+@pytest.mark.slow
 def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
     """It strays as feet strike the ground: by about a millimetre at 100 mm/s, by half of that at 25 mm/s."""
     off = slower[1].margin_pressure.mean("start")
@@ -53,6 +56,7 @@ def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
     assert (off.sel(vp=25.0) < 0.5 * off.sel(vp=400.0)).all()
 
 
+@pytest.mark.slow
 def test_light_legs_keep_the_centre_of_mass_at_o(slower):
     _, result = slower
     assert (result.drift.sel(leg_mass=0.01) < 0.02).all()
@@ -60,10 +64,12 @@ def test_light_legs_keep_the_centre_of_mass_at_o(slower):
     assert (result.kinematic == result.kinematic[0, 0]).all()
 
 
+@pytest.mark.slow
 def test_every_number_has_a_unit(slower):
     assert all("units" in variable.attrs for variable in slower[1].data_vars.values())
 
 
+@pytest.mark.thorough
 def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
     """What keeps them apart where the same feet stand: legs that give way, and whose mass moves the centre of mass.
 
@@ -80,6 +86,7 @@ def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
     assert margins[2] < margins[1] / 3
 
 
+@pytest.mark.slow
 def test_finished_walks_are_not_walked_again(slower, monkeypatch):
     folder, result = slower
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
@@ -90,6 +97,7 @@ def test_finished_walks_are_not_walked_again(slower, monkeypatch):
     assert sum(told) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_controller_may_read_the_legs(slower):
     few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
     reading, alone = conduct(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
@@ -115,6 +123,7 @@ def test_what_makes_no_sense_is_refused(wrong, said):
         StaticLimit(LDVS, **wrong)
 
 
+@pytest.mark.slow
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     words = ("converge", "--vps", 100, 50, "--starts", 4, "--window", 10, "--out", tmp_path)
     code, text, _ = run(*words, "--json")

@@ -101,6 +101,7 @@ def test_depth_is_that_of_mujocos_contacts(ground):
     assert in_contact > 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_feet_never_sink_in(name, monkeypatch):
     """By 2 % of the standing height, wherever and however fast the insect walks, until it has fallen."""

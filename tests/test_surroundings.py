@@ -35,7 +35,8 @@ def test_a_terminal_of_few_columns_gets_its_help(columns: str):
     assert done_with(("--help",), COLUMNS=columns).returncode == 0
 
 
-@pytest.mark.parametrize("columns", ["0", "00", "wide"])
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", ["0", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("00", "wide"))])
 def test_no_width_is_as_wide_as_usual(columns: str):
     assert flss_in(columns) == flss_in("80") != ""
 
@@ -46,6 +47,7 @@ def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):
     assert (tmp_path / "flss.png").exists()
 
 
+@pytest.mark.thorough
 def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
     """TeX is not there, and would not take a title with a per cent sign."""
     (wish := tmp_path / "matplotlibrc").write_text("text.usetex: True\nfont.size: 30\nlines.linewidth: 8\n")
@@ -81,8 +83,9 @@ def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
     assert "Nothing can be rendered here (MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none)" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "wish", ["off", *(pytest.param(one, marks=pytest.mark.slow) for one in ("nonsense", "osmesa"))]
+    "wish", ["off", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("nonsense", "osmesa"))]
 )
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
     done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)

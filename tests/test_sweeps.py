@@ -98,6 +98,7 @@ class Products:
         return whole.assign_coords(height=list(self.heights), speed=list(self.speeds))
 
 
+@pytest.mark.slow
 def test_cells_stand_along_their_axes_in_order(tmp_path: Path) -> None:
     data = conduct(Products(), tmp_path)
     assert data.y.dims == ("height", "speed", "x")

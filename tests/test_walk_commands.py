@@ -16,6 +16,7 @@ from film_reader import read_film
 PNG = b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
     words = ["compare", "--velocities", 0.4, 0.6, "--starts", 12, "--window", "start", "--json", "--no-video"]
     answers, datasets = [], []
@@ -123,6 +124,7 @@ def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
     assert recording.seconds.values[-1] == pytest.approx(16 / 40)
 
 
+@pytest.mark.slow
 @drawing
 def test_render_from_a_recording_and_side_by_side(run, tmp_path):
     walk = ["--velocity", 0.5, "--window", 16]
