@@ -43,6 +43,10 @@ def test_a_damaged_or_foreign_cell_is_never_believed(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=rf"{path.name} is .*; delete it, and it is made anew$"):
             run([cell], tmp_path)
     path.unlink()
+    path.symlink_to("nowhere/cell.nc")
+    with pytest.raises(InputError, match=rf"{path.name} is a link to nothing; delete it, and it is made anew$"):
+        run([cell], tmp_path)
+    path.unlink()
     run([cell], tmp_path)
     assert path.read_bytes() == good
 

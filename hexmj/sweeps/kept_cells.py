@@ -42,8 +42,10 @@ def find(path: Path, record: str) -> tuple["xr.Dataset", dict[str, str]] | None:
     """The data of a kept cell, if there is one, and what else its code has read.
 
     Raises:
-        InputError: it cannot be read, is damaged, or has another record.
+        InputError: it cannot be read, is damaged, a link to nothing, or has another record.
     """
+    if path.is_symlink() and not path.exists():
+        raise InputError(f"{path} is a link to nothing; delete it, and it is made anew")
     return _decode(path, read_sealed(path), record) if path.exists() else None
 
 
