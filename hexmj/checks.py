@@ -25,6 +25,9 @@ Of = TypeVar("Of")
 LABEL = 200
 """Characters of the longest name."""
 
+NO_ARRAY = ValueError, TypeError, RuntimeError, AttributeError
+"""What objects raise that are asked for an array and cannot be one, as a dataset or a tensor with gradients."""
+
 _NAMES = {
     float: "a number",
     int: "a whole number",
@@ -78,7 +81,7 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
     Raises:
         InputError: values that are none, some that are masked, or rows of different lengths.
     """
-    with suppress(ValueError):
+    with suppress(*NO_ARRAY):
         array = np.asarray(values)
         if (array.dtype.kind in "iuf" or not array.size) and not np.ma.is_masked(values):
             return np.array(array, dtype=float)
@@ -119,7 +122,7 @@ def states(name: str, values: ArrayLike) -> np.ndarray:
     Raises:
         InputError: values that are none, or some that are masked.
     """
-    with suppress(ValueError):
+    with suppress(*NO_ARRAY):
         array = np.asarray(values)
         known = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.isin(array, (0, 1)).all())
         if known and not np.ma.is_masked(values):

@@ -36,7 +36,7 @@ class Walk:
 
     def __post_init__(self) -> None:
         typed("geometry", self.geometry, Geometry)
-        shape = np.shape(self.stance)
+        shape = typed("a walk's stance", self.stance, np.ndarray).shape
         if len(shape) == 3 and shape[2] != len(LEGS):
             raise InputError(f"a walk's stance is of {shape[2]} legs; expected {len(LEGS)}")
         expected_of = {"time": shape[:1], "velocity": shape[:2]}

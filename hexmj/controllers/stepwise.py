@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import whole
+from hexmj.checks import NO_ARRAY, whole
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
@@ -108,7 +108,7 @@ def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """A value of one step that can be written into (start, leg)."""
     try:
         values = np.asarray(value)
-    except ValueError:
+    except NO_ARRAY:
         raise InputError(f"{name} of a step is {value!r:.80}; expected one array") from None
     kinds, expected = ("b", "booleans") if name == "stance" else ("fiu", "numbers")
     if values.dtype.kind not in kinds:
