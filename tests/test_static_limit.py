@@ -114,8 +114,11 @@ def test_a_controller_may_read_the_legs(slower):
         ({"vps": (0.0,)}, "vp = 0.0; expected above 0.1"),
         ({"velocity": 1.0}, "0 <= V < 1"),
         ({"window": "long"}, "valid names: walk, start"),
-        ({"conditions": Conditions.of(vp=20.0)}, "vp = 20.0; expected vps, which takes all of them"),
-        ({"conditions": Conditions.of(leg_mass=0.5)}, "leg_mass = 0.5; expected leg_masses, which takes all of them"),
+        ({"conditions": Conditions.of(vp=20.0)}, "vp = 20.0; expected it among vps, which has all that are tried"),
+        (
+            {"conditions": Conditions.of(leg_mass=0.5)},
+            "leg_mass = 0.5; expected it among leg_masses, which has all that are tried",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(wrong, said):

@@ -140,7 +140,7 @@ class Controlled:
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""
-        check_distinct("controllers", names)
+        check_distinct("models", names)
         found = [self.controller(name) for name in names]
         own = [one.name for one in found]
         return dict(zip(own if len(set(own)) == len(own) else names, found, strict=True))

@@ -91,7 +91,7 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
         if key not in valid:
             raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
-            raise InputError(f"{where}: {key} = {str(value)[:40]!r}; expected a number, finite and below 1e100")
+            raise InputError(f"{where}: {key} = {value!r:.40}; expected a number, finite and below 1e100")
     return {key: float(value) for key, value in table.items()}
 
 
