@@ -10,7 +10,8 @@
 # PYTHON=...      the Python, 3.11 or newer, that .venv is made from
 
 PYTHON ?= python3
-PIP = .venv/bin/python -m pip --disable-pip-version-check --quiet
+INSTALL = -m pip --disable-pip-version-check --quiet install --no-compile
+PROJECT = .venv/bin/python $(INSTALL) --constraint constraints.txt --editable
 TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
@@ -81,28 +82,30 @@ browser:
 	    >/dev/null 2>&1 || \
 	echo "Tests of pages are skipped: chromium could not be installed here: apt-get install chromium."
 
-.venv/project: pyproject.toml constraints.txt
+.venv/begun:
 	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || \
 	    { echo "$(PYTHON) cannot make virtual environments: apt-get install python3-venv."; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) install --constraint constraints.txt --editable ".[film]"
+	.venv/bin/python $(INSTALL) "pip>=25.1"  # the first with dependency groups
+	touch $@
+
+.venv/project: .venv/begun pyproject.toml constraints.txt
+	$(PROJECT) ".[film]"
 	touch $@
 
 # A peer with other versions of MuJoCo; its OpenCV is replaced by the one that needs no libGL.
 .venv-flygym/ready: benchmarks/flygym.txt
 	$(PYTHON) -m venv .venv-flygym
-	.venv-flygym/bin/python -m pip --disable-pip-version-check --quiet install --requirement benchmarks/flygym.txt
-	.venv-flygym/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --force-reinstall \
-	    "opencv-python-headless<5"
+	.venv-flygym/bin/python $(INSTALL) --requirement benchmarks/flygym.txt
+	.venv-flygym/bin/python $(INSTALL) --no-deps --force-reinstall "opencv-python-headless<5"
 	touch $@
 
-.venv/dev: .venv/project
-	$(PIP) install "pip>=25.1"  # the first with dependency groups
-	$(PIP) install --constraint constraints.txt --editable ".[film,search,gym,dask,view,docs]" --group dev
-	touch $@
+.venv/dev: .venv/begun pyproject.toml constraints.txt
+	$(PROJECT) ".[film,search,gym,dask,view,docs]" --group dev
+	touch .venv/project $@
 
 # stable-baselines3 and torch, for tests of learning, which are skipped without them.
 .venv/rl: .venv/dev
 	@echo "Installing stable-baselines3, for the tests of learning; its torch may be gigabytes."
-	@$(PIP) install --constraint constraints.txt --editable ".[rl]" && touch $@ || \
+	@$(PROJECT) ".[rl]" && touch $@ || \
 	echo "Tests of learning are skipped: stable-baselines3 could not be installed here: pip install '.[rl]'."

@@ -35,6 +35,7 @@ LDVS, STRIDE = anything.LDVS, hexmj.Stride()
 search: Any = stages.search
 Sample: Any = samples.Sample
 STARTS = np.zeros((2, 6))
+TABLE: Any = xr.Dataset({"x": 1.0})
 FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
 STANDS = np.ones((2, 6), dtype=bool)
 FEW: Any = {"n_starts": 2, "window": 10.0}
@@ -93,10 +94,10 @@ MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
 
 BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: anything.Stride(dt=np.timedelta64(1)), "dt = np.timedelta64(1); expected a number"),
-    (lambda: walk(xr.Dataset({"x": 1.0})), "starts = <xarray.Dataset>"),
-    (lambda: walk(velocity=xr.Dataset({"x": 1.0})), "velocity = <xarray.Dataset>"),
-    (lambda: hexmj.stability_margin(np.zeros((1, 6, 2)), xr.Dataset()), "stance = <xarray.Dataset>"),
-    (lambda: replace(walk(), stance=xr.Dataset()), "a walk's stance = <xarray.Dataset>"),
+    (lambda: walk(TABLE), "starts = <xarray.Dataset>"),
+    (lambda: walk(velocity=TABLE), "velocity = <xarray.Dataset>"),
+    (lambda: hexmj.stability_margin(np.zeros((1, 6, 2)), TABLE), "stance = <xarray.Dataset>"),
+    (lambda: replace(walk(), stance=TABLE), "a walk's stance = <xarray.Dataset>"),
     (lambda: walk(stride=3), "stride = 3; expected a Stride"),
     (lambda: walk(stride={}), "stride = {}; expected a Stride"),
     (lambda: walk(stride=0), "stride = 0; expected a Stride"),
