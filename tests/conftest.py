@@ -15,7 +15,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, a
 @pytest.fixture(autouse=True)
 def a_program_of_its_own():
     """What tests before this one have opened is nothing to it."""
-    for known in (opened_files._OPENED, opened_files._AT_FIRST):
+    for known in (opened_files._OPENED, opened_files._DOUBTS, opened_files._AT_FIRST):
         known.clear()
 
 

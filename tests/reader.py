@@ -98,6 +98,7 @@ def another_program(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has opened nothing so far, and remembers nothing."""
     monkeypatch.setattr(opened_files, "_AT_FIRST", {})
     monkeypatch.setattr(opened_files, "_OPENED", {})
+    monkeypatch.setattr(opened_files, "_DOUBTS", {})
     sys.modules.pop(importable("reader.py").__name__)
 
 

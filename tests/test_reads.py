@@ -22,6 +22,7 @@ READS = [
     ("gain", 'eval(compile(Path(at + "/gain").read_bytes(), "<text>", "eval"))'),
     ("gain.py", 'runpy.run_path(f"{at}/gain.py")["GAIN"]'),
     ("gain.py", 'float(Path(at, "gain.py").read_text().split()[-1])'),
+    ("gain.py", 'ThreadPoolExecutor(1).submit(runpy.run_path, f"{at}/gain.py").result()["GAIN"]'),
     ("gain.bin", 'float(np.memmap(f"{at}/gain.bin", float)[0])'),
     ("gain", '[os.chdir(at), float(Path("gain").read_text()), os.chdir("..")][1]'),
     ("gain.db", 'sqlite3.connect(f"{at}/gain.db").execute("select gain from told").fetchone()[0]'),

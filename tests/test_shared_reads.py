@@ -143,6 +143,15 @@ def test_what_an_object_remembers_is_not_sent_to_workers(
     assert what_was_read() == {"one/gain"}
 
 
+def test_a_field_over_something_that_is_computed_once_is_sent(computed: Callable[..., tuple[float, int]]) -> None:
+    Path("reader.py").write_text(
+        f"{READER.format(gain='self.known')}\n@dataclass(frozen=True)\nclass Known(Reader):\n    known: float = 3.0"
+    )
+    with ProcessPoolExecutor(1) as pool:
+        (data,) = run([Cell("reader", importable("reader.py").Known(known=4.0).cell, {})], Path("kept"), executor=pool)
+    assert data.gain == 4.0
+
+
 def test_a_worker_that_outlives_a_program_keeps_nothing_of_what_it_remembers(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,9 +187,60 @@ def test_a_cell_that_sweeps_in_processes_is_no_more_kept_than_what_it_sweeps(
     pool = "__import__('concurrent.futures').futures.ProcessPoolExecutor(1)"
     inner = "hexmj.sweeps.Cell('inner', importable('inner_reader.py').Reader().cell, {})"
     gain = f"hexmj.sweeps.run([{inner}], executor={pool})[0].gain.item()"
-    with pytest.warns(UserWarning, match=f"inner is not kept: .*{told}"):
-        assert computed(f"[importable := hexmj.user_code.loaded.importable, {gain}][1]") == (1.0, 2)
+    for n in (1, 2):  # what it has seen of the first one, the code may remember
+        with pytest.warns(UserWarning, match=f"inner is not kept: .*{told}"):
+            computed(f"[importable := hexmj.user_code.loaded.importable, {gain}][1]", f"file {n}")
     assert not [*Path("kept").glob("*.nc")]
+
+
+def test_a_cell_that_goes_on_where_a_cell_elsewhere_has_failed_is_not_kept(
+    computed: Callable[..., tuple[float, int]],
+) -> None:
+    Path("one/gain").write_text("-1.0")
+    Path("reader.py").write_text(
+        READER.format(gain="0.0 if fails() else 1.0")
+        + """
+@dataclass(frozen=True)
+class Failing:
+    def cell(self):
+        return Inner().cell() if float(Path("one/gain").read_text()) > 0 else {}
+
+def fails():
+    with __import__("concurrent.futures").futures.ProcessPoolExecutor(1) as pool:
+        try:
+            hexmj.sweeps.run([hexmj.sweeps.Cell("failing", Failing().cell, {})], executor=pool)
+        except hexmj.InputError:
+            return True
+"""
+    )
+    with pytest.warns(UserWarning, match="a cell that was swept elsewhere has failed"):
+        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    assert data.gain == 0.0
+    assert not [*Path("kept").glob("*.nc")]
+
+
+def test_what_a_cached_function_has_swept_before_counts(
+    computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though it found its cell kept, and opened nothing."""
+    Path("reader.py").write_text(
+        READER.format(gain="best()")
+        + """
+@functools.cache
+def best():
+    return hexmj.sweeps.run([hexmj.sweeps.Cell("inner", Inner().cell, {})], Path("inner"))[0].gain.item()
+"""
+    )
+    for program in range(3):
+        if program == 2:
+            Path("one/gain").write_text("7.0")
+        module = importable("reader.py")
+        assert module.best() == (7.0 if program == 2 else 1.0)
+        (data,) = run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+        assert data.gain == module.best()
+        if program == 0:
+            shutil.rmtree("kept")
+        another_program(monkeypatch)
 
 
 def test_a_worker_that_outlives_a_program_knows_nothing_of_what_that_has_opened(

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from inspect import signature
@@ -16,7 +16,17 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.code import OPEN_BY_THEMSELVES, code, data_of_users, files_of_classes, sources_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
-from hexmj.user_code.opened_files import also_read, changed, computing, heard, opened_by, seen, spelled
+from hexmj.user_code.opened_files import (
+    also_read,
+    changed,
+    computes,
+    computing,
+    doubts,
+    heard,
+    opened_by,
+    seen,
+    spelled,
+)
 
 EXECUTION = ("threads", "progress")
 """Arguments that say how a cell is computed, not what: a function that has them is given them by the sweep."""
@@ -75,27 +85,24 @@ class Cell:
             return json.dumps(self._told(), sort_keys=True)
         return ""
 
-    def computing(self) -> AbstractContextManager[list[str]]:
-        """While it is computed: what it opens beyond what its settings name is noted; gives `doubts`, see `read`."""
+    def computing(self) -> AbstractContextManager[None]:
+        """While it is computed: what it opens beyond what its settings name is noted."""
         return computing(self._told_files(), files_of_classes(self._modules()))
 
     def tell(self, read: Mapping[str, str], not_kept: str) -> None:
-        """Let the cell that sweeps this one, if one does, know what this one has read, what its settings name, and why
-        it is not kept, unless it is."""
-        also_read(_beyond({*_files(read), *map(spelled, self._told_files())}, ()), not_kept)
+        """Let those who sweep this one know what it has read, and a cell that does also what its settings name, and
+        why it is not kept, unless it is."""
+        named = map(spelled, self._told_files() if computes() else ())
+        also_read(_beyond({*_files(read), *named}, ()), not_kept)
 
-    def read(self, doubts: Sequence[str]) -> tuple[dict[str, str], str]:
+    def read(self) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
         `_THERE`; with the folder from which they were looked for, `_HERE`.  And why it cannot be kept, in a sentence,
-        else empty.
-
-        Args:
-            doubts: why cells that it has swept are not kept.
-        """
-        if doubts:
-            return {}, doubts[0]
+        else empty."""
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
+            if swept := doubts(sources):
+                return {}, swept[0]
             unheard, named = data_of_users(self._modules())
             files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
@@ -103,6 +110,7 @@ class Cell:
                     f"{self.name} is not kept: its code opens or runs {ran[0]}, of which an edit would not be noticed;"
                     " expected an import, or a field that names it"
                 )
+            seen(files)
             read = dict.fromkeys(_beyond(named, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"

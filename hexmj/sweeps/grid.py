@@ -7,6 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import nullcontext
+from copyreg import dispatch_table
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -23,7 +24,7 @@ from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
 from hexmj.sweeps.plain_settings import field_names, is_computed_once
-from hexmj.user_code.opened_files import remembered
+from hexmj.user_code.opened_files import also_read, remembered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 _Task = tuple[Cell, str, Path | None]
 """A cell, its record and its file; empty and None where nothing is kept."""
+
+_USUAL = {way: getattr(object, way) for way in ("__getstate__", "__reduce__", "__reduce_ex__")}
+"""How objects are pickled that say nothing else."""
 
 _Parcel = Callable[[Path | None], "Made"]
 """A cell on its way to a worker, who calls it with the mark of the folder."""
@@ -171,11 +175,11 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
     if path and (kept := _kept(cell, record, path)):
         return kept
     before = record if path else cell.settings_now()
-    with cell.computing() as doubts:
+    with cell.computing():
         data = typed(f"what {cell.name} gives", cell.compute(**execution), xr.Dataset)
     check_free(cell.name, data)
     check_unchanged(cell, before, cell.record() if path else cell.settings_now())
-    read, not_kept = cell.read(doubts) if record else ({}, "".join(doubts[:1]))
+    read, not_kept = cell.read() if record else ({}, "")
     return write(path, record, read, data) if path and not not_kept else data, read, not_kept
 
 
@@ -225,7 +229,11 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future.add_done_callback(done.put)
             for _ in parcels:
                 future = done.get()
-                data, read, not_kept = future.result()
+                try:
+                    data, read, not_kept = future.result()
+                except Exception:
+                    also_read(set(), "a cell that was swept elsewhere has failed: nobody knows what it has read")
+                    raise
                 if other := [file for file in read if remembered(file) and not holds(file, read[file])]:
                     raise InputError(
                         f"a worker has another {other[0]} than the sender; start it again, where it has the same"
@@ -270,11 +278,12 @@ class _WithoutMemory(pickle.Pickler):
     """Of settings without what they have computed once, which may come of a file as it was: workers compute it anew."""
 
     def reducer_override(self, one: Any) -> Any:
-        if field_names(one) is None:
+        names, kind = field_names(one), type(one)
+        if names is None or kind in dispatch_table or any(getattr(kind, way) is not _USUAL[way] for way in _USUAL):
             return NotImplemented
         match one.__reduce_ex__(pickle.HIGHEST_PROTOCOL):
             case (made, arguments, dict(state), *rest):
-                state = {name: held for name, held in state.items() if not is_computed_once(type(one), name)}
-                return made, arguments, state, *rest
+                kept = {name: it for name, it in state.items() if name in names or not is_computed_once(kind, name)}
+                return made, arguments, kept, *rest
             case other:
                 return other

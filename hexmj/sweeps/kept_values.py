@@ -59,11 +59,11 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            with self._cell.computing() as doubts:
+            with self._cell.computing():
                 values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
-                read, self._not_kept = self._cell.read(doubts)
+                read, self._not_kept = self._cell.read()
                 if told := unlike(self._cell.name, self._read, read):
                     warn(told, stacklevel=2)
                 if self._not_kept:

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from traceback import walk_stack
 from types import FrameType
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import unquote
 
 from hexmj.user_code.sources_as_run import INSTALLED, is_users
@@ -57,22 +57,13 @@ _OPENED: dict[str, set[str]] = {}
 _ANYBODY = ""
 """Stands for a source where a thread opens data of which no function is a user's."""
 
+_DOUBTS: dict[str, str] = {}
+"""Source -> why something that a cell has swept is not kept, while a function of it was called."""
 
-class _Computed(NamedTuple):
-    """A cell that is being computed."""
+_COMPUTING: dict[int, tuple[set[str], set[str]]] = {}
+"""Thread that computes a cell -> files that the cell tells by itself, as they really are, and those of its classes."""
 
-    told: set[str]
-    """Files that it tells by itself, as they really are."""
-    sources: set[str]
-    """Of its classes."""
-    doubts: list[str]
-    """Sentences on why a cell that it has swept is not kept."""
-
-
-_COMPUTING: dict[int, _Computed] = {}
-"""Thread -> the cell that it computes."""
-
-_NOTHING = _Computed(set(), set(), [])
+_NOTHING = set[str](), set[str]()
 """The same of a thread that computes none."""
 
 _TEMPORARY = set[str]()
@@ -86,19 +77,22 @@ _AT_FIRST: dict[str, tuple[int, ...]] = {}
 
 
 @contextmanager
-def computing(told: Iterable[Path], sources: set[str]) -> Iterator[list[str]]:
-    """While this thread computes a cell that tells some files by itself and whose classes stand in some sources; gives
-    what `doubted` notes."""
+def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
+    """While this thread computes a cell that tells some files by itself and whose classes stand in some sources."""
     mine = threading.get_ident()
     outer = _COMPUTING.get(mine)
-    this = _Computed({os.path.realpath(file) for file in told}, sources | (outer or _NOTHING).sources, [])
-    _COMPUTING[mine] = this
+    _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | (outer[1] if outer else set())
     try:
-        yield this.doubts
+        yield
     finally:
         del _COMPUTING[mine]
         if outer:
             _COMPUTING[mine] = outer
+
+
+def computes() -> bool:
+    """Whether this thread computes a cell."""
+    return threading.get_ident() in _COMPUTING
 
 
 def opened_by(sources: set[str]) -> set[str]:
@@ -107,14 +101,20 @@ def opened_by(sources: set[str]) -> set[str]:
 
 
 def also_read(files: set[str], not_kept: str) -> None:
-    """Note for the cell that this thread computes, if it does, what one that it has swept has read, and why that is not
-    kept, unless it is."""
-    if computed := _COMPUTING.get(threading.get_ident()):
-        new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
-        for one in _callers(sys._getframe(1)) | computed.sources:
-            _OPENED.setdefault(one, set()).update(new)
+    """Note for whose code is being called what a cell that it has swept has read; and, if that is of a cell that this
+    thread computes, why the other one is not kept, unless it is."""
+    new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
+    whose = _whose(sys._getframe(1))
+    for one in whose:
+        _OPENED.setdefault(one, set()).update(new)
+    if computes() or (_COMPUTING and _ANYBODY in whose):
         seen(files)
-        computed.doubts.extend([not_kept] if not_kept else [])
+        _DOUBTS.update(dict.fromkeys(whose, not_kept) if not_kept else {})
+
+
+def doubts(sources: set[str]) -> list[str]:
+    """Why cells of the code of some sources are not kept, since others are not that they have swept."""
+    return [_DOUBTS[one] for one in (*sorted(sources), _ANYBODY) if one in _DOUBTS] if sources else []
 
 
 def seen(files: Iterable[str]) -> None:
@@ -167,7 +167,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         file = spelled(name)
         opens = event == "open"
         writes = opens and _writes(arguments[2])
-        if writes and _COMPUTING and arguments[2] & os.O_APPEND:
+        if writes and computes() and arguments[2] & os.O_APPEND:
             _LOGS.add(os.path.realpath(file))
         reads = not (writes or (opens and _reads_a_source(file, sys._getframe(1))))
         if reads and _is_data(file):
@@ -183,16 +183,21 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
         seen((file, really))
     if _counts_by_itself(really):
         return
-    callers = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING).sources
-    if not (callers or file.endswith(".py") or threading.current_thread() is threading.main_thread()):
-        callers.add(_ANYBODY)
-    for one in callers:
+    for one in _whose(opener, file):
         _OPENED.setdefault(one, set()).add(file)
+
+
+def _whose(opener: FrameType, file: str = "") -> set[str]:
+    """The user's sources that may know of what is opened: called functions' and those of the cell that this thread
+    computes; `_ANYBODY` where another thread than the main one has none, unless it looks at sources for no cell."""
+    found = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
+    aside = threading.current_thread() is not threading.main_thread() and (_COMPUTING or not file.endswith(".py"))
+    return found or ({_ANYBODY} if aside else set())
 
 
 def _counts_by_itself(really: str) -> bool:
     """Whether the cell that this thread computes tells a file, or it was made to be thrown away."""
-    told = _COMPUTING.get(threading.get_ident(), _NOTHING).told
+    told, _ = _COMPUTING.get(threading.get_ident(), _NOTHING)
     return really in told or (bool(_TEMPORARY) and not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))))
 
 
