@@ -45,14 +45,26 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
 
 
-def circular_range(phase: np.ndarray) -> np.ndarray:
-    """The shortest arc of the circle [0, 1) that holds all phases of a row, (row, n) -> (row,)."""
-    ordered = np.sort(phase, axis=1)
+def circular_range(phase: ArrayLike) -> np.ndarray:
+    """The shortest arc of the circle [0, 1) that holds all phases of a row, (row, n) -> (row,).
+
+    Raises:
+        InputError: no numbers, or no rows of at least one.
+    """
+    rows = numbers("phase", phase)
+    if rows.ndim != 2 or not rows.shape[1]:
+        raise InputError(f"phase has the shape {rows.shape}; expected (row, n), rows of at least one")
+    ordered = np.sort(rows, axis=1)
     return 1.0 - np.diff(ordered, axis=1, append=ordered[:, :1] + 1.0).max(axis=1)
 
 
-def unrolled(phase: np.ndarray) -> np.ndarray:
-    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN."""
+def unrolled(phase: ArrayLike) -> np.ndarray:
+    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN.
+
+    Raises:
+        InputError: no numbers.
+    """
+    phase = numbers("phase", phase)
     known = phase[np.isfinite(phase)]
     middle = circular_mean(known) if len(known) else np.nan
     return phase + (phase < middle - 0.5) - (phase > middle + 0.5)

@@ -25,7 +25,7 @@ from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.paper.protocol import FULL
 from hexmj.paper.reproduce import measure
-from hexmj.phases import circular_mean, wilson_phase
+from hexmj.phases import circular_mean, circular_range, unrolled, wilson_phase
 from hexmj.physics.settling import settle
 from hexmj.search import samples, stages
 from hexmj.walks import one_start, part_of
@@ -94,6 +94,10 @@ MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
 
 BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: anything.Stride(dt=np.timedelta64(1)), "dt = np.timedelta64(1); expected a number"),
+    (lambda: circular_range([0.95, 0.05]), "phase has the shape (2,); expected (row, n), rows of at least one"),
+    (lambda: circular_range(0.5), "phase has the shape (); expected (row, n)"),
+    (lambda: circular_range(np.empty((2, 0))), "phase has the shape (2, 0); expected (row, n)"),
+    (lambda: unrolled("gait"), "phase = 'gait'; expected numbers"),
     (lambda: walk(TABLE), "starts = <xarray.Dataset>"),
     (lambda: walk(velocity=TABLE), "velocity = <xarray.Dataset>"),
     (lambda: hexmj.stability_margin(np.zeros((1, 6, 2)), TABLE), "stance = <xarray.Dataset>"),
