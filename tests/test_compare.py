@@ -87,7 +87,9 @@ STUDIES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.thorough if one == "disturb" else ()) for one in STUDIES]
+)
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
     here = conduct(STUDIES[name], threads=2)
     assert conduct(STUDIES[name], executor=two_processes).identical(here)

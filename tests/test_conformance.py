@@ -18,7 +18,9 @@ LDVS = hexmj.LDVS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", ["printed", "undelayed", "sequential"])
+@pytest.mark.parametrize(
+    "order", ["printed", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("undelayed", "sequential"))]
+)
 @pytest.mark.parametrize("name", ["ldvs", "uncoordinated", "own-0.1", "own"])
 def test_the_network_conforms(name, order):
     controller = replace(hexmj.PRESETS[name], order=order)

@@ -18,7 +18,7 @@ LDVS = hexmj.LDVS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", ["printed", "undelayed", "sequential"])
+@pytest.mark.parametrize("order", ["printed", pytest.param("undelayed", marks=pytest.mark.thorough), "sequential"])
 @pytest.mark.parametrize("name", hexmj.PRESETS)
 def test_fast_losses_are_those_of_the_plan(name, order):
     """To the last bit, for every preset and order, with an acceleration and without."""

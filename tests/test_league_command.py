@@ -69,7 +69,7 @@ def test_a_film_that_cannot_be_written_stops_the_command_and_one_that_cannot_be_
     assert stops or capsys.readouterr().err == "hexmj: no video: no space\n"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_command_takes_a_controller_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     example = Path(__file__).parents[1] / "examples" / "tripod.py"

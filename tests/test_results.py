@@ -88,11 +88,7 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "recording": recorded,
     "search": searched,
 }
-STUDIES = [
-    pytest.param(name, marks=pytest.mark.thorough if name in ("biology", "disturb", "league", "variants") else ())
-    for name in FIGURES
-    if name not in MADE and name != "readings"  # which takes minutes
-]
+STUDIES = [name for name in FIGURES if name not in MADE and name != "readings"]  # which takes minutes
 
 
 def check_it_stays_the_same(result: xr.Dataset, folder: Path) -> None:
@@ -146,7 +142,7 @@ def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(MADE[name](), tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(study(name), tmp_path)
