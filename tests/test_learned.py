@@ -228,6 +228,10 @@ def test_held_actions_without_sense_are_refused():
             held(steps=steps)
     with pytest.raises(InputError, match=r"numbers = 0; expected a whole number"):
         held(numbers=0)
+    with pytest.raises(InputError, match=r"insects = 3; expected a VecEnv"):
+        face.HeldInsects(3, 1, 2, lambda *_: 0, lambda *_: 0)
+    with pytest.raises(InputError, match=r"reward = None; expected a function"):
+        face.HeldInsects(insects, 1, 2, lambda *_: 0, None)
     walked = held()
     with pytest.raises(InputError, match="a step before the first reset"):
         walked.step(np.zeros((2, 1)))
@@ -260,6 +264,7 @@ def test_actions_that_are_none_are_refused_by_felt_insects(actions, sentence):
     insects = face.FeltInsects(2, duration=1.0)
     insects.reset()
     assert len(insects.get_attr("num_envs", -1)) == 1
+    assert insects.get_attr("action_space")[0].shape == (18,)
     with pytest.raises(InputError, match=sentence):
         insects.step(actions)
     with pytest.raises(InputError, match="action = None; expected numbers"):

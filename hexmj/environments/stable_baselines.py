@@ -92,8 +92,9 @@ class FeltInsects(VecEnv):
         self._insects.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute that all insects share."""
-        return [getattr(self._insects, attr_name)] * len(self._some(indices))
+        """An attribute that all insects share; spaces are those of one of them."""
+        of = self if attr_name in ("action_space", "observation_space") else self._insects
+        return [getattr(of, attr_name)] * len(self._some(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: all that an insect is made with is settled.
@@ -142,8 +143,11 @@ class HeldInsects(VecEnvWrapper):
         """Actions of so many numbers, -1 to 1, each held for so many steps.
 
         Raises:
-            InputError: no numbers or steps.
+            InputError: no numbers or steps, no insects of stable-baselines3's kind, or what is no function.
         """
+        checks.typed("insects", insects, VecEnv)
+        for name, function in {"moves": moves, "reward": reward}.items():
+            checks.typed(name, function, Callable)
         self._shape = (checks.whole("numbers", numbers, 1, MANY),)
         nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
         super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, self._shape, np.float32))
