@@ -69,4 +69,4 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
         if study != RECORDING:
             check_axes(result)
             check_window(result)
-        return draw(result)
+        return draw(result.compute())  # as it may have been opened lazily

@@ -75,6 +75,7 @@ def test_the_order_of_the_axes_changes_nothing(name: str):
         assert pixels(result.transpose(*[*result.sizes][::-1]), which) == whole
         if "start" in result.dims:
             assert pixels(result.isel(start=slice(None, None, -1)), which) == whole
+    assert pixels(result.chunk(), which) == whole, "opened lazily"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.study_command import lists_of
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show, table
-from hexmj.errors import InputError
+from hexmj.errors import InputError, check_distinct
 from hexmj.starts import MOST_DRAWN, check_draw
 from hexmj.storage.attributes import attributes
 from hexmj.storage.results import results_folder, save_dataset, save_text
@@ -21,7 +21,7 @@ class Readings:
     """Options of `hexmj readings`, which `commands.COMMANDS` describes."""
 
     only: tuple[str, ...] | None = None
-    """Named readings alone ('printed', 'lasting'); every combination of choices unless given."""
+    """Named readings alone ('lasting'), beside 'printed'; every combination of choices unless given."""
     best: int | None = None
     """How many of them are looked at more closely, with ideal sets searched under each; 12, or all of fewer, unless
     given."""
@@ -55,6 +55,7 @@ class Readings:
         protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
         readings = list(combinations(protocol))
         if self.only:
+            check_distinct("--only", self.only)
             named = [named_reading(name) for name in dict.fromkeys(("printed", *self.only))]
             readings = [replace(protocol, reading=one) for one in named]
         best = min(12, len(readings)) if self.best is None else self.best
