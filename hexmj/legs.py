@@ -6,6 +6,9 @@ paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
 
 import math
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
@@ -64,3 +67,29 @@ CENTRED = Geometry(origins=(24.0, 0.0, -24.0))
 """The other reading: centre of mass above O_2, D6 = step range.  Fits the paper almost as well."""
 
 GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
+
+
+def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
+    """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by numbers.
+
+    Args:
+        values: of legs.
+        name: of the values, for sentences.
+        behind: how many axes come after that of the legs.
+
+    Raises:
+        InputError: labels of other legs.
+    """
+    if not behind and hasattr(values, "columns"):
+        labels = [*values.columns]
+    else:
+        labels = [*values.index] if hasattr(values, "iloc") else []
+    if "leg" in getattr(values, "dims", ()):
+        others = [axis for axis in values.dims if axis != "leg"]
+        values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
+        labels = [*values.coords["leg"].values] if "leg" in values.coords else []
+    if not labels or labels == [*range(len(LEGS))]:
+        return values
+    if sorted(map(str, labels)) != sorted(LEGS):
+        raise InputError(f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
+    return np.asarray(values)[(..., [labels.index(leg) for leg in LEGS], *behind * [slice(None)])]

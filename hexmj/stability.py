@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import numbers, states, typed
 from hexmj.errors import InputError
 from hexmj.jitted import jitted
+from hexmj.legs import in_order
 from hexmj.process.threads import run_blocks
 from hexmj.walks import Walk
 
@@ -27,8 +28,8 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     """Signed distance from the centre of mass to the nearest edge of the support polygon.
 
     Args:
-        feet: tips seen from the projected centre of mass, (..., leg, 2) [mm].
-        stance: which of them stand, (..., leg).
+        feet: tips seen from the projected centre of mass, (..., leg, 2) [mm]; labelled legs may come in any order.
+        stance: which of them stand, (..., leg), labelled or not.
         threads: one per core unless given.
 
     Returns:
@@ -38,7 +39,8 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     Raises:
         InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
-    points, stands = np.ascontiguousarray(numbers("feet", feet)), states("stance", stance)
+    tips, stands = _of_legs(feet, stance)
+    points = np.ascontiguousarray(tips)
     if points.shape[-2:] != (6, 2) or stands.shape != points.shape[:-1]:
         raise InputError(
             f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
@@ -54,6 +56,10 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
 
     run_blocks(work, len(points), 4096, threads)
     return margin.reshape(shape)
+
+
+def _of_legs(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    return numbers("feet", in_order(feet, "feet", behind=1)), states("stance", in_order(stance, "stance"))
 
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
@@ -81,7 +87,7 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
     Raises:
         InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
-    tips, stands = numbers("feet", feet), states("stance", stance)
+    tips, stands = _of_legs(feet, stance)
     if tips.ndim != 2 or tips.shape[1] != 2 or stands.shape != tips.shape[:1]:
         raise InputError(f"feet of the shape {tips.shape}, stance of {stands.shape}; expected (leg, 2) and (leg,)")
     points = tips[stands]

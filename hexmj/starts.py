@@ -1,14 +1,13 @@
 """Random starts of walks, all standing (paper, Section 3), and what is checked of starts and velocities."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import given, numbers, short, typed, whole
 from hexmj.errors import InputError
-from hexmj.legs import LEGS
+from hexmj.legs import in_order
 from hexmj.timing import Acceleration, Stride
 
 SAMPLE = 1000
@@ -72,23 +71,6 @@ def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
     if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
         raise InputError(f"a start lies outside the step range, {stride.pep_min} to {stride.aep0} mm")
     return x
-
-
-def in_order(starts: Any) -> Any:
-    """Starts as (..., leg), the legs as `LEGS` has them where a DataArray or DataFrame labels them, but by numbers.
-
-    Raises:
-        InputError: labels of other legs.
-    """
-    labels = [*getattr(starts, "columns", ())]
-    if "leg" in getattr(starts, "dims", ()):
-        starts = starts.transpose(..., "leg")
-        labels = [*starts.coords["leg"].values] if "leg" in starts.coords else []
-    if not labels or labels == [*range(len(LEGS))]:
-        return starts
-    if sorted(map(str, labels)) != sorted(LEGS):
-        raise InputError(f"starts of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
-    return np.asarray(starts)[..., [labels.index(leg) for leg in LEGS]]
 
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:

@@ -347,6 +347,23 @@ def test_labelled_legs_may_come_in_any_order():
             walk(labelled.assign_coords(leg=labels))
 
 
+def test_labelled_legs_of_a_posture_may_come_in_any_order():
+    feet, stands = np.broadcast_to(FEET[0], (8, 6, 2)).copy(), np.random.default_rng(1).random((8, 6)) < 0.8
+    margin, shuffled = hexmj.stability_margin(feet, stands), ["R1", "L2", "R3", "L1", "L3", "R2"]
+    tips = xr.DataArray(feet, dims=("step", "leg", "xy"), coords={"leg": [*LEGS]})
+    down = xr.DataArray(stands, dims=("step", "leg"), coords={"leg": [*LEGS]})
+    table: Any = down.to_pandas()
+    for one in (feet, tips.sel(leg=shuffled), tips.transpose("leg", "step", "xy"), tips.drop_vars("leg")):
+        for other in (stands, down.sel(leg=shuffled), down.T, table[shuffled]):
+            assert np.array_equal(hexmj.stability_margin(one, other), margin)
+    polygon = hexmj.support_polygon(feet[0], stands[0])
+    places: Any = tips[0].to_pandas()
+    for one in (places, places.loc[shuffled]):
+        assert np.array_equal(hexmj.support_polygon(one, table.iloc[0][shuffled]), polygon)
+    with pytest.raises(hexmj.InputError, match=r"^stance of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
+        hexmj.stability_margin(feet, down.assign_coords(leg=[*"abcdef"]))
+
+
 def test_states_may_be_given_as_0_and_1():
     margin = hexmj.stability_margin(FEET, STANDS)
     assert np.array_equal(hexmj.stability_margin(FEET.tolist(), STANDS.astype(int)), margin)

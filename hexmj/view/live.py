@@ -14,6 +14,7 @@ from hexmj.conditions import Bound, Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
+from hexmj.legs import in_order
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.measured import measured_walk
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
@@ -21,7 +22,6 @@ from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.settling import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
-from hexmj.starts import in_order
 from hexmj.timing import MOST_STEPS, Stride
 from hexmj.view.steered import Steered
 from hexmj.walks import PlannedWalk, joined, part_of
