@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import hexmj
+from hexmj import sweeps
 from hexmj.checks import typed
 from hexmj.conditions import Ground, Masses, TimeScale
 from hexmj.controllers.checked_plans import begin
@@ -36,6 +37,7 @@ search: Any = stages.search
 Sample: Any = samples.Sample
 STARTS = np.zeros((2, 6))
 TABLE: Any = xr.Dataset({"x": 1.0})
+ANY: Any = None
 FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
 STANDS = np.ones((2, 6), dtype=bool)
 FEW: Any = {"n_starts": 2, "window": 10.0}
@@ -95,6 +97,9 @@ MASKED = np.ma.masked_less(np.linspace(-5.0, 5.0, 12).reshape(2, 6), 0.0)
 BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: anything.Stride(dt=np.timedelta64(1)), "dt = np.timedelta64(1); expected a number"),
     (lambda: circular_range([0.95, 0.05]), "phase has the shape (2,); expected (row, n), rows of at least one"),
+    (lambda: sweeps.conduct(ANY), "study = None; expected one that has cells and a result"),
+    (lambda: sweeps.over_axes({"a": 0}, []), "size of a = 0; expected a whole number of at least 1"),
+    (lambda: sweeps.KeptValues(ANY), "cell = None; expected a Cell"),
     (lambda: circular_range(0.5), "phase has the shape (); expected (row, n)"),
     (lambda: circular_range(np.empty((2, 0))), "phase has the shape (2, 0); expected (row, n)"),
     (lambda: unrolled("gait"), "phase = 'gait'; expected numbers"),

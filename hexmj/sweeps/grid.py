@@ -15,7 +15,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 from warnings import warn
 
-from hexmj.checks import path_of, typed
+from hexmj.checks import path_of, short, typed, whole
 from hexmj.errors import InputError
 from hexmj.process.progress import Progress, shown
 from hexmj.process.threads import thread_count
@@ -68,6 +68,8 @@ class Execution(TypedDict, total=False):
 
 def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """The result of a study; arguments and errors as of `finish`."""
+    if not (hasattr(study, "cells") and hasattr(study, "result")):
+        raise InputError(f"study = {short(study)}; expected one that has cells and a result")
     cells = study.cells()
     before = [cell.settings_now() for cell in cells]
     result = study.result(run(cells, folder, **how))
@@ -153,13 +155,15 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     """
     import xarray as xr
 
+    for name, size in typed("sizes", sizes, Mapping).items():
+        whole(f"size of {name}", size, 1)
     if (count := math.prod(sizes.values())) != len(data):
         raise InputError(f"the data of {len(data)} cells along {dict(sizes)}; expected {count}")
     rows = list(data)
     for name, size in reversed(list(sizes.items())):
         rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
-    (whole,) = rows
-    return whole
+    (table,) = rows
+    return table
 
 
 def _kept(cell: Cell, record: str, path: Path) -> "Made | None":

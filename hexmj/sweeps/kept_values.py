@@ -11,6 +11,7 @@ from warnings import warn
 
 import numpy as np
 
+from hexmj.checks import numbers, path_of, typed
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged, unlike
@@ -25,7 +26,7 @@ class KeptValues:
     today, counts as if it were not there.
     """
 
-    def __init__(self, cell: Cell, folder: Path | None = None, *, threads: int | None = None) -> None:
+    def __init__(self, cell: Cell, folder: Path | str | None = None, *, threads: int | None = None) -> None:
         """Begin with what the folder holds.
 
         Args:
@@ -34,9 +35,10 @@ class KeptValues:
             threads: for the function, if it takes them.
 
         Raises:
-            InputError: the file is damaged in its first line, is of another cell, or cannot be read or written.
+            InputError: no cell or folder; the file is damaged in its first line, is of another cell, or cannot be read
+                or written.
         """
-        self._cell, self._threads = cell, threads
+        self._cell, self._threads = typed("cell", cell, Cell), threads
         self._values: dict[bytes, float] = {}
         self._read: dict[str, str] = {}
         self._not_kept = ""
@@ -44,7 +46,7 @@ class KeptValues:
         if folder:
             self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
-            self._path = folder / f"{cell.stem(record)}.jsonl"
+            self._path = path_of(folder) / f"{cell.stem(record)}.jsonl"
             self._begin(self._path, record)
         self._held = frozenset(self._values)
         self._replayed = set[bytes]()
@@ -60,7 +62,12 @@ class KeptValues:
         if new:
             picked = rows[list(new.values())]
             with self._cell.computing():
-                values = np.asarray(self._cell.compute(picked, threads=self._threads), dtype=float)
+                given = self._cell.compute(picked, threads=self._threads)
+            values = numbers(f"what {self._cell.name} gives", given)
+            if values.shape != (len(picked),):
+                raise InputError(
+                    f"{self._cell.name} gives the shape {values.shape}; expected ({len(picked)},), one a row"
+                )
             if self._path:
                 check_unchanged(self._cell, self._record, self._cell.record())
                 read, self._not_kept = self._cell.read()
