@@ -4,11 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import hexmj
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import ReadingPlan
+from hexmj.legs import LEGS
 from stepwise_ldvs import plan_of, same
 
 STRIDE = hexmj.Stride()
@@ -27,6 +29,18 @@ def test_a_step_is_broadcast_to_starts_and_legs():
     assert np.isnan(walk.height).all()
     assert plan.done == 2
     assert not isinstance(plan, ReadingPlan)
+
+
+def test_labelled_legs_of_a_step_may_come_in_any_order():
+    x = np.arange(12.0).reshape(2, 6)
+    table: Any = xr.DataArray(x, dims=("start", "leg"), coords={"leg": [*LEGS]}).to_pandas()
+    shuffled = table[["R1", "L2", "R3", "L1", "L3", "R2"]]
+    plan = stepwise(lambda v: Step(x=shuffled, stance=shuffled > 4.0), np.zeros((2, 6)), 0.5, STRIDE)
+    walk = plan.advance(1)
+    assert np.array_equal(walk.x[0], x) and np.array_equal(walk.stance[0], x > 4.0)
+    plan = stepwise(lambda v: Step(x=table.rename(columns={"L1": "head"}), stance=True), np.zeros((2, 6)), 0.5, STRIDE)
+    with pytest.raises(hexmj.InputError, match="x of a step of the legs head, L2"):
+        plan.advance(1)
 
 
 def test_what_a_step_leaves_out_is_as_usual():
