@@ -1,7 +1,7 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       the tests, but for those that take their time
 # make slow       others: kills at every write, the soak's sample, README and examples, whatever takes seconds
-# make thorough   those for which .ci/run has no time: all commands of the documents, notebooks, larger numbers of starts
+# make thorough   those for which .ci/run has no time: longer commands of the documents, notebooks, more starts
 # make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
 # make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
 # make lint       style and types

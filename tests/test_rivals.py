@@ -18,12 +18,12 @@ from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean, wilson_phase
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED
 
-SLOW = "walknet-load", "walknet-reacog"
+THOROUGH = "walknet-load", "walknet-reacog"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.thorough if one in SLOW else ()) for one in RIVALS]
+    "name", [pytest.param(one, marks=pytest.mark.thorough if one in THOROUGH else ()) for one in RIVALS]
 )
 def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
     assert hexmj.load_controller(name) is RIVALS[name]
