@@ -7,9 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import nullcontext
-from copyreg import dispatch_table
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
@@ -23,7 +21,7 @@ from hexmj.storage.files import marked, prepare, remove_leftovers
 from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
-from hexmj.sweeps.plain_settings import field_names, is_computed_once
+from hexmj.sweeps.parcels import pickled_cell
 from hexmj.user_code.opened_files import also_read, remembered
 
 if TYPE_CHECKING:
@@ -34,9 +32,6 @@ if TYPE_CHECKING:
 
 _Task = tuple[Cell, str, Path | None]
 """A cell, its record and its file; empty and None where nothing is kept."""
-
-_USUAL = {way: getattr(object, way) for way in ("__getstate__", "__reduce__", "__reduce_ex__")}
-"""How objects are pickled that say nothing else."""
 
 _Parcel = Callable[[Path | None], "Made"]
 """A cell on its way to a worker, who calls it with the mark of the folder."""
@@ -217,7 +212,7 @@ def _elsewhere(
         if path and (kept := _kept(cell, record, path)):
             yield i, kept
         else:
-            parcels[i] = partial(_made_by_a_worker, _pickled(cell), record or cell.record(), path, threads)
+            parcels[i] = partial(_made_by_a_worker, pickled_cell(cell), record or cell.record(), path, threads)
     yield from _by_others(executor, parcels, folder)
 
 
@@ -267,27 +262,3 @@ def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Futur
         raise
     except RuntimeError as error:  # it was shut down
         raise InputError(f"executor = {executor!r:.80}: {error}") from None
-
-
-def _pickled(cell: Cell) -> bytes:
-    parcel = BytesIO()
-    try:
-        _WithoutMemory(parcel, pickle.HIGHEST_PROTOCOL).dump(cell)
-    except Exception as error:
-        raise InputError(f"{cell.name} cannot be sent to another process: {error}") from None
-    return parcel.getvalue()
-
-
-class _WithoutMemory(pickle.Pickler):
-    """Of settings without what they have computed once, which may come of a file as it was: workers compute it anew."""
-
-    def reducer_override(self, one: Any) -> Any:
-        names, kind = field_names(one), type(one)
-        if names is None or kind in dispatch_table or any(getattr(kind, way) is not _USUAL[way] for way in _USUAL):
-            return NotImplemented
-        match one.__reduce_ex__(pickle.HIGHEST_PROTOCOL):
-            case (made, arguments, dict(state), *rest):
-                kept = {name: it for name, it in state.items() if name in names or not is_computed_once(kind, name)}
-                return made, arguments, kept, *rest
-            case other:
-                return other

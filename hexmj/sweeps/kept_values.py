@@ -43,7 +43,7 @@ class KeptValues:
         self._read: dict[str, str] = {}
         self._not_kept = ""
         self._path, self._seed = None, 0
-        if folder:
+        if folder is not None:
             self._record = record = cell.record()
             self._seed = zlib.crc32(record.encode())
             self._path = path_of(folder) / f"{cell.stem(record)}.jsonl"
