@@ -26,9 +26,12 @@ REAR = tuple(n[0] if n else d for d, n in enumerate(N2))
 FRONT = tuple(n[0] if n else d for d, n in enumerate(N4))
 CONTRA = MIRROR
 
+# The six legs, and below the rows, are numbers of NumPy: for each literal one numba compiles a function anew.
+L1, L2, L3, R1, R2, R3 = np.arange(6)
+
 # Rows of a block.  Six rows a variable, one for each leg: the tip x, the states s(t) and s(t - dt), AEP(t), and
 # the influences on PEP and AEP that the next step uses.
-X, S, S_OLD, AEP, PEP_SHIFT, AEP_SHIFT = range(0, 36, 6)
+X, S, S_OLD, AEP, PEP_SHIFT, AEP_SHIFT = np.arange(0, 36, 6)
 # One row a variable: V_r(t) and its final value, steps to take and taken, the step of the first loss or 0.
 V, V_FINAL, STEPS, DONE, LOST = range(36, 41)
 ROWS = 41
@@ -91,12 +94,12 @@ def _move(x, s, pep_shift, aep_shift, v, k):
 @inlined
 def _influences(x, s, s_old, aep, v, p, k, rules):
     """Eq. 2-5 for all legs: the shifts of PEP, and those of AEP."""
-    pep0, aep0 = _influence(0, x, s, s_old, aep, v, p, k, rules)
-    pep1, aep1 = _influence(1, x, s, s_old, aep, v, p, k, rules)
-    pep2, aep2 = _influence(2, x, s, s_old, aep, v, p, k, rules)
-    pep3, aep3 = _influence(3, x, s, s_old, aep, v, p, k, rules)
-    pep4, aep4 = _influence(4, x, s, s_old, aep, v, p, k, rules)
-    pep5, aep5 = _influence(5, x, s, s_old, aep, v, p, k, rules)
+    pep0, aep0 = _influence(L1, x, s, s_old, aep, v, p, k, rules)
+    pep1, aep1 = _influence(L2, x, s, s_old, aep, v, p, k, rules)
+    pep2, aep2 = _influence(L3, x, s, s_old, aep, v, p, k, rules)
+    pep3, aep3 = _influence(R1, x, s, s_old, aep, v, p, k, rules)
+    pep4, aep4 = _influence(R2, x, s, s_old, aep, v, p, k, rules)
+    pep5, aep5 = _influence(R3, x, s, s_old, aep, v, p, k, rules)
     return (pep0, pep1, pep2, pep3, pep4, pep5), (aep0, aep1, aep2, aep3, aep4, aep5)
 
 
@@ -130,12 +133,12 @@ def _put(six, d, value):
 @inlined
 def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
     """Eq. 2-6 leg after leg."""
-    x, s, s_old, aep = _move_in_turn(0, x, s, s_old, aep, v, v_neutral, p, k, rules)
-    x, s, s_old, aep = _move_in_turn(1, x, s, s_old, aep, v, v_neutral, p, k, rules)
-    x, s, s_old, aep = _move_in_turn(2, x, s, s_old, aep, v, v_neutral, p, k, rules)
-    x, s, s_old, aep = _move_in_turn(3, x, s, s_old, aep, v, v_neutral, p, k, rules)
-    x, s, s_old, aep = _move_in_turn(4, x, s, s_old, aep, v, v_neutral, p, k, rules)
-    return _move_in_turn(5, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(L1, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(L2, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(L3, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(R1, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    x, s, s_old, aep = _move_in_turn(R2, x, s, s_old, aep, v, v_neutral, p, k, rules)
+    return _move_in_turn(R3, x, s, s_old, aep, v, v_neutral, p, k, rules)
 
 
 @inlined
