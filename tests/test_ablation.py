@@ -66,7 +66,7 @@ def test_what_cannot_be_switched_is_refused_in_a_sentence(name: str, said: str) 
         hexmj.load_controller(name)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_without_a_part_is_a_controller_like_any_other() -> None:
     check_controller(hexmj.load_controller("walknet-without-2"))
 

@@ -26,6 +26,7 @@ from hexmj.sweeps import Cell, run
 from hexmj.sweeps.cluster import workers_of
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, counted_cells, odd_cells
+from tiers import few_of
 
 DASK = [sys.executable, "-m", "dask"]
 WORKERS = ("--nworkers", "2", "--nthreads", "1", "--no-dashboard", "--death-timeout", "60")
@@ -127,7 +128,7 @@ def test_a_local_cluster_gives_the_bits_of_one_process(tmp_path: Path, cluster: 
                 assert contents(kept / name) == contents(kept / "here")
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_command_waits_for_workers_and_says_nothing_else(tmp_path: Path) -> None:
     words = ("flss", "--velocities", "0.5", "0.7", "--starts", "2500", "--window", "start", "--json")
     with scheduler(tmp_path) as (address, _):
@@ -221,7 +222,7 @@ def test_an_executor_that_is_shut_down_meanwhile_is_a_sentence(tmp_path: Path) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gone", ["scheduler", "ctrl-c"])
+@pytest.mark.parametrize("gone", few_of(["scheduler", "ctrl-c"], "scheduler"))
 def test_a_command_that_loses_its_scheduler_or_is_stopped_keeps_what_is_finished(tmp_path: Path, gone: str) -> None:
     out = tmp_path / "out"
     with (

@@ -25,7 +25,7 @@ def test_a_difference_has_its_signs() -> None:
     assert difference(xr.Dataset({"lost": -0.5, "lost_low": -0.79, "lost_high": 0.04}), "lost") == "-.50 (-.79 to +.04)"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:
     words = ["--velocities", 0.5, "--starts", 2, "--disturbances", "push", "--impulses", 40, "--window", 45]
     code, text, _ = run("disturb", *words, "--strategies", "slow_down", "--out", tmp_path / "out")

@@ -23,6 +23,7 @@ from hexmj.studies.stability_map.study import StabilityMap
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.studies.terrain.study import Terrain
 from hexmj.sweeps import Cell, conduct
+from tiers import few_of
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
@@ -87,9 +88,7 @@ STUDIES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.thorough if one == "disturb" else ()) for one in STUDIES]
-)
+@pytest.mark.parametrize("name", few_of(STUDIES, "compare", "reading", "map", "terrain", "converge"))
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
     here = conduct(STUDIES[name], threads=2)
     assert conduct(STUDIES[name], executor=two_processes).identical(here)
@@ -97,7 +96,7 @@ def test_processes_and_threads_give_the_same_bits(name, two_processes):
         assert conduct(STUDIES[name], executor=executor).identical(here)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_killed_command_goes_on_and_ends_like_an_unbroken_one(run, tmp_path):
     words = [*WORDS, "--no-video", "--json", "--out"]
     command = [sys.executable, "-m", "hexmj", *words, str(tmp_path / "killed")]

@@ -12,15 +12,14 @@ from broken_controllers import BROKEN, BegunOtherwise, Melting, steps_changed
 from hexmj.controllers import conformance
 from hexmj.controllers.conformance import FIRST, check_controller, findings
 from stepwise_ldvs import Own
+from tiers import few_of
 from waiting_legs import OWN
 
 LDVS = hexmj.LDVS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "order", ["printed", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("undelayed", "sequential"))]
-)
+@pytest.mark.parametrize("order", few_of(["printed", "undelayed", "sequential"], "printed"))
 @pytest.mark.parametrize("name", ["ldvs", "uncoordinated", "own-0.1", "own"])
 def test_the_network_conforms(name, order):
     controller = replace(hexmj.PRESETS[name], order=order)
@@ -28,7 +27,7 @@ def test_the_network_conforms(name, order):
     assert controller.mirrored == (order != "sequential" and name != "own-0.1")
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_other_controllers_conform():
     check_controller(hexmj.ReadsLegs(LDVS))
     check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))

@@ -119,7 +119,7 @@ def test_disturbed_walks_can_read_their_legs():
     assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
     pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "window": 45.0}
     study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)

@@ -1,7 +1,8 @@
 """Every command and snippet of README and docs, and every example, runs; the site is whole and needs no other.
 
 A command stands on a line of its own, indented by four blanks.  Behind `# long` it is parsed and not run, behind
-`# refused` it ends with exit code 2.  Those of `LONGER` are run by `make thorough` alone.
+`# refused` it ends with exit code 2.  Those that neither stand in the README nor are the first of their name, and those
+of `LONGER`, are run by `make thorough` alone.
 """
 
 import os
@@ -19,6 +20,7 @@ from hexmj.cli.command_words import checked
 from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller
+from tiers import few_of
 
 pytestmark = pytest.mark.slow
 
@@ -35,9 +37,10 @@ LONG = [command for command, told in LINES if told.startswith("long")]
 REFUSED = [command for command, told in LINES if told == "refused"]
 FIRST = {command.split()[0]: command for command in reversed(COMMANDS)}
 """Name of a command -> the first line that has it."""
-EXAMPLES = sorted(one for one in (ROOT / "examples").glob("*.py") if not one.name.startswith("train_"))
+EXAMPLES = sorted(one.stem for one in (ROOT / "examples").glob("*.py") if not one.name.startswith("train_"))
 """Those that train for minutes are in `test_learned`, made small."""
-LONG_EXAMPLE = "servo_hexapod"
+LONG_EXAMPLES = "gallery", "servo_hexapod"
+"""The one that draws the documentation's films, and one that is run here from fewer starts."""
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -70,13 +73,12 @@ def test_there_is_something_to_run():
     assert all(told in ("", "refused") or told.startswith("long") for _, told in LINES)
 
 
-def as_tiers(commands):
-    """With the longer ones marked."""
-    marks = {True: pytest.mark.thorough, False: ()}
-    return [pytest.param(one, id=one, marks=marks[one.split()[0] in LONGER]) for one in commands]
+SHORT = [
+    one for one in COMMANDS if one.split()[0] not in LONGER and (one in PAGES["README.md"] or one in FIRST.values())
+]
 
 
-@pytest.mark.parametrize("command", as_tiers(COMMANDS))
+@pytest.mark.parametrize("command", few_of(COMMANDS, *SHORT))
 def test_command(command, here, run):
     """The first of each name in a new process, as it is typed; the others here, where all is imported."""
     if command in FIRST.values():
@@ -139,19 +141,13 @@ def test_parameter_file(tmp_path):
     assert read.weights == LDVS.weights
 
 
-@pytest.mark.parametrize(
-    "example",
-    [
-        pytest.param(one, id=one.stem, marks=pytest.mark.thorough if one.stem == LONG_EXAMPLE else ())
-        for one in EXAMPLES
-    ],
-)
+@pytest.mark.parametrize("example", few_of(EXAMPLES, *[one for one in EXAMPLES if one not in LONG_EXAMPLES]))
 def test_example(example, folder):
-    subprocess.run([sys.executable, str(example)], cwd=folder, check=True)
+    subprocess.run([sys.executable, str(ROOT / "examples" / f"{example}.py")], cwd=folder, check=True)
 
 
-def test_a_long_example_from_fewer_starts(tmp_path):
-    small = f"import {LONG_EXAMPLE}; {LONG_EXAMPLE}.main(n_starts=4)"
+def test_the_servo_hexapod_from_fewer_starts(tmp_path):
+    small = "import servo_hexapod; servo_hexapod.main(n_starts=4)"
     paths = os.pathsep.join([str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")])
     subprocess.run([sys.executable, "-c", small], cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, check=True)
 

@@ -25,6 +25,7 @@ from hexmj.storage.files import replacing, write_whole
 from hexmj.storage.results import save_dataset, save_figure, save_text
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import squares
+from tiers import few_of
 
 ROOM = 30_000
 """Bytes that a full disk still takes of a file."""
@@ -173,12 +174,12 @@ def hexmj_into(stream: str, *words: str) -> subprocess.CompletedProcess[bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [("--help",), ("flss", "--starts", "5", "--json")], ids=" ".join)
+@pytest.mark.parametrize("words", few_of(["--help", "flss --starts 5 --json"], "--help"))
 def test_standard_output_that_is_full_or_gone(words):
-    full = hexmj_into("> /dev/full", *words)
+    full = hexmj_into("> /dev/full", *words.split())
     assert full.returncode == 2
     assert full.stderr.strip().splitlines()[-1:] == [b"hexmj: standard output: No space left on device"]
-    gone = hexmj_into("| true", *words)
+    gone = hexmj_into("| true", *words.split())
     assert gone.returncode in (0, 141)
     progress = [line for line in gone.stderr.splitlines() if line.startswith(b"kinematic FLSS: ")]  # of a slow machine
     assert gone.stderr.split() == b" ".join(progress).split()

@@ -20,6 +20,7 @@ from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, class
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import Walk
+from tiers import few_of
 
 TRIPOD = np.array([0.0, 0.5, 0.0, 0.5, 0.0, 0.5])
 
@@ -256,7 +257,7 @@ def test_limit_gait_is_the_gait_of_the_whole_walk(controller, v, acceleration, m
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("v", "phase", "printed"), [(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)])
+@pytest.mark.parametrize(("v", "phase", "printed"), few_of([(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)], (0.4, 0.714, 0.7)))
 def test_hard_wired_phases(v, phase, printed):
     """An independent simulation gave 0.655 and 0.714 with the default constants; the paper prints 0.65 and 0.7."""
     found = limit_gait(HWS, v, n_starts=10, acceleration=Acceleration(rate=0.0004), periods=45)

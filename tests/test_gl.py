@@ -198,7 +198,7 @@ assert (theirs() == first).all(), "dropped"
 """
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @drawing
 def test_dm_control_films_and_environments_draw_in_one_program(tmp_path):
     """dm_control takes for granted that its context is current, and frees it at the exit."""

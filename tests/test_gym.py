@@ -267,7 +267,7 @@ def test_some_insects_begin_anew_and_the_others_go_on():
     assert many.np_random_seed == (0, 6, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_make_finds_them_in_whatever_order_of_imports():
     """In a process of its own, as a script would; and neither dm_control nor a GL is there."""
     script = (

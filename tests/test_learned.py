@@ -114,7 +114,7 @@ def test_a_policy_that_answers_something_else_is_refused(odd):
     assert hexmj.walk(hexmj.draw_starts(2, 0), WithOffsets(Odd(2, 18)), 0.5, 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_obeys_the_laws_of_controllers(example):
     check_controller(some_reflexes(example("train_cma")))
 

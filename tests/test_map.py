@@ -99,7 +99,7 @@ def test_starts_whose_tips_are_out_of_reach_at_rest_are_left_out():
     assert 0 < result.stand.item() == result.sizes["start"] < 8
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_starts_whose_tips_are_out_of_reach_are_left_out_everywhere():
     few: dict[str, Any] = {"velocities": [0.5, 0.7], "n_starts": 9}
     low = conduct(StabilityMap(LDVS, "standing_height", [6.0, 10.0], **few))

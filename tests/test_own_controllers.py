@@ -27,6 +27,7 @@ from hexmj.rotations import heading
 from hexmj.search.samples import Sample
 from hexmj.studies.league.entrants_by_name import entrants
 from hexmj.walks import PlannedWalk
+from tiers import few_of
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 GUIDE = EXAMPLES.parent / "docs/your_own_controller.md"
@@ -285,11 +286,11 @@ class Chatty:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [(), pytest.param(("--processes", "2"), marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("more", few_of(["", "--processes 2"], ""))
 def test_what_a_controller_prints_is_no_answer(tmp_path, more):
     (tmp_path / "mine.py").write_text(CHATTY)
     words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--window", "3"]
-    command = [sys.executable, "-m", "hexmj", *words, "--no-video", "--json", *more]
+    command = [sys.executable, "-m", "hexmj", *words, "--no-video", "--json", *more.split()]
     paths = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
     done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, env=paths)
     assert json.loads(done.stdout)["chatty"]["kinematic"]

@@ -279,7 +279,7 @@ def test_a_rows_command_tells_starts_and_readings():
     assert f"`{claim.command}`" in claims_markdown([Row(claim, {})], asdict(FULL))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_reproduce_judges_chosen_claims(run, tmp_path):
     words = ["reproduce", "--quick", "--only", "ldvs-accelerated", "--json", "--out", tmp_path]
     code, text, _ = run(*words)

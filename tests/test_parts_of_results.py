@@ -27,6 +27,7 @@ from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.studies.terrain.study import Terrain
 from hexmj.studies.variants.study import Variants
 from hexmj.sweeps import conduct
+from tiers import few_of
 
 PHYSICAL: dict[str, Any] = {"n_starts": 3, "window": 20.0}
 ON_PAPER: dict[str, Any] = {"n_starts": 20, "window": 20.0, "physical": False, "strategies": ["reorganise"]}
@@ -67,7 +68,7 @@ def pixels(result: xr.Dataset, which: str) -> bytes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", few_of(MADE, "flss", "compare", "variants", "search"))
 def test_the_order_of_the_axes_changes_nothing(name: str):
     result = made(name)
     for which in FIGURES[name]:

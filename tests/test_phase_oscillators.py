@@ -11,6 +11,7 @@ from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.phases import PAIRS
 from hexmj.timing import Stride
+from tiers import few_of
 
 GAITS = ("tripod", "tetrapod", "wave")
 
@@ -24,7 +25,7 @@ def test_a_table_of_phases_says_the_same_of_every_pair_of_legs(name: str) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", GAITS)
-@pytest.mark.parametrize("velocity", [0.3, 0.7])
+@pytest.mark.parametrize("velocity", few_of([0.3, 0.7], 0.7))
 def test_legs_come_to_swing_as_the_table_says_and_for_the_usual_time(name: str, velocity: float) -> None:
     stride = Stride()
     found = gait(walk(hexmj.draw_starts(6, 2), RIVALS[f"cpg-{name}"], velocity, 25 * stride.periods(velocity)))

@@ -19,6 +19,7 @@ from hexmj.physics.settling import settle
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.study import DisturbedWalks
 from hexmj.timing import Stride
+from tiers import few_of
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +107,7 @@ def test_a_push_begins_when_told(vp):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vp", [80.0, 130.0])
+@pytest.mark.parametrize("vp", few_of([80.0, 130.0], 130.0))
 def test_a_push_depends_on_no_start_beside(vp):
     """To the last bit, however their pushes cut the chunks."""
     conditions, starts, times = Conditions.of(vp=vp), draw_starts(3, 4), np.array([12.0, 14.0, 16.3])

@@ -88,7 +88,7 @@ def test_a_margin_leaves_out_the_ends_of_s():
         lost(10.0)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_refined_constants_miss_no_more(monkeypatch):
     monkeypatch.setattr("hexmj.paper.scores.ROUNDS", (({"aep0": 9.0, "pep0": -9.0},), ({"pep_min": -25.0},)))
     better, claims = refined(SMALL, threads=1), [claim for claim in CLAIMS if claim.key in REFINED_BY]

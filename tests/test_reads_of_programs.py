@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from small_cells import BODY, WITHOUT_DASK
+from tiers import few_of
 
 NEW = "import xarray as xr\nfrom pathlib import Path\n"
 SWEEPS = """
@@ -86,7 +87,7 @@ PROGRAMS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("program", few_of(PROGRAMS, "a script", "a helper", "a module, while another thread sweeps"))
 def test_what_programs_open_is_noticed(tmp_path: Path, program: str) -> None:
     (tmp_path / "gain").write_text("2.0")
     assert sweep(tmp_path, **PROGRAMS[program]) == (2.0, 1, "")
@@ -154,7 +155,7 @@ OTHER = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["'best.toml'", "__import__('glob').glob('best*')[0]"])
+@pytest.mark.parametrize("name", few_of(["'best.toml'", "__import__('glob').glob('best*')[0]"], "'best.toml'"))
 def test_what_a_script_loads_its_own_controllers_may_use(tmp_path: Path, name: str) -> None:
     script = f"import hexmj\n{NEW}BASE = hexmj.load_controller({name})\n"
     script += f"def cell():\n    return xr.Dataset({{'gain': BASE.gain}})\n{SWEEPS}"

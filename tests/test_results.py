@@ -19,6 +19,7 @@ from hexmj.errors import InputError
 from hexmj.plots import FIGURES
 from hexmj.search.stages import search
 from hexmj.sweeps import Study, conduct
+from tiers import few_of
 
 ALPHA = "ß: 1 $"
 """A name that JSON escapes, and that figures would set as a formula."""
@@ -137,7 +138,7 @@ def test_a_recordings_legs_stand_in_their_order_however_they_are_sorted():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", few_of(MADE, "flss", "physical"))
 def test_a_result_stays_what_it_is(name: str, tmp_path: Path):
     check_it_stays_the_same(MADE[name](), tmp_path)
 
@@ -294,7 +295,7 @@ def test_a_name_that_would_not_come_back_is_refused(old: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", ["svg", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("png", "pdf"))])
+@pytest.mark.parametrize("form", few_of(["svg", "png", "pdf"], "svg"))
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
     words = ["compare", "--starts", "2", "--window", "10", "--no-video", "--format", form, "--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)

@@ -13,6 +13,7 @@ from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Stride
+from tiers import few_of
 
 
 def state(x: float, y: float) -> Hopf:
@@ -20,7 +21,7 @@ def state(x: float, y: float) -> Hopf:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("velocity", [0.4, 0.7])
+@pytest.mark.parametrize("velocity", few_of([0.4, 0.7], 0.7))
 def test_two_tripods_move_in_anti_phase(velocity: float) -> None:
     found = gait(walk(hexmj.draw_starts(6, 2), RIVALS["righetti"], velocity, 30 * Stride().periods(velocity)))
     assert found.periodic.all()

@@ -17,14 +17,11 @@ from hexmj.measures.kinematic import walk
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean, wilson_phase
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PLANNED
-
-THOROUGH = "walknet-load", "walknet-reacog"
+from tiers import few_of
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.thorough if one in THOROUGH else ()) for one in RIVALS]
-)
+@pytest.mark.parametrize("name", few_of(RIVALS, "wilson", "cpg-tripod", "tegotae"))
 def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
     assert hexmj.load_controller(name) is RIVALS[name]
     check_controller(RIVALS[name])
@@ -47,7 +44,7 @@ def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("wave", "name"), [("wilson", "wilson"), ("graham", "graham")])
-@pytest.mark.parametrize("velocity", [0.1, 0.35, 0.8])
+@pytest.mark.parametrize("velocity", few_of([0.1, 0.35, 0.8], 0.35))
 def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_one(wave, name, velocity) -> None:
     metronome, stride = RIVALS[name], Stride()
     assert isinstance(metronome, Metronome)

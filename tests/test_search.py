@@ -13,6 +13,7 @@ from hexmj.errors import InputError
 from hexmj.search.samples import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
+from tiers import few_of
 
 HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
 PROBLEM = Problem(HWS, 0.5, 0.5, window="start")
@@ -36,7 +37,7 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
-@pytest.mark.parametrize("stop", [0.05, 0.3, 0.7])
+@pytest.mark.parametrize("stop", few_of([0.05, 0.3, 0.7], 0.3))
 def test_a_stopped_search_goes_on_to_the_same_bits(tmp_path, algorithm, stop):
     effort = Effort(algorithm, budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
     whole = search(PROBLEM, effort)

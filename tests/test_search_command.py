@@ -67,7 +67,7 @@ def test_the_order_of_updates_reaches_the_network(run, tmp_path):
     assert "valid names: printed, undelayed, sequential" in error
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_killed_search_ends_like_an_unbroken_one(run, tmp_path):
     changed = {"100": "20000", "20": "40"}  # refined for longer
     words = [*(changed.get(str(word), str(word)) for word in SEARCH), "--json", "--out"]

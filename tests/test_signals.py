@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import hexmj
+from tiers import few_of
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
 
@@ -102,7 +103,7 @@ POOLS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("when", POOLS)
+@pytest.mark.parametrize("when", few_of(POOLS, "is left"))
 def test_while_a_pool_of_processes(when, tmp_path):
     """Its semaphores are left to nobody, who would be told of them."""
     script = f"import os\n{POOLS[when]}from hexmj.__main__ import main\nmain()"

@@ -97,7 +97,7 @@ def test_finished_walks_are_not_walked_again(slower, monkeypatch):
     assert sum(told) == pytest.approx(1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_controller_may_read_the_legs(slower):
     few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
     reading, alone = conduct(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
@@ -126,7 +126,7 @@ def test_what_makes_no_sense_is_refused(wrong, said):
         StaticLimit(LDVS, **wrong)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     words = ("converge", "--vps", 100, 50, "--starts", 4, "--window", 10, "--out", tmp_path)
     code, text, _ = run(*words, "--json")

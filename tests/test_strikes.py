@@ -28,6 +28,7 @@ from hexmj.physics.fine_steps import FINER, FINEST, FineSteps, in_whole_steps, s
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
 from hexmj.starts import draw_starts
+from tiers import few_of
 
 OBSTACLES = {
     ground: Conditions.of(ground=ground, ground_at=45.0, ground_length=8.0, ground_height=4.0)
@@ -102,7 +103,7 @@ def test_depth_is_that_of_mujocos_contacts(ground):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CONDITIONS)
+@pytest.mark.parametrize("name", few_of(CONDITIONS, "step", "fast", "hard landing"))
 def test_feet_never_sink_in(name, monkeypatch):
     """By 2 % of the standing height, wherever and however fast the insect walks, until it has fallen."""
     controller = ReadsLegs(LDVS) if name == "closed loop" else LDVS

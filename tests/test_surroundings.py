@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from tiers import few_of
+
 WALK = ("walk", "--physical", "--window", "1")
 FEW = ("flss", "--velocities", "0.5", "--starts", "3", "--window", "start")
 
@@ -36,7 +38,7 @@ def test_a_terminal_of_few_columns_gets_its_help(columns: str):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", ["0", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("00", "wide"))])
+@pytest.mark.parametrize("columns", few_of(["0", "00", "wide"], "0"))
 def test_no_width_is_as_wide_as_usual(columns: str):
     assert flss_in(columns) == flss_in("80") != ""
 
@@ -84,9 +86,7 @@ def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "wish", ["off", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("nonsense", "osmesa"))]
-)
+@pytest.mark.parametrize("wish", few_of(["off", "nonsense", "osmesa"], "off"))
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
     done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
     assert done.returncode == 0, done.stderr

@@ -160,7 +160,7 @@ def test_a_cell_is_a_physical_walk_under_those_conditions(few):
         assert_array_equal(one[name], getattr(walks, name))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_distance_is_what_was_walked_in_whole_steps():
     told: dict[str, Any] = {
         "velocities": (0.4,),
@@ -191,7 +191,7 @@ def test_where_nothing_is_reached_there_is_no_frequency():
     assert (alone.reached == 0).all() and np.isnan(alone.flss).all()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_controller_may_read_the_legs(few):
     """It goes another way, not only at the step, and all its starts are counted."""
     reading = conduct(Terrain(ReadsLegs(LDVS), **FEW))

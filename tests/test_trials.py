@@ -81,7 +81,7 @@ def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() 
         LegLost(hexmj.LDVS, 0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:
     check_controller(LegLost(hexmj.LDVS, 2))
     check_controller(LegLost(ReadsLegs(hexmj.LDVS), 2))

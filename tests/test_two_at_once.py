@@ -34,7 +34,7 @@ def test_many_writers_of_one_file_leave_one_whole_file(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_two_commands_write_the_same_folder(tmp_path):
     words = ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--window", "20", "--no-video")
     both = [command(*words, "--json", "--out", str(tmp_path)) for _ in range(2)]
