@@ -6,6 +6,7 @@ paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -70,15 +71,15 @@ GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
 
 
 def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
-    """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by numbers.
+    """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers.
 
     Args:
-        values: of legs.
+        values: of legs, or of some of them; an axis `leg` may stand anywhere, the others in their order.
         name: of the values, for sentences.
         behind: how many axes come after that of the legs.
 
     Raises:
-        InputError: labels of other legs.
+        InputError: labels of other legs, or of one twice.
     """
     if not behind and hasattr(values, "columns"):
         labels = [*values.columns]
@@ -88,8 +89,10 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         others = [axis for axis in values.dims if axis != "leg"]
         values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
         labels = [*values.coords["leg"].values] if "leg" in values.coords else []
-    if not labels or labels == [*range(len(LEGS))]:
+    numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted(labels)
+    if numbered or np.ndim(values) <= behind:
         return values
-    if sorted(map(str, labels)) != sorted(LEGS):
+    places = [labels.index(leg) for leg in LEGS if leg in labels]
+    if len(places) != len(labels):
         raise InputError(f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
-    return np.asarray(values)[(..., [labels.index(leg) for leg in LEGS], *behind * [slice(None)])]
+    return np.take(np.asarray(values), places, axis=-1 - behind)

@@ -185,6 +185,7 @@ def test_what_code_can_tell_apart_is_no_one_cell() -> None:
         ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
         ({"stride": 1, "order": 2}, {"stride": 1, "order": 3}),
         ((1.0, 2.0), np.array([1.0, 2.0])),
+        ((0, 1), [0, 1]),
         (np.zeros((0, 3)), np.zeros((0, 6))),
     ):
         assert plain(one, exact=True) != plain(other, exact=True)

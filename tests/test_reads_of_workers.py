@@ -82,12 +82,12 @@ def test_a_cell_that_sweeps_in_processes_is_no_more_kept_than_what_it_sweeps(
     assert not [*Path("kept").glob("*.nc")]
 
 
-def test_a_cell_that_goes_on_where_a_cell_elsewhere_has_failed_is_not_kept(
-    computed: Callable[..., tuple[float, int]],
-) -> None:
+@pytest.mark.parametrize("how", ["fails()", "ThreadPoolExecutor(1).submit(fails).result()"])
+@pytest.mark.usefixtures("computed")
+def test_a_cell_that_goes_on_where_a_cell_elsewhere_has_failed_is_not_kept(how: str) -> None:
     Path("one/gain").write_text("-1.0")
     Path("reader.py").write_text(
-        READER.format(gain="0.0 if fails() else 1.0")
+        READER.format(gain=f"0.0 if {how} else 1.0")
         + """
 @dataclass(frozen=True)
 class Failing:
@@ -102,7 +102,7 @@ def fails():
             return True
 """
     )
-    with pytest.warns(UserWarning, match="a cell that was swept elsewhere has failed"):
+    with pytest.warns(UserWarning, match="^reader is not kept: a cell that was swept elsewhere has failed"):
         (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert data.gain == 0.0
     assert not [*Path("kept").glob("*.nc")]

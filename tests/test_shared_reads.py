@@ -122,6 +122,35 @@ def test_a_cell_that_sweeps_has_read_what_its_cells_have_and_tell(
     assert what_was_read() == {"one/gain"}
 
 
+@pytest.mark.parametrize("how", ["swept()", "ThreadPoolExecutor(1).submit(swept).result()"])
+@pytest.mark.parametrize("gain", [1.0, -1.0])
+@pytest.mark.usefixtures("computed")
+def test_what_a_cell_tells_counts_for_one_that_sweeps_it_in_a_thread_or_goes_on_where_it_failed(
+    how: str, gain: float
+) -> None:
+    Path("one/gain").write_text(str(gain))
+    Path("reader.py").write_text(
+        READER.format(gain=how)
+        + """
+@dataclass(frozen=True)
+class Picky:
+    file: str
+    note: str = "no file"
+    def cell(self):
+        return xr.Dataset({"gain": gain}) if (gain := float(Path(self.file).read_text())) > 0 else {}
+
+def swept():
+    try:
+        return hexmj.sweeps.run([hexmj.sweeps.Cell("picky", Picky("one/gain").cell, {})])[0].gain.item()
+    except hexmj.InputError:
+        return 0.0
+"""
+    )
+    (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    assert data.gain == max(gain, 0.0)
+    assert what_was_read() == {"one/gain"}
+
+
 def test_what_a_cached_function_has_swept_before_counts(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

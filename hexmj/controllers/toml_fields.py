@@ -106,7 +106,8 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
         if isinstance(value, str) and value in kind.__members__:
             return kind[value]
         with suppress(ValueError):
-            return kind(value)
+            member = kind(value)
+            return member if isinstance(member.value, bool) == isinstance(value, bool) else None
     elif isinstance(kind, type) and issubclass(kind, PurePath):
         return kind(value) if isinstance(value, str) else None
     elif _is_record(kind) and isinstance(value, dict):

@@ -19,12 +19,12 @@ from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stan
 from hexmj.user_code.opened_files import (
     also_read,
     changed,
-    computes,
     computing,
     doubts,
     heard,
     opened_by,
     seen,
+    serves,
     spelled,
 )
 
@@ -92,8 +92,8 @@ class Cell:
     def tell(self, read: Mapping[str, str], not_kept: str) -> None:
         """Let those who sweep this one know what it has read, and a cell that does also what its settings name, and
         why it is not kept, unless it is."""
-        named = map(spelled, self._told_files() if computes() else ())
-        also_read(_beyond({*_files(read), *named}, ()), not_kept)
+        named = map(spelled, self._told_files() if serves() else ())
+        also_read(_beyond({*_files(read), *filter(os.path.isfile, named)}, ()), not_kept)
 
     def read(self) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
@@ -102,7 +102,7 @@ class Cell:
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             if swept := doubts(sources):
-                return {}, swept[0]
+                return {}, f"{self.name} is not kept: {swept[0]}; start the program again"
             unheard, named = data_of_users(self._modules())
             files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):

@@ -129,6 +129,8 @@ def finish(
     else:
         made = _elsewhere(executor, tasks, folder, threads or 1)
     before: dict[str, str] = {}
+    for cell in cells:
+        cell.tell({}, "")  # which may fail
     for i, (data, read, not_kept) in made:
         cells[i].tell(read, not_kept)
         if (told := unlike(cells[i].name, before, read) or (not_kept if folder else "")) and not warned:

@@ -61,6 +61,7 @@ class KeptValues:
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
+            self._cell.tell({}, "")  # it may fail
             with self._cell.computing():
                 given = self._cell.compute(picked, threads=self._threads)
             values = numbers(f"what {self._cell.name} gives", given)

@@ -42,7 +42,7 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     Args:
         value: of the setting.
         folders: where files are looked for, beside the current one.
-        exact: tell also the shape of an array and the order of a dict, which code may go by.
+        exact: tell also the shape of an array, lists from tuples and the order of a dict, which code may go by.
 
     Raises:
         InputError: it is none of the things that a setting can be.
@@ -65,7 +65,8 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     if value is None or type(value) in (bool, int, float, str):
         return value
     if type(value) is list or type(value) is tuple:
-        return [plain(item, folders, exact) for item in value]
+        items = [plain(item, folders, exact) for item in value]
+        return {"list": items} if exact and type(value) is list else items
     if type(value) is dict and all(isinstance(key, str) for key in value):
         told = {key: plain(item, folders, exact) for key, item in value.items()}
         return told | {ORDER: list(value)} if exact and sorted(value) != list(value) else told

@@ -95,19 +95,24 @@ def computes() -> bool:
     return threading.get_ident() in _COMPUTING
 
 
+def serves() -> bool:
+    """Whether this thread computes a cell, or may do something for one."""
+    return computes() or (bool(_COMPUTING) and threading.current_thread() is not threading.main_thread())
+
+
 def opened_by(sources: set[str]) -> set[str]:
     """What the code of some sources, if there are any, has opened, or found and run, and may remember."""
     return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
 def also_read(files: set[str], not_kept: str) -> None:
-    """Note for whose code is being called what a cell that it has swept has read; and, if that is of a cell that this
-    thread computes, why the other one is not kept, unless it is."""
+    """Note for whose code is being called what a cell that it has swept has read; and, if that is of a cell that is
+    being computed, why the other one is not kept, unless it is."""
     new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
     whose = _whose(sys._getframe(1))
     for one in whose:
         _OPENED.setdefault(one, set()).update(new)
-    if computes() or (_COMPUTING and _ANYBODY in whose):
+    if serves():
         seen(files)
         _DOUBTS.update(dict.fromkeys(whose, not_kept) if not_kept else {})
 
