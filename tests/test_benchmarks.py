@@ -76,6 +76,7 @@ def test_a_small_bench_prints_its_table(tmp_path):
     assert re.search(r"does \d{3} arithmetic operations for each start and step, [248] at a time", text)
 
 
+@pytest.mark.thorough
 def test_solver_settings_of_a_few_starts(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(solver_settings, "ROUNDS", 1)
     solver_settings.main(str(tmp_path), "4")

@@ -329,6 +329,7 @@ def test_an_executor_that_has_lost_its_scheduler_is_refused_at_once(tmp_path: Pa
         flss(LDVS, [0.5], n_starts=2, executor=executor)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path: Path) -> None:
     """Nobody is there; or somebody is who says nothing."""
     from socket import create_server

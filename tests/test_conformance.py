@@ -54,6 +54,7 @@ def test_one_cause_is_found_once(law):
             assert all(one.well for one in kept if one.name != "settings")
 
 
+@pytest.mark.thorough
 def test_feet_that_slide_are_told():
     """No law forbids it; tips that stand still slide with V_r, at most."""
     *_, last = findings(Own())

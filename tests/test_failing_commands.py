@@ -85,6 +85,7 @@ def test_an_answer_that_can_go_nowhere_is_a_sentence(run, monkeypatch):
     assert (code, error) == (2, "hexmj: standard output is closed; expected it open, for the answer\n")
 
 
+@pytest.mark.slow
 def test_nothing_but_the_answer_is_on_standard_output_where_the_other_one_is_closed(run, tmp_path):
     words = ["flss", "--starts", 5, "--window", 10, "--out", tmp_path / "out", "--velocities"]
     assert "this has taken its place" not in run(*words, 0.3)[2]

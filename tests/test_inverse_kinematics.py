@@ -77,6 +77,7 @@ def test_it_reaches_what_the_closed_form_reaches(closed: ThreeHinges, numeric: H
         assert (off[:, 0] * np.sin(protraction) + side * off[:, 1] * np.cos(protraction) < 0).all()
 
 
+@pytest.mark.thorough
 def test_limits_of_joints_are_reached_and_not_passed(closed: ThreeHinges, numeric: HingeChains):
     middle = closed.joint_range.mean(axis=-1)
     for joint in range(3):

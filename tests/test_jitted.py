@@ -40,6 +40,7 @@ def test_an_edit_of_another_file_is_compiled(tmp_path, old, new, told):
     assert ran(tmp_path) == ([told] if new else [4.0, 1.0])
 
 
+@pytest.mark.thorough
 def test_helpers_that_stand_below_count_too(tmp_path):
     """And what they take from other files."""
     low = OUTER.replace("return FACTOR * inner(x)", "return below(x)")

@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -60,6 +61,7 @@ class Imports(ast.NodeVisitor):
         self.names += [f"{node.module}.{one.name}" for one in node.names]
 
 
+@cache
 def imported(source: str) -> list[str]:
     """Everything imported by a source, each with its name as if it were a module."""
     found = Imports()

@@ -103,6 +103,7 @@ def test_oscillators_reach_the_tripod():
     assert found.duty_factor == pytest.approx(np.full((20, 6), 1 / 1.5), abs=0.01)
 
 
+@pytest.mark.thorough
 def test_uncoupled_oscillators_lose_more():
     tripod = hexmj.load_controller(OWN["tripod"])
     loose = type(tripod)(pull=0.0)  # pyright: ignore[reportCallIssue]

@@ -257,6 +257,7 @@ def test_the_numbers_do_not_depend_on_who_measures(tmp_path):
         assert one.identical(measure(name, TINY, tmp_path, threads=1))
 
 
+@pytest.mark.thorough
 def test_other_readings_stand_beside(tmp_path):
     keys = ("hws-late", "hws-regimes", "p2")
     alone, _ = reproduce(tmp_path / "alone", replace(TINY, reading=READINGS["lasting"]), only=keys[:2])

@@ -107,6 +107,7 @@ def test_numbers_of_all_starts_are_not_drawn_of_a_part_of_them(name: str):
             hexmj.plot(part, which)
 
 
+@pytest.mark.thorough
 def test_ranks_over_all_velocities_are_not_drawn_of_a_part_of_them():
     for which in FIGURES["league"]:
         with pytest.raises(InputError, match=r"^1 of 2 along the axis velocity; expected all"):

@@ -16,6 +16,7 @@ from hexmj.process import progress
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.stages import search
 from hexmj.view import live
+from tiers import few_of
 
 STARTS = hexmj.draw_starts(2, 0)
 CALLS: dict[str, Any] = {
@@ -47,7 +48,7 @@ class Terminal:
     def flush(self) -> None: ...
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", few_of(CALLS, "flss", "physical_walk"))
 def test_true_shows_a_bar_and_changes_nothing(name: str, monkeypatch):
     screen, parts = Terminal(), list[float]()
     monkeypatch.setattr(sys, "stderr", screen)

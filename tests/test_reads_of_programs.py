@@ -95,6 +95,7 @@ def test_what_programs_open_is_noticed(tmp_path: Path, program: str) -> None:
     assert sweep(tmp_path, **PROGRAMS[program]) == (3.0, 1, "")
 
 
+@pytest.mark.thorough
 def test_profiled_modules_are_heard_too(tmp_path: Path) -> None:
     """Code of a profiled script has a relative name."""
     for gain in (2.0, 3.0):
@@ -121,6 +122,7 @@ def test_a_log_that_a_cell_writes_is_no_reason_to_refuse_it(tmp_path: Path) -> N
     assert (tmp_path / "log.txt").read_text() == "."
 
 
+@pytest.mark.thorough
 def test_a_log_that_a_script_names_and_writes_meanwhile_is_no_error(tmp_path: Path) -> None:
     """The script's texts name it, so it counts for a cell of the script; a controller in a file of its own is kept."""
     log = "LOG = open('log.txt', 'a')\nimport atexit\natexit.register(LOG.close)\n"
@@ -183,7 +185,7 @@ def test_a_controller_that_another_one_loads_by_name_is_noticed(tmp_path: Path) 
     assert (gain, kept) == (2.0, 0) and "other.py, of which" in complaint
 
 
-@pytest.mark.parametrize("where", ["leg.xml", "models/leg.xml"])
+@pytest.mark.parametrize("where", few_of(["leg.xml", "models/leg.xml"], "leg.xml"))
 def test_an_mjcf_counts_that_a_text_names_with_what_it_includes(tmp_path: Path, where: str) -> None:
     """MuJoCo opens it where nobody hears it."""
     (tmp_path / "models").mkdir()

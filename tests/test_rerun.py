@@ -168,6 +168,7 @@ def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch, t
     assert "mine.py, with which out/manifest.json was made, is no file here; expected to run where" in error
 
 
+@pytest.mark.slow
 def test_a_result_of_other_words_in_its_place_is_told(run, tmp_path):
     words = "compare", "--velocities", "0.5", "--window", "5", "--no-video", "--out", str(tmp_path / "kept"), "--starts"
     told = [run(*words, starts)[2] for starts in ("2", "3", "3")]

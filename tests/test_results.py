@@ -179,6 +179,7 @@ def test_settings_are_told_as_they_were_given():
     assert hexmj.settings(flss())["acceleration"] is None
 
 
+@pytest.mark.thorough
 def test_the_title_tells_what_was_chosen():
     title = hexmj.plot(compared()).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
     for words in (

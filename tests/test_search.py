@@ -72,6 +72,7 @@ def test_a_finished_search_is_reported_without_an_evaluation(tmp_path, monkeypat
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.thorough
 def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(tmp_path):
     few = Effort(budget=30, starts=20, refine_budget=0)
     search(PROBLEM, few, folder=tmp_path)

@@ -58,6 +58,7 @@ def test_before_it_hears_them(by, how):
     assert running.returncode == 130 and b"hexmj: stopped" in told and b"Traceback" not in told
 
 
+@pytest.mark.thorough
 def test_no_program_is_started_that_a_stop_would_reach(tmp_path):
     """As GLFW does to ask libraries for their versions."""
     heard = "lambda event, _: event == 'subprocess.Popen' and print('started a program', flush=True)"

@@ -43,6 +43,7 @@ def test_no_width_is_as_wide_as_usual(columns: str):
     assert flss_in(columns) == flss_in("80") != ""
 
 
+@pytest.mark.thorough
 def test_figures_go_to_files_whatever_the_backend(tmp_path: Path):
     done = done_with((*FEW, "--out", str(tmp_path)), MPLBACKEND="nonsense")
     assert done.returncode == 0, done.stderr
@@ -59,6 +60,7 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_asks_for(tmp_path: Path):
     assert (tmp_path / "plain" / "flss.png").read_bytes() == (tmp_path / "asked" / "flss.png").read_bytes()
 
 
+@pytest.mark.thorough
 def test_empty_numbers_for_libraries_are_none_at_all():
     done = done_with(FEW, NUMBA_NUM_THREADS="", SOURCE_DATE_EPOCH="")
     said = [line for line in done.stderr.splitlines() if "% in " not in line]

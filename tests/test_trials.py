@@ -92,6 +92,7 @@ def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None
         PoorSenses(hexmj.LDVS, -1.0)
 
 
+@pytest.mark.thorough
 def test_poor_senses_that_are_perfect_change_nothing_and_errors_are_a_starts_own() -> None:
     starts, reading = hexmj.draw_starts(3, 2), ReadsLegs(hexmj.LDVS)
     plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (reading, PoorSenses(reading)))

@@ -86,6 +86,7 @@ def test_what_has_the_changed_value_already_gets_the_usual_one():
     assert varied(Stride(geometry=CENTRED), "centred") == Stride()
 
 
+@pytest.mark.thorough
 def test_a_row_says_what_is_walked_where_a_set_has_the_variant_anyway():
     assert instead(LDVS, "lasting") == instead(Stride(), "dt 0.2") == {}
     lasting, sums = hexmj.PRESETS["lasting"], replace(LDVS, reading=Reading(ipsilateral="lasting", cap="sum"))
@@ -170,6 +171,7 @@ def test_the_figure_shows_every_set_and_velocity(result):
     assert all(name == "usual" or any(name.startswith(begin) for begin in STYLES) for name in VARIANTS)
 
 
+@pytest.mark.thorough
 def test_the_insect_walks_the_variants_that_its_legs_reach():
     """On paper the other one is walked too."""
     assert set(variants()) - set(variants(physical=True)) == {"AEP0 11"}
@@ -208,6 +210,7 @@ def test_a_set_for_each_velocity_is_expected(networks):
         Variants({"l": networks}, (0.5,))
 
 
+@pytest.mark.thorough
 def test_the_command_marks_what_is_walked_otherwise(run, tmp_path):
     words = ["variants", "--models", "lasting", "ldvs", "--velocities", 0.3, "--starts", 2, "--window", 3]
     code, out, _ = run(*words, "--out", tmp_path)
