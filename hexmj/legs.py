@@ -82,15 +82,18 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         InputError: labels of other legs, or of one twice.
     """
     if not behind and hasattr(values, "columns"):
+        values = values.T if {*values.index} == {*LEGS} else values
         labels = [*values.columns]
     else:
         labels = [*values.index] if hasattr(values, "iloc") else []
+    if "leg" in getattr(values, "coords", ()) and "leg" not in values.dims and values.coords["leg"].dims:
+        values = values.swap_dims({values.coords["leg"].dims[0]: "leg"})
     if "leg" in getattr(values, "dims", ()):
         others = [axis for axis in values.dims if axis != "leg"]
         values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
         labels = [*values.coords["leg"].values] if "leg" in values.coords else []
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted(labels)
-    if numbered or np.ndim(values) <= behind:
+    if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
         return values
     places = [labels.index(leg) for leg in LEGS if leg in labels]
     if len(places) != len(labels):

@@ -5,6 +5,7 @@ import os
 import py_compile
 import subprocess
 import sys
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from hexmj.errors import InputError
 from hexmj.sweeps import Cell, KeptValues
 from hexmj.sweeps import code as sources
 from hexmj.sweeps.code import code
+from hexmj.user_code import parsing
 from hexmj.user_code.loaded import importable
 from small_cells import MINE, WITHOUT_DASK
 from toy_project import write_toy
@@ -24,6 +26,17 @@ def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch
     monkeypatch.setitem(sources._AT_FIRST, str(file), 0)
     with pytest.raises(InputError, match=r"errors\.py was edited since this program began; start it again"):
         sources._read.__wrapped__(name, file)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_process_that_is_forked_while_a_source_is_parsed_parses_its_own() -> None:
+    with parsing._alone():
+        child = get_context("fork").Process(target=parsing.parsed, args=(b"1",))
+        child.start()
+    child.join(20)
+    child.kill()
+    assert child.exitcode == 0
 
 
 USED = """

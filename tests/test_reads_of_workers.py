@@ -1,9 +1,11 @@
 """What workers have read and remember, and what is sent to them, counts as it does where a sweep begins."""
 
 import os
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from hexmj.errors import InputError
 from hexmj.sweeps import Cell, cells, run
 from hexmj.sweeps.cells import unlike
+from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
 from reader import READER, another_program, what_was_read
 
@@ -180,3 +183,13 @@ def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
 def test_workers_may_stand_in_folders_of_their_own() -> None:
     assert unlike("second", {"file": "held"}, {".": "two", "file": "there"}) == ""
     assert unlike("second", {"file": "held"}, {"file": "other"}).startswith("file has changed before second read it")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_process_that_is_forked_within_a_cell_computes_none() -> None:
+    with opened_files.computing([], set()):
+        child = get_context("fork").Process(target=lambda: sys.exit(opened_files.computes()))
+        child.start()
+    child.join()
+    assert child.exitcode == 0

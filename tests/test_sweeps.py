@@ -1,5 +1,7 @@
 """A sweep's cells have the same bits whoever computes them, are computed once, and stand along their axes."""
 
+import gc
+import weakref
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ import pytest
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, conduct, over_axes, run
+from hexmj.sweeps import Cell, conduct, finish, over_axes, run
 from hexmj.user_code.loaded import importable
 from left_by_cells import calls, contents
 from small_cells import MINE, Wave, assert_same_bits, counted_cells, odd_bits, odd_cells, of_object, told_how
@@ -43,6 +45,17 @@ def test_a_users_object_travels_to_a_process_of_its_own(tmp_path: Path, spawned:
     cells = [Cell(f"{n} steps", of_object, {"controller": tripod, "n": n}) for n in (2, 3)]
     cells.append(Cell("its own", of_object, {"controller": importable(tmp_path / "mine.py").Tripod(3.0), "n": 4}))
     assert_same_bits(run(cells, tmp_path / "kept", executor=spawned), run(cells))
+
+
+def test_what_a_caller_throws_away_nobody_holds() -> None:
+    with ThreadPoolExecutor(1) as executor:
+        held = list[weakref.ref[xr.Dataset]]()
+        for _, data in finish(odd_cells(), executor=executor):
+            held.append(weakref.ref(data))
+            del data
+            gc.collect()
+            assert not any(one() is not None for one in held[:-1])
+    assert len(held) == 6
 
 
 def test_what_cannot_travel_is_refused_in_one_sentence(spawned: Executor) -> None:

@@ -365,6 +365,12 @@ def test_labelled_legs_of_a_posture_may_come_in_any_order():
     places: Any = tips[0].to_pandas()
     for one in (places, places.loc[shuffled]):
         assert np.array_equal(hexmj.support_polygon(one, table.iloc[0][shuffled]), polygon)
+    for name in ("feet", "stance"):
+        with pytest.raises(hexmj.InputError, match=f"^{name} = "):
+            hexmj.stability_margin(**{"feet": feet, "stance": stands, name: down.to_dataset(name="down")})
+    along = down.rename(leg="i").assign_coords(leg=("i", [*LEGS])).drop_vars("i")[:, ::-1]
+    assert np.array_equal(hexmj.stability_margin(feet, along), margin)
+    assert np.array_equal(hexmj.stability_margin(feet[:6], table[shuffled][:6].T), margin[:6])
     few = ["R2", "L3", "L1"]
     assert len(hexmj.support_polygon(places.loc[few], [1, 1, 1])) == 3
     assert np.array_equal(hexmj.stability_margin(places.set_axis(range(6, 12)), stands[0]), margin[0])

@@ -223,4 +223,4 @@ def difference(one: str, other: str) -> str:
     while isinstance(a, dict) and isinstance(b, dict):
         names.append(next(name for name in sorted({*a, *b}) if a.get(name) != b.get(name)))
         a, b = a.get(names[-1]), b.get(names[-1])
-    return " of ".join(reversed(names))
+    return " of ".join(reversed([name for name in names if name != "of"]))

@@ -239,7 +239,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                     raise InputError(
                         f"a worker has another {other[0]} than the sender; start it again, where it has the same"
                     )
-                yield futures[future], (data, read, not_kept)
+                yield futures.pop(future), (data, read, not_kept)
         except BrokenExecutor:
             raise InputError(
                 "a process that computed cells was killed, or could not be started; what is finished is kept:"

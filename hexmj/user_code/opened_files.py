@@ -85,7 +85,7 @@ def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
     try:
         yield
     finally:
-        del _COMPUTING[mine]
+        _COMPUTING.pop(mine, None)
         if outer:
             _COMPUTING[mine] = outer
 
@@ -163,10 +163,9 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         lists = event == "open" and arguments[1] is None and sys._getframe(1).f_globals.get("__name__") in _WALKERS
         if lists or not isinstance(path, str | bytes | os.PathLike):
             return  # a folder that is walked through or removed; an open file
-        given = os.fsdecode(path)
-        name = ":memory:" if "mode=memory" in given else given
+        name = os.fsdecode(path)
         if event == "sqlite3.connect" and (uri := _URI.match(name)):
-            name = unquote(uri[1])
+            name = ":memory:" if "mode=memory" in name else unquote(uri[1])
         if name.startswith("<") or name == ":memory:" or (event == "ctypes.dlopen" and os.sep not in name):
             return  # of no file; or the system's linker looks for it
         file = spelled(name)
@@ -263,4 +262,6 @@ def _writes(flags: int) -> bool:
     return bool(flags & (os.O_WRONLY | os.O_TRUNC | os.O_EXCL))
 
 
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_COMPUTING.clear)
 sys.addaudithook(_hear)

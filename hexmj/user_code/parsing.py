@@ -2,6 +2,7 @@
 that of one.  Nothing is told of their warnings, which whoever imports them hears."""
 
 import ast
+import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ LONGEST = 1000
 """More letters no path has that a source names."""
 
 _ONE = Lock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=lambda: globals().update(_ONE=Lock()))  # whose holder stays with the parent
 
 
 def parsed(source: bytes) -> ast.Module:
