@@ -42,6 +42,17 @@ class Wave:
         return xr.Dataset({"y": ("x", self.slope * self.values + shift)})
 
 
+class OfALeg(Exception):
+    """Cannot be unpickled, as those cannot that make a sentence of what they are given."""
+
+    def __init__(self, leg: int, why: str) -> None:
+        super().__init__(f"leg {leg} {why}")
+
+
+def slips(leg: int) -> xr.Dataset:
+    raise OfALeg(leg, "slips")
+
+
 def odd_bits(seed: int, size: int = 4) -> xr.Dataset:
     """Numbers whose bits are easily lost on the way: signs of NaN and 0, subnormals, bool, text, no rows at all."""
     draw = np.random.default_rng(seed).standard_normal(size)

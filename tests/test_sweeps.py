@@ -17,7 +17,18 @@ from hexmj.errors import InputError
 from hexmj.sweeps import Cell, conduct, finish, over_axes, run
 from hexmj.user_code.loaded import importable
 from left_by_cells import calls, contents
-from small_cells import MINE, Wave, assert_same_bits, counted_cells, odd_bits, odd_cells, of_object, told_how
+from small_cells import (
+    MINE,
+    OfALeg,
+    Wave,
+    assert_same_bits,
+    counted_cells,
+    odd_bits,
+    odd_cells,
+    of_object,
+    slips,
+    told_how,
+)
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +72,11 @@ def test_what_a_caller_throws_away_nobody_holds() -> None:
 def test_what_cannot_travel_is_refused_in_one_sentence(spawned: Executor) -> None:
     with pytest.raises(InputError, match="a cannot be sent to another process: "):
         run([Cell("a", lambda: xr.Dataset(), {})], executor=spawned)
+
+
+def test_what_a_worker_s_error_tells_is_told(spawned: Executor) -> None:
+    with pytest.raises((RuntimeError, OfALeg), match=r"leg 3 slips$"):  # itself, where something pickles all errors
+        run([Cell("slips", slips, {"leg": 3})], executor=spawned)
 
 
 def test_a_cell_is_told_how_only_if_it_asks(spawned: Executor) -> None:

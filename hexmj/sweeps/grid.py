@@ -202,7 +202,20 @@ def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: i
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
-    return _made(cell, record, path, threads=threads)
+    try:
+        return _made(cell, record, path, threads=threads)
+    except Exception as error:
+        if not _travels(error):
+            raise RuntimeError(f"{type(error).__name__}: {error}") from error
+        raise
+
+
+def _travels(error: Exception) -> bool:
+    """Whether an error can be pickled and read again; else it would break a pool of processes."""
+    try:
+        return isinstance(pickle.loads(pickle.dumps(error)), Exception)
+    except Exception:
+        return False
 
 
 def _elsewhere(
