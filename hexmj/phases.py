@@ -54,7 +54,7 @@ def circular_range(phase: ArrayLike) -> np.ndarray:
     rows = numbers("phase", phase)
     if rows.ndim != 2 or not rows.shape[1]:
         raise InputError(f"phase has the shape {rows.shape}; expected (row, n), rows of at least one")
-    ordered = np.sort(rows, axis=1)
+    ordered = np.sort(rows % 1.0, axis=1)
     return 1.0 - np.diff(ordered, axis=1, append=ordered[:, :1] + 1.0).max(axis=1)
 
 

@@ -1,5 +1,6 @@
 """What one cell's code has read others may know: of the same program, of workers, of values that a search keeps."""
 
+import importlib
 import shutil
 import time
 from collections.abc import Callable
@@ -148,6 +149,16 @@ def swept():
     )
     (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert data.gain == max(gain, 0.0)
+    assert what_was_read() == {"one/gain"}
+
+
+@pytest.mark.usefixtures("computed")
+def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("site-packages").mkdir()
+    Path("site-packages/my_reader.py").write_text(READER.format(gain="float(Path('one/gain').read_text())"))
+    monkeypatch.syspath_prepend("site-packages")
+    (data,) = run([Cell("reader", importlib.import_module("my_reader").Reader().cell, {})], Path("kept"))
+    assert data.gain == 1.0
     assert what_was_read() == {"one/gain"}
 
 

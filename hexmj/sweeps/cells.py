@@ -20,7 +20,7 @@ from hexmj.user_code.opened_files import (
     also_read,
     changed,
     computing,
-    doubts,
+    doubt,
     heard,
     opened_by,
     seen,
@@ -101,8 +101,8 @@ class Cell:
         else empty."""
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
-            if swept := doubts(sources):
-                return {}, f"{self.name} is not kept: {swept[0]}; start the program again"
+            if swept := doubt(sources):
+                return {}, f"{self.name} is not kept: {swept}; start the program again"
             unheard, named = data_of_users(self._modules())
             files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
@@ -123,11 +123,10 @@ class Cell:
         """Whether its code would read today what it has read, or may remember from earlier in this program."""
         try:
             same = all(holds(*one) for one in read.items())
-            named = data_of_users(self._modules())
+            named = set[str]().union(*data_of_users(self._modules()))
         except InputError:
             return False
-        new = set[str]().union(*named) - read.keys()
-        return same and not changed(_files(read)) and not (new and _beyond(new, self._told_files()))
+        return same and not changed(_files(read)) and not _beyond(named - read.keys(), self._told_files())
 
     def _told_files(self) -> set[Path]:
         """Files that its settings name."""

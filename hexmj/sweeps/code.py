@@ -63,7 +63,6 @@ _ALL = "*"
 _ASSETS = PACKAGE / "assets" if (PACKAGE / "assets").is_dir() else PACKAGE.parent / "assets"
 """Of an installed package, and of one that runs from its repository."""
 
-_INSTALLED = tuple(Path(sysconfig.get_path(one)) for one in ("purelib", "platlib"))
 _STANDARD = sysconfig.get_path("stdlib")
 _FILES_OF_OURS = (os.path.join(folder, name) for folder, _, names in os.walk(PACKAGE) for name in names)
 _AT_FIRST = {file: os.stat(file).st_mtime_ns for file in _FILES_OF_OURS if file.endswith(".py")}
@@ -135,9 +134,9 @@ def sources_of_users(modules: frozenset[str]) -> set[str]:
 
 
 def files_of_classes(modules: frozenset[str]) -> set[str]:
-    """Files of some modules, as far as they are a user's own."""
+    """Files of some modules that are not this package's own, be they installed or not."""
     files = {os.path.abspath(file) for name in modules if (file := _file(name))}
-    return {file for file in files if sources_as_run.is_users(file)}
+    return {file for file in files if not Path(file).is_relative_to(PACKAGE)}
 
 
 def data_of_users(modules: frozenset[str]) -> tuple[set[str], set[str]]:
@@ -262,7 +261,7 @@ def _found(module: str) -> Path | None:
 
 
 def _is_installed(file: Path) -> bool:
-    return any(file.is_relative_to(one) for one in _INSTALLED) or not sources_as_run.INSTALLED.isdisjoint(file.parts)
+    return not sources_as_run.INSTALLED.isdisjoint(file.parts)
 
 
 @cache

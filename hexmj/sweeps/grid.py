@@ -98,8 +98,8 @@ def finish(
             fail raises.
 
     Warns:
-        UserWarning: cells are not kept, since what their code has read has changed, or it runs what no import names; or
-            one has read a file that has changed since another one did.
+        UserWarning: cells are not kept, since what their code has read has changed, or it runs what no import names, or
+            has swept others that are not kept; or one has read a file that has changed since another one did.
     """
     if unknown := set(how) - set(Execution.__annotations__):
         raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
@@ -108,12 +108,10 @@ def finish(
     progress = typed("progress", how.get("progress"), Progress | None)
     thread_count(threads := how.get("threads"))
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
-    records = [cell.record() if folder else "" for cell in cells]
-    tasks: list[_Task] = [
-        (cell, record, folder / f"{cell.stem(record)}.nc" if folder else None)
-        for cell, record in zip(cells, records, strict=True)
-    ]
+    tasks: list[_Task] = [(cell, "", None) for cell in cells]
     if folder:
+        named = [(cell, cell.record()) for cell in cells]
+        tasks = [(cell, record, folder / f"{cell.stem(record)}.nc") for cell, record in named]
         finished_all = all(path and os.path.exists(path) for _, _, path in tasks)
         (remove_leftovers if finished_all else prepare)(folder)
     work, done, warned = sum(cell.work for cell in cells), [0.0] * len(cells), False

@@ -54,7 +54,14 @@ class KeptValues:
         """Values that the file held."""
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
-        """The values, (row,), of rows (row, number)."""
+        """The values, (row,), of rows (row, number).
+
+        Raises:
+            InputError: the function gives no number for each row; what it depends on has changed, or the file is gone.
+
+        Warns:
+            UserWarning: values are not kept, or of a file that has changed since, as of `finish`.
+        """
         rows = np.ascontiguousarray(rows, dtype=float)
         keys = [row.tobytes() for row in rows]
         self._replayed |= self._held.intersection(keys)

@@ -20,8 +20,8 @@ from urllib.parse import unquote
 
 from hexmj.user_code.sources_as_run import INSTALLED, is_users
 
-_PATH = {"open": 0, "exec": 0, "sqlite3.connect": 0, "ctypes.dlopen": 0}
-"""Event of Python's audit hooks -> which of its arguments tells the path."""
+_OPENS = "open", "exec", "sqlite3.connect", "ctypes.dlopen"
+"""Events of Python's audit hooks whose first argument tells a path."""
 
 _MAKES = "tempfile.mkdtemp", "tempfile.mkstemp"
 """Events of what makes a file, or a folder, to be used and thrown away; the path comes first."""
@@ -117,9 +117,9 @@ def also_read(files: set[str], not_kept: str) -> None:
         _DOUBTS.update(dict.fromkeys(whose, not_kept) if not_kept else {})
 
 
-def doubts(sources: set[str]) -> list[str]:
-    """Why cells of the code of some sources are not kept, since others are not that they have swept."""
-    return [_DOUBTS[one] for one in (*sorted(sources), _ANYBODY) if one in _DOUBTS] if sources else []
+def doubt(sources: set[str]) -> str:
+    """Why cells of the code of some sources are not kept, if one is not that they have swept."""
+    return next((_DOUBTS[one] for one in (*sorted(sources), _ANYBODY) if one in _DOUBTS), "") if sources else ""
 
 
 def seen(files: Iterable[str]) -> None:
@@ -130,8 +130,7 @@ def seen(files: Iterable[str]) -> None:
 
 def heard(files: set[str]) -> set[str]:
     """Those of some files that anybody in this program has opened, but for logs."""
-    names = {one: {one, os.path.realpath(one)} for one in files}
-    return {one for one, its in names.items() if its & _AT_FIRST.keys() and not its & _LOGS}
+    return {one for one in files if (its := {one, os.path.realpath(one)}) & _AT_FIRST.keys() and not its & _LOGS}
 
 
 def remembered(file: str) -> bool:
@@ -154,10 +153,10 @@ def spelled(file: str | Path) -> str:
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event in _MAKES and _COMPUTING:
         _TEMPORARY.add(os.path.realpath(arguments[0]))
-    if event not in _PATH:
+    if event not in _OPENS:
         return
     with suppress(Exception):  # of whoever opens something, wherever in the process
-        path: Any = arguments[_PATH[event]]
+        path: Any = arguments[0]
         if event == "exec":
             path = path.co_filename if path.co_name == "<module>" else None
         lists = event == "open" and arguments[1] is None and sys._getframe(1).f_globals.get("__name__") in _WALKERS
@@ -202,7 +201,7 @@ def _whose(opener: FrameType, file: str = "") -> set[str]:
 def _counts_by_itself(really: str) -> bool:
     """Whether the cell that this thread computes tells a file, or it was made to be thrown away."""
     told, _ = _COMPUTING.get(threading.get_ident(), _NOTHING)
-    return really in told or (bool(_TEMPORARY) and not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents))))
+    return really in told or not _TEMPORARY.isdisjoint((really, *map(str, Path(really).parents)))
 
 
 def _is_of_a_sweep(opener: FrameType) -> bool:
