@@ -238,13 +238,13 @@ class NetworkPlan:
         for row, values in {kernel.V: self.slow, kernel.DONE: 0.0}.items():
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 
-    def _read(self, row: int, rows: int = 6) -> np.ndarray:
+    def _read(self, row: int | np.integer, rows: int = 6) -> np.ndarray:
         """A variable of every start, (start, leg), or (start, 1) with one row."""
         return self._rows(row, rows).transpose(0, 2, 1).reshape(-1, rows)[: len(self.starts)]
 
-    def _write(self, row: int, values: np.ndarray, rows: int = 6) -> None:
+    def _write(self, row: int | np.integer, values: np.ndarray, rows: int = 6) -> None:
         padded = np.concatenate([values, np.repeat(values[-1:], -len(values) % kernel.LANES, axis=0)])
         self._rows(row, rows)[:] = padded.reshape(-1, kernel.LANES, rows).transpose(0, 2, 1)
 
-    def _rows(self, row: int, rows: int) -> np.ndarray:
+    def _rows(self, row: int | np.integer, rows: int) -> np.ndarray:
         return self._blocks.reshape(len(self._blocks), kernel.ROWS, kernel.LANES)[:, row : row + rows]
