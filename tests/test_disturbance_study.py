@@ -135,6 +135,7 @@ def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
     assert other.fall[0, 2].equals(result.fall[0, 1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
 def test_some_starts_alone_go_as_among_all(kind):
     walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)

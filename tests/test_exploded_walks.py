@@ -22,6 +22,7 @@ from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.cases import every_case
+from tiers import few_of
 
 LEG, GRAVITY = 31.0, 9810.0
 
@@ -130,7 +131,7 @@ def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duratio
     return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), push=pushed)
 
 
-@pytest.mark.parametrize("push", [40.0, 80.0])
+@pytest.mark.parametrize("push", few_of([40.0, 80.0], 80.0))
 def test_an_insect_tipped_over_by_a_push_fell(push: float):
     found = outcomes(Conditions(), 0.5, push, duration=120.0)
     assert np.isfinite(found.fall).mean() > 0.5

@@ -27,6 +27,7 @@ def test_divergence_is_an_error_that_can_be_replayed(walking: Any):
     assert set(error.value.state) >= {"qpos", "qvel", "ctrl", "conditions"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_after_a_divergence_a_reset_is_a_new_beginning(mode):
     task: Any = {**TIPS, "autoreset_mode": mode}

@@ -71,6 +71,7 @@ def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
         conduct(StabilityMap(LDVS, "vp", **(SMALL | OTHER_SEED)), folder)
 
 
+@pytest.mark.slow
 def test_same_bits_in_any_blocks_and_threads(result, monkeypatch):
     monkeypatch.setattr(fates, "BLOCK", 5)
     other = conduct(StabilityMap(LDVS, "vp", **SMALL), threads=1)
@@ -163,6 +164,7 @@ def test_bad_input_is_refused(over, changed, message):
         StabilityMap(**given)
 
 
+@pytest.mark.thorough
 def test_command(tmp_path, run):
     words = ("map", "--values", 80, "--velocities", 0.7, "--starts", 4, "--window", 20, "--out", tmp_path)
     code, out, _ = run(*words, "--json")

@@ -68,6 +68,7 @@ def test_both_measures_beside_ldvs(own):
     assert hexmj.settings(alone)["controllers"][own.name]["name"] == own.name
 
 
+@pytest.mark.slow
 def test_it_is_recorded_and_shown_beside_its_plan(own, tmp_path):
     starts = hexmj.draw_starts(1, 4)
     walked = hexmj.physical_walk(starts, own, 0.4, 40.0)
@@ -87,6 +88,7 @@ def test_the_guide_shows_the_example():
     assert "check_controller(Tripod())" in test
 
 
+@pytest.mark.slow
 def test_the_guide_is_enough(tmp_path):
     """What it shows, saved as told."""
     code, test = re.findall(r"```python\n(.+?)```", GUIDE.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -111,6 +113,7 @@ def test_uncoupled_oscillators_lose_more():
     assert pulled < 0.5 * free
 
 
+@pytest.mark.slow
 def test_a_swing_ends_where_the_foot_meets_the_ground():
     """On a step of 3 mm, which the plan knows nothing of, feet come to stand higher, and the paper's plan does not."""
     feeler, starts = hexmj.load_controller(OWN["feeler"]), hexmj.draw_starts(6, 0)

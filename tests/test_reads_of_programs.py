@@ -114,6 +114,7 @@ def test_a_file_of_data_counts_that_a_text_names(tmp_path: Path, name: str, firs
         assert sweep(tmp_path, mine=mine, script=SCRIPT.replace("import hexmj", first)) == (gain, 1, "")
 
 
+@pytest.mark.slow
 def test_a_log_that_a_cell_writes_is_no_reason_to_refuse_it(tmp_path: Path) -> None:
     mine = f"{NEW}def cell():\n    with open('log.txt', 'a') as log:\n        log.write('.')\n"
     mine += "    return xr.Dataset({'gain': 2.0})\n"

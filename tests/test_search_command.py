@@ -103,6 +103,7 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, m
     assert len(kept.read_text().splitlines()) == 1 + 37
 
 
+@pytest.mark.slow
 def test_physical_search(run, tmp_path):
     words = ["search", "--physical", "--velocity", 0.6, "--window", "start", "--vp", 200, "--starts", 3, "--budget", 10]
     words += ["--refine-budget", 0, "--verdict-starts", 4, "--json", "--out", tmp_path]
@@ -159,6 +160,7 @@ class Stretched(hexmj.Cruse1998):
 """
 
 
+@pytest.mark.thorough
 def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
     """It is no set of weights: neither what is found nor what a search of weights can begin with."""
     (tmp_path / "heir.py").write_text(HEIR)

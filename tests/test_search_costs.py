@@ -45,6 +45,7 @@ def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
     assert [sample.costs(vector[None])[0] for vector in vectors] == costs.tolist()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("feedback", [False, True])
 def test_the_physical_cost_is_the_physical_flss(feedback):
     conditions = hexmj.Conditions.of(vp=200.0)
@@ -101,6 +102,7 @@ def test_ties_are_broken_by_later_losses_and_nothing_else_is():
         assert [sample.lost(cost) for cost in known] == np.rint(n * flss).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ties", "over", "said"),
     [

@@ -120,6 +120,7 @@ def test_feet_never_sink_in_when_the_insect_is_pushed_off_them(monkeypatch):
     assert outcomes(settled, PUSH).depth.max() > 5 * allowed(settled), "this test would notice nothing"
 
 
+@pytest.mark.slow
 def test_fine_steps_depend_on_nothing_but_their_own_insect():
     """Pushed, so that nearly all take some: the same bits with one thread, and among fewer."""
     settled, few = settle(draw_starts(16, 4)), settle(draw_starts(16, 4)[5:9])

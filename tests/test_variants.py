@@ -223,6 +223,7 @@ def test_the_command_marks_what_is_walked_otherwise(run, tmp_path):
     assert json.loads(out)["instead"][0][-1] == ["ipsilateral = standing"]
 
 
+@pytest.mark.thorough
 def test_the_command(run, result, tmp_path):
     words = ["variants", "--models", "hws", "own-V", "--velocities", 0.5, 0.7, "--starts", 60, "--window", "start"]
     code, out, _ = run(*words, "--seed", 4, "--json", "--out", tmp_path)

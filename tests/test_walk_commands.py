@@ -42,6 +42,7 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
     assert {"mujoco", "numpy", "hexmj"} <= set(manifest["versions"])
 
 
+@pytest.mark.slow
 @drawing
 def test_compare_makes_a_video_of_a_gait_and_its_tables_break_no_name(run, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "80")
