@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from hexmj.jitted import jitted
+from hexmj.jitted import inlined, part
 
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -34,7 +33,7 @@ def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))
 
 
-@jitted
+@part
 def lowest(qpos: Any, corners: Any, radii: Any) -> float:
     """Height of the lowest of some spheres that a root carries, for compiled code [mm].
 
@@ -51,7 +50,7 @@ def lowest(qpos: Any, corners: Any, radii: Any) -> float:
     return least
 
 
-@njit(nogil=True, forceinline=True)
+@inlined
 def matrix(w: float, x: float, y: float, z: float) -> Any:
     """The rotation of one quaternion, row by row: nine numbers, for compiled code."""
     return (

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.jitted import jitted
+from hexmj.jitted import jitted, part
 
 CLOSE = 1e-10
 """Greatest distance of a foot from its tip [mm]."""
@@ -54,7 +54,7 @@ def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
     return joints, reachable
 
 
-@jitted
+@part
 def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
     """Whether a posture is found that reaches a tip; it is written to `angles`.
 
@@ -72,7 +72,7 @@ def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
     return False
 
 
-@jitted
+@part
 def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
     """Bring the foot to a tip as near as Newton's method can; its distance [mm]."""
     low, high = chains.low[leg], chains.high[leg]
@@ -94,7 +94,7 @@ def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
     return distance
 
 
-@jitted
+@part
 def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> None:
     """Among the postures that reach a tip go down the distance from home as far as it goes."""
     low, high, home = chains.low[leg], chains.high[leg], chains.home[leg]
@@ -111,7 +111,7 @@ def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> Non
             share /= 2.0
 
 
-@jitted
+@part
 def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, damping: float) -> float:
     """Of the steps that bring the foot to the tip, to first order, the nearest to the way toward other angles.
 
@@ -140,7 +140,7 @@ def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, 
     return largest
 
 
-@jitted
+@part
 def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, float, float]:
     """Cramer's rule for a symmetric matrix of these rows, damped; 0 where it is singular."""
     trace = x[0] + y[1] + z[2]
@@ -153,7 +153,7 @@ def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, 
     return _dot(right, a) / determinant, _dot(right, b) / determinant, _dot(right, c) / determinant
 
 
-@jitted
+@part
 def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
     """Turn the hinges, the outermost first: the columns of J, (joint, axis), and last the error from the foot to the
     tip are written to `lever`; the error's length [mm]."""
@@ -172,7 +172,7 @@ def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
     return math.sqrt(_dot(error, error))
 
 
-@jitted
+@part
 def _turned(vector: Any, axis: Any, cosine: float, sine: float) -> tuple[float, float, float]:
     """A vector turned about an axis."""
     x, y, z = _cross(axis, vector)
@@ -184,21 +184,21 @@ def _turned(vector: Any, axis: Any, cosine: float, sine: float) -> tuple[float, 
     )
 
 
-@jitted
+@part
 def _write(rows: Any, row: int, vector: Any) -> None:
     rows[row, 0], rows[row, 1], rows[row, 2] = vector
 
 
-@jitted
+@part
 def _plus(a: Any, times: float, b: Any) -> tuple[float, float, float]:
     return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]
 
 
-@jitted
+@part
 def _cross(a: Any, b: Any) -> tuple[float, float, float]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@jitted
+@part
 def _dot(a: Any, b: Any) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

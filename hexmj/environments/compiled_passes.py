@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
-from hexmj.jitted import jitted
+from hexmj.jitted import jitted, part
 from hexmj.stability import margins
 
 ROUNDING = 1e-6
@@ -137,7 +137,7 @@ def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any,
             seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
 
 
-@jitted
+@part
 def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
     """Write joints, orientation and velocities into the first numbers of `seen`; how many these are."""
     for j in range(joints):
@@ -157,7 +157,7 @@ def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
     return at + 6
 
 
-@jitted
+@part
 def _clearance(q: Any, turn: Any, corners: Any) -> float:
     """Height of the trunk's lowest corner [mm]."""
     lowest = np.inf
@@ -187,10 +187,10 @@ def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time:
     (_, qvel, rotation, now), (done, steps), (reward, fell, over), any_over = places, time, said, False
     for i, n in enumerate(ids):
         done[n] += 1
-        for part in range(trunk[0], trunk[1]):
-            fell[n] |= now[n, part] > 0
+        for one in range(trunk[0], trunk[1]):
+            fell[n] |= now[n, one] > 0
             for t in range(sensors.shape[1]):
-                fell[n] |= sensors[i, t, part] > 0
+                fell[n] |= sensors[i, t, one] > 0
         over[n] = done[n] == steps and not fell[n]
         if not fell[n]:
             reward[n] = worth(qvel[n], rotation[n], command)

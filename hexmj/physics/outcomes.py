@@ -114,7 +114,7 @@ class OutcomesSoFar:
     def add(self, chunk: Chunk) -> None:
         """Take in one chunk of `drive.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
-        seen = chunk.qpos, chunk.sensors, chunk.targets, chunk.force, chunk.valid
+        seen = chunk.qpos, chunk.sensors, np.ascontiguousarray(chunk.targets), chunk.force, chunk.valid
         since = self._before, chunk.first, len(chunk.plan.time) * m, steps_in_chunk(m) * m
         _scan(seen, since, ids, self._body, self._scale, self._sums)
         n, last = np.arange(len(ids)), chunk.valid - 1
