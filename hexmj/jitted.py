@@ -12,8 +12,8 @@ njit: Any = numba.njit
 """Whose types tell not all of its options."""
 
 part = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""A function that only compiled ones call: Python, which would crash, has nothing to call it by, and it compiles in half
-of the time."""
+"""A function that only compiled ones call, for Python would crash.  Without what that would call it by, it compiles in
+half of the time."""
 
 inlined = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
 """The same, put into each of its callers."""
