@@ -62,7 +62,7 @@ assert first in ("", record())
 def used_record(folder: Path, how: str) -> subprocess.CompletedProcess[str]:
     (folder / "used.py").write_text("GAIN = 0.5")
     (folder / "controller.py").write_text("import used\n" + MINE)
-    command = [sys.executable, "-c", USED, how]
+    command = [sys.executable, "-B", "-c", USED, how]
     return subprocess.run(command, cwd=folder, env=WITHOUT_DASK, capture_output=True, text=True)
 
 
