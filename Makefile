@@ -17,9 +17,6 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
-# The tests start Python a thousand times: it keeps what it has compiled, whatever the environment says.
-unexport PYTHONDONTWRITEBYTECODE
-
 .PHONY: compare test slow thorough soak bench lint docs gallery system browser
 .DELETE_ON_ERROR:
 

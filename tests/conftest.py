@@ -1,5 +1,6 @@
 """What all tests share: the command, run in this process."""
 
+import os
 import signal
 import sys
 
@@ -7,6 +8,9 @@ import pytest
 
 from hexmj.user_code import opened_files
 from reader import computed  # noqa: F401
+
+sys.dont_write_bytecode = False  # what is compiled here a thousand processes use
+os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # which keep nothing of sources that a test edits within a second
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background, and so would what tests start
     signal.signal(signal.SIGINT, signal.default_int_handler)
