@@ -148,6 +148,8 @@ def _annotations(of: type) -> dict[str, Any]:
 
 def _fitted(value: Any, wanted: Any) -> Any:
     """The value as its type has it; a TypeError where it is of another."""
+    if type(value) is wanted and wanted is not float:
+        return value
     origin, inner = get_origin(wanted), get_args(wanted)
     if origin in (Union, UnionType):
         for one in inner:

@@ -64,14 +64,14 @@ class FineSteps:
         """
         m, end = self.substeps, control.shape[1]
         before, shown, struck = self._roll(ids, control, 0, end, 1)
-        for begin in range(0, end, m):
-            if (again := np.flatnonzero(struck == begin)).size:
-                few, then = ids[again], min(begin + m, end)
-                self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
-                _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
-                if then < end:
-                    _, rest, struck[again] = self._roll(few, control[again], then, end, 1)
-                    _show(shown, again, then, rest)
+        while (begin := struck.min(initial=end)) < end:
+            again, then = np.flatnonzero(struck == begin), min(begin + m, end)
+            few, struck[again] = ids[again], end
+            self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
+            _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
+            if then < end:
+                _, rest, struck[again] = self._roll(few, control[again], then, end, 1)
+                _show(shown, again, then, rest)
         return shown
 
     def _roll(

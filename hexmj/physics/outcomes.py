@@ -128,8 +128,8 @@ class OutcomesSoFar:
         depth = np.where(np.arange(chunk.depth.shape[1]) < until[:, None], chunk.depth, 0.0)
         self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
         share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
-        for commanded in share * chunk.plan.velocity[:, ids]:  # step by step: the same bits, however chunks are cut
-            self._commanded[ids] += commanded
+        steps = np.vstack([self._commanded[ids], share * chunk.plan.velocity[:, ids]])
+        self._commanded[ids] = np.add.accumulate(steps)[-1]  # step by step: the same bits, however chunks are cut
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
         _, measured, _ = measured_walk(chunk, settled, stable)
         if measured.stance.size:
