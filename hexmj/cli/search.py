@@ -15,7 +15,7 @@ from hexmj.cli.walking_command import WalkingCommand
 from hexmj.errors import InputError
 from hexmj.process.progress import progress_bar
 from hexmj.process.threads import thread_count
-from hexmj.starts import SAMPLE
+from hexmj.starts import SAMPLE, check_draw
 from hexmj.storage.files import read_toml
 from hexmj.storage.literal import literal
 from hexmj.storage.results import results_folder, save_dataset, save_text
@@ -97,7 +97,8 @@ class Search(WalkingCommand):
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
-        fresh = Sample(problem, self._size(self.verdict_starts, 7 * SAMPLE, 200), self.verdict_seed)
+        size = self._size(self.verdict_starts, 7 * SAMPLE, 200)
+        fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts"))
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
         found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
         with progress_bar("judging") as progress:
