@@ -81,18 +81,19 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     Raises:
         InputError: labels of other legs, or of one twice.
     """
-    if not behind and hasattr(values, "columns"):
-        values = values.T if {*values.index} == {*LEGS} else values
-        labels = [*values.columns]
-    else:
-        labels = [*values.index] if hasattr(values, "iloc") else []
-    if "leg" in getattr(values, "coords", ()) and "leg" not in values.dims and values.coords["leg"].dims:
-        values = values.swap_dims({values.coords["leg"].dims[0]: "leg"})
-    if "leg" in getattr(values, "dims", ()):
-        others = [axis for axis in values.dims if axis != "leg"]
-        values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
-        labels = [*values.coords["leg"].values] if "leg" in values.coords else []
-    numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted(labels)
+    labels = [] if behind else [*getattr(values, "columns", ())]
+    if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
+        values = values.T if not behind and {*values.index} == {*LEGS} else values
+        labels = [*values.axes[-1 - behind]]
+    elif hasattr(values, "dims"):  # of xarray
+        known = getattr(values, "coords", {})
+        if "leg" in known and "leg" not in values.dims and len(known["leg"].dims) == 1:
+            values = values.swap_dims({known["leg"].dims[0]: "leg"})
+        if "leg" in values.dims:
+            others = [axis for axis in values.dims if axis != "leg"]
+            values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
+            labels = [*values.coords["leg"].values] if "leg" in known else []
+    numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
         return values
     places = [labels.index(leg) for leg in LEGS if leg in labels]

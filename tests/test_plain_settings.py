@@ -186,6 +186,9 @@ def test_what_code_can_tell_apart_is_no_one_cell() -> None:
         ({"stride": 1, "order": 2}, {"stride": 1, "order": 3}),
         ((1.0, 2.0), np.array([1.0, 2.0])),
         ((0, 1), [0, 1]),
+        ({"list": (0, 1)}, [0, 1]),
+        ("tripod", Path("tripod")),
+        (np.zeros(0, dtype=np.int64), np.zeros(0)),
         (np.zeros((0, 3)), np.zeros((0, 6))),
     ):
         assert plain(one, exact=True) != plain(other, exact=True)

@@ -12,6 +12,7 @@ from hexmj.cli.options import AS_THEY_ARE, STEADY, Accelerating, Controlled, Wal
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import check_distinct
+from hexmj.measures.captions import starts_in_words
 from hexmj.storage.attributes import settings
 from hexmj.studies.ablation import study
 from hexmj.studies.ablation.figure import ablation_figure
@@ -59,8 +60,10 @@ class Ablate(StudyCommand):
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """A table for each measure, and the conditions."""
         for measure, title in study.MEASURES.items():
-            yield f"{measure}: {title}; frequency, and how far it is above the whole's (* for sure)"
-            yield from _tables(result.sel(measure=measure))
+            one = result.sel(measure=measure)
+            starts = starts_in_words(one.frequency_starts.max().item())
+            yield f"{measure}: {title}; frequency in {starts}, and how far it is above the whole's (* for sure)"
+            yield from _tables(one)
         yield from (f"{words}: {', '.join(names)}" for words, names in settings(result)["not_printed"].items())
         yield self.conditions_line()
 

@@ -85,7 +85,10 @@ class Compare(StudyCommand):
         frequencies, answers = _tables(result)
         yield "Frequency of the loss of static stability, with 95 % intervals"
         yield frequencies
-        yield "Starts that lost on paper and fell (both), did either (kin., phys.) or none; speed over command"
+        yield (
+            "Starts that lost on paper and fell (both), did either (kin., phys.) or none; speed over command, from the"
+            " least to the greatest of those that did not fall"
+        )
         yield answers
         yield self.conditions_line()
         yield report_line(physical_report(result))

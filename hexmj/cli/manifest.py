@@ -2,7 +2,6 @@
 
 import json
 import platform
-import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -15,7 +14,7 @@ import numpy as np
 from hexmj.cli import command_words
 from hexmj.cli.loaded import check_loaded
 from hexmj.errors import InputError
-from hexmj.storage.files import DIGEST, WRITTEN, digest_of, read_text
+from hexmj.storage.files import DIGEST, STAMP, WRITTEN, digest_of, read_text
 from hexmj.storage.literal import literal
 from hexmj.storage.results import json_text, save_text
 from hexmj.sweeps.code import code
@@ -37,9 +36,6 @@ KINDS = {
     "files": "changed since they were written",
 }
 """What may differ -> what it is called."""
-
-STAMP = re.compile("@[0-9a-f]{12}")
-"""Of a loaded file, in the name of its module."""
 
 SHOWN = 8
 """Most names of a kind in a sentence."""
@@ -132,6 +128,8 @@ def manifests(result: Path) -> dict[Path, Manifest]:
     Raises:
         InputError: there is none, or one makes no sense.
     """
+    if result.is_file() and result.suffix != ".json":
+        raise InputError(f"{result} is no manifest; expected one, or a folder that a hexmj command wrote results to")
     paths = sorted(result.glob(f"*{MANIFEST}")) if result.is_dir() else [result]
     if not paths:
         raise InputError(f"{result} holds no {MANIFEST}; expected a folder that a hexmj command wrote results to")

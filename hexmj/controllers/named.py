@@ -23,6 +23,9 @@ from hexmj.user_code.loaded import importable
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points by which other packages bring controllers: a name and `module:object`."""
 
+NO_FILE = "expected the path of one from the current folder; ~ is expanded by shells, in front of a word"
+"""What is said of a file that is not there."""
+
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
 
@@ -58,6 +61,8 @@ def load_controller(name: str) -> Controller:
     if path.suffix == ".py" and isfile(path):
         return _found(name, "", name)
     if not isfile(path):
+        if path.suffix in (".py", ".toml"):
+            raise InputError(f"controller {name!r} is no file; {NO_FILE}")
         raise InputError(
             f"controller {name!r} is neither one of {', '.join(known_names())}, nor a TOML file that exists,"
             " nor module:object or file.py:object"
@@ -150,4 +155,4 @@ def _module(where: str, name: str) -> ModuleType:
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
     finally:
         os.chdir(here)  # which some files change
-    raise InputError(f"controller {name!r}: {where} is no file; expected one that ends in .py")
+    raise InputError(f"controller {name!r}: {where} is no file; {NO_FILE}")

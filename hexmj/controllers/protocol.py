@@ -48,7 +48,8 @@ class Plan(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """What a robot knows of itself at the end of a step, for the starts that still walk."""
+    """What a robot knows of itself at the end of a step, for the starts that still walk; contact, load and torques are
+    those of the beginning of its last physics step."""
 
     ids: np.ndarray
     """(n,) which starts these are: rows of the plan's own arrays."""

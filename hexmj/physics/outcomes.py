@@ -52,7 +52,7 @@ class Outcomes:
     tilt: np.ndarray
     """(start,) greatest angle between the trunk's vertical and the world's [rad]."""
     speed: np.ndarray
-    """(start,) distance walked ahead over distance commanded, until the fall; NaN at V = 0."""
+    """(start,) distance walked ahead, as it stood at first, over distance commanded, until the fall; NaN at V = 0."""
     slip: np.ndarray
     """(start,) mean sliding speed of a foot in contact [mm/s]."""
     tracking: np.ndarray

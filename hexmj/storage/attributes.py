@@ -31,7 +31,8 @@ def attributes(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def settings(result: "xr.Dataset") -> dict[str, Any]:
-    """All that a result was made with, from its attributes: controllers, window, starts, seed, conditions.
+    """All that a result was made with, from its attributes: controllers, window, starts, seed, conditions; by the names
+    of the study's fields, as `n_starts` of `league`, `ablate` and `variants`.
 
     Args:
         result: of `compare`, `flss` or any study, fresh or read from its file.

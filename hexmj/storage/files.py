@@ -5,6 +5,7 @@ A sealed file ends with a checksum of all that stands before it: 80 bytes that r
 
 import hashlib
 import os
+import re
 import stat
 import time
 import tomllib
@@ -34,6 +35,9 @@ WRITING: set[Path] = set()
 
 DIGEST = 12
 """Digits of a digest."""
+
+STAMP = re.compile(f"@[0-9a-f]{{{DIGEST}}}")
+"""A digest behind the name of what it is of."""
 
 SETTLED = 2_000_000_000
 """Age of a file's last change from which on its times tell whether it was touched, whatever their resolution [ns]."""

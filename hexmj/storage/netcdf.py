@@ -14,6 +14,9 @@ from hexmj.storage.literal import literal
 if TYPE_CHECKING:
     import xarray as xr
 
+_NO_LOCK: Any = False
+"""HDF5 has its own; one of xarray's stays locked in a process that is forked while another thread has it."""
+
 TAKEN = {"coordinates"}
 """Attributes of the whole that readers of NetCDF take for orders, and away."""
 
@@ -50,7 +53,7 @@ def encode(data: "xr.Dataset") -> bytes:
     content = io.BytesIO()
     try:
         with h5netcdf.File(content, "w") as file:  # in to_netcdf xarray would ask Dask's cluster for a lock
-            plain.compute().dump_to_store(H5NetCDFStore(file))
+            plain.compute().dump_to_store(H5NetCDFStore(file, lock=_NO_LOCK))
     except (TypeError, ValueError, OverflowError, NotImplementedError, AttributeError) as error:
         raise InputError(
             f"NetCDF cannot hold this: {literal(str(error))}; expected arrays, numbers and texts"
@@ -100,14 +103,15 @@ def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":
     """
     import h5netcdf
     import xarray as xr
+    from xarray.backends import H5NetCDFStore
 
     if content is None:
         raise InputError(otherwise)
     try:
         with h5netcdf.File(io.BytesIO(content), "r") as file:
             claimed = sum(math.prod(one.shape) * one.dtype.itemsize for one in file.variables.values())
-        if claimed <= len(content):
-            return xr.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
+            if claimed <= len(content):
+                return xr.load_dataset(H5NetCDFStore(file, lock=_NO_LOCK), decode_times=False)
     except Exception as error:  # whatever the libraries make of what is sealed, but not by `encode`
         raise InputError(f"{otherwise} ({type(error).__name__})") from None
     raise InputError(otherwise)

@@ -24,7 +24,6 @@ from hexmj.user_code.opened_files import (
     heard,
     opened_by,
     seen,
-    serves,
     spelled,
 )
 
@@ -89,11 +88,11 @@ class Cell:
         """While it is computed: what it opens beyond what its settings name is noted."""
         return computing(self._told_files(), files_of_classes(self._modules()))
 
-    def tell(self, read: Mapping[str, str], not_kept: str) -> None:
+    def tell(self, read: Mapping[str, str], not_kept: str, to_a_cell: bool) -> None:
         """Let those who sweep this one know what it has read, and a cell that does also what its settings name, and
         why it is not kept, unless it is."""
-        named = map(spelled, self._told_files() if serves() else ())
-        also_read(_beyond({*_files(read), *filter(os.path.isfile, named)}, ()), not_kept)
+        named = map(spelled, self._told_files() if to_a_cell else ())
+        also_read(_beyond({*_files(read), *named}, ()), not_kept, to_a_cell)
 
     def read(self) -> tuple[dict[str, str], str]:
         """What its code may have read that its record does not tell, file -> digest, empty of one that is not there, or
@@ -102,7 +101,7 @@ class Cell:
         try:
             sources, told = sources_of_users(self._modules()), self._told_files()
             if swept := doubt(sources):
-                return {}, f"{self.name} is not kept: {swept}; start the program again"
+                return {}, f"{self.name} is not kept: {swept}"
             unheard, named = data_of_users(self._modules())
             files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
@@ -222,4 +221,4 @@ def difference(one: str, other: str) -> str:
     while isinstance(a, dict) and isinstance(b, dict):
         names.append(next(name for name in sorted({*a, *b}) if a.get(name) != b.get(name)))
         a, b = a.get(names[-1]), b.get(names[-1])
-    return " of ".join(reversed([name for name in names if name != "of"]))
+    return " of ".join(reversed([name for name in names if name != "of" and not name.startswith("\0")]))

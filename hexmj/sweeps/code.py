@@ -211,12 +211,11 @@ def _follow(modules: frozenset[str]) -> _Needed:
             if file is None and top in installed:
                 missing |= {name, f"{name}.{attribute}" if attribute.strip(_ALL) else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())
-    from hexmj.sweeps.packages import version
+    from hexmj.sweeps.packages import versions
 
-    versions = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    versions |= {name: version(name) for name in sorted(names)}
+    told = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"} | versions(sorted(names))
     theirs = [(file, module.texts) for _, file, module in read if not file.is_relative_to(PACKAGE)]
-    return _Needed(sources, versions, read, theirs, missing)
+    return _Needed(sources, told, read, theirs, missing)
 
 
 def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:

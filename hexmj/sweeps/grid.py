@@ -22,13 +22,16 @@ from hexmj.sweeps.cells import Cell, check_unchanged, difference, holds, unlike
 from hexmj.sweeps.cluster import has_given_up
 from hexmj.sweeps.kept_cells import check_free, find, write
 from hexmj.sweeps.parcels import pickled_cell
-from hexmj.user_code.opened_files import also_read, remembered
+from hexmj.user_code.opened_files import also_read, remembered, serves
 
 if TYPE_CHECKING:
     import xarray as xr
 
     Made = tuple[xr.Dataset, dict[str, str], str]
     """The data of a cell, what else its code has read, and why it is not kept; see `Cell.read`."""
+
+FAILED = "a cell that was swept elsewhere has failed: nobody knows what it has read; start the program again"
+"""Why those who have swept it are not kept."""
 
 _Task = tuple[Cell, str, Path | None]
 """A cell, its record and its file; empty and None where nothing is kept."""
@@ -65,7 +68,7 @@ def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) 
     """The result of a study; arguments and errors as of `finish`."""
     if not (hasattr(study, "cells") and hasattr(study, "result")):
         raise InputError(f"study = {short(study)}; expected one that has cells and a result")
-    cells = study.cells()
+    cells = [typed("a cell", cell, Cell) for cell in typed("cells", study.cells(), Sequence)]
     before = [cell.settings_now() for cell in cells]
     result = study.result(run(cells, folder, **how))
     for cell, settings in zip(cells, before, strict=True):
@@ -110,8 +113,7 @@ def finish(
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", cells, Sequence)]
     tasks: list[_Task] = [(cell, "", None) for cell in cells]
     if folder:
-        named = [(cell, cell.record()) for cell in cells]
-        tasks = [(cell, record, folder / f"{cell.stem(record)}.nc") for cell, record in named]
+        tasks = [(cell, record := cell.record(), folder / f"{cell.stem(record)}.nc") for cell in cells]
         finished_all = all(path and os.path.exists(path) for _, _, path in tasks)
         (remove_leftovers if finished_all else prepare)(folder)
     work, done, warned = sum(cell.work for cell in cells), [0.0] * len(cells), False
@@ -126,11 +128,11 @@ def finish(
         made = ((i, _made(*task, threads=threads, progress=partial(tell, i))) for i, task in enumerate(tasks))
     else:
         made = _elsewhere(executor, tasks, folder, threads or 1)
-    before: dict[str, str] = {}
+    before, by_a_cell = dict[str, str](), serves()
     for cell in cells:
-        cell.tell({}, "")  # which may fail
+        cell.tell({}, "", by_a_cell)  # counts even if the cell fails
     for i, (data, read, not_kept) in made:
-        cells[i].tell(read, not_kept)
+        cells[i].tell(read, not_kept, by_a_cell)
         if (told := unlike(cells[i].name, before, read) or (not_kept if folder else "")) and not warned:
             warned = True
             warn(told, stacklevel=2)
@@ -182,7 +184,9 @@ def _made(cell: Cell, record: str, path: Path | None, **execution: Any) -> "Made
     return write(path, record, read, data) if path and not not_kept else data, read, not_kept
 
 
-def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: int, mark: Path | None) -> "Made":
+def _made_by_a_worker(
+    pickled: bytes, record: str, path: Path | None, threads: int, sender: tuple[str, int], mark: Path | None
+) -> "Made":
     """A cell, by a worker that sees what it was sent from: files, code, packages, and the folder that holds `mark` as
     long as somebody waits."""
     here = f"a worker on {socket.gethostname()}"
@@ -202,16 +206,21 @@ def _made_by_a_worker(pickled: bytes, record: str, path: Path | None, threads: i
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
     try:
         return _made(cell, record, path, threads=threads)
-    except Exception as error:
-        if not _travels(error):
+    except BaseException as error:
+        if sender != _process() and not _travels(error):
             raise RuntimeError(f"{type(error).__name__}: {error}") from error
         raise
 
 
-def _travels(error: Exception) -> bool:
+def _process() -> tuple[str, int]:
+    """This process, among those of all machines."""
+    return socket.gethostname(), os.getpid()
+
+
+def _travels(error: BaseException) -> bool:
     """Whether an error can be pickled and read again; else it would break a pool of processes."""
     try:
-        return isinstance(pickle.loads(pickle.dumps(error)), Exception)
+        return isinstance(pickle.loads(pickle.dumps(error)), BaseException)
     except Exception:
         return False
 
@@ -225,13 +234,14 @@ def _elsewhere(
         if path and (kept := _kept(cell, record, path)):
             yield i, kept
         else:
-            parcels[i] = partial(_made_by_a_worker, pickled_cell(cell), record or cell.record(), path, threads)
+            told = pickled_cell(cell), record or cell.record(), path, threads, _process()
+            parcels[i] = partial(_made_by_a_worker, *told)
     yield from _by_others(executor, parcels, folder)
 
 
 def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path | None) -> Iterator[tuple[int, "Made"]]:
     """What an executor's workers make of parcels, each with its place, as soon as it is there."""
-    futures: dict[Future[Made], int] = {}
+    by_a_cell, futures = serves(), dict[Future["Made"], int]()
     done: SimpleQueue[Future[Made]] = SimpleQueue()  # hears of cancelled ones, too, as `as_completed` does not
     with marked(folder) if folder and parcels else nullcontext() as mark:
         try:
@@ -243,13 +253,13 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                 future = done.get()
                 try:
                     data, read, not_kept = future.result()
-                except Exception:
-                    also_read(set(), "a cell that was swept elsewhere has failed: nobody knows what it has read")
+                    if other := [file for file in read if remembered(file) and not holds(file, read[file])]:
+                        raise InputError(
+                            f"a worker has another {other[0]} than the sender; start it again, where it has the same"
+                        )
+                except BaseException:
+                    also_read(set(), FAILED, by_a_cell)
                     raise
-                if other := [file for file in read if remembered(file) and not holds(file, read[file])]:
-                    raise InputError(
-                        f"a worker has another {other[0]} than the sender; start it again, where it has the same"
-                    )
                 yield futures.pop(future), (data, read, not_kept)
         except BrokenExecutor:
             raise InputError(

@@ -15,6 +15,7 @@ from hexmj.checks import numbers, path_of, typed
 from hexmj.errors import InputError
 from hexmj.storage.files import opened
 from hexmj.sweeps.cells import Cell, check_unchanged, unlike
+from hexmj.user_code.opened_files import serves
 
 
 class KeptValues:
@@ -63,12 +64,12 @@ class KeptValues:
             UserWarning: values are not kept, or of a file that has changed since, as of `finish`.
         """
         rows = np.ascontiguousarray(rows, dtype=float)
-        keys = [row.tobytes() for row in rows]
+        keys, by_a_cell = [row.tobytes() for row in rows], serves()
         self._replayed |= self._held.intersection(keys)
         new = {key: i for i, key in enumerate(keys) if key not in self._values}
         if new:
             picked = rows[list(new.values())]
-            self._cell.tell({}, "")  # it may fail
+            self._cell.tell({}, "", by_a_cell)  # counts even if it fails
             with self._cell.computing():
                 given = self._cell.compute(picked, threads=self._threads)
             values = numbers(f"what {self._cell.name} gives", given)
@@ -88,7 +89,7 @@ class KeptValues:
                     lines = (self._line(*one, read) for one in zip(new, values.tolist(), strict=True))
                     _add(self._path, "".join(lines))
             self._values |= zip(new, values.tolist(), strict=True)
-        self._cell.tell(self._read, self._not_kept)
+        self._cell.tell(self._read, self._not_kept, by_a_cell)
         return np.array([self._values[key] for key in keys])
 
     @property

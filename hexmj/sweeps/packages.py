@@ -1,13 +1,13 @@
 """Installed packages as a cell's name tells them: by versions, and by files where these may change alone."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import Distribution, PackageNotFoundError, packages_distributions, requires
 from importlib.util import find_spec
 from pathlib import Path
 
-from packaging.requirements import Requirement
+from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
 from hexmj.storage.files import digest, digest_of
@@ -17,41 +17,83 @@ NAMES = {"PIL": "pillow"}
 installed takes a third of a second."""
 
 
+LARGE = 1_000_000
+"""Files of more bytes are told as they were installed, since compiled libraries of some packages hold gigabytes."""
+
+
+def versions(modules: Iterable[str]) -> dict[str, str]:
+    """Of some modules, see `version`, and of all that their distributions require, beyond what this package does."""
+    told = {name: version(name) for name in modules}
+    waiting: list[tuple[Distribution, set[str]]] = [(one, {""}) for name in told for one in _distributions(name)]
+    for one, extras in waiting:
+        for requirement in () if _is_required(one) else _requirements(one):
+            name, marker = canonicalize_name(requirement.name), requirement.marker
+            if name not in told and (not marker or any(marker.evaluate({"extra": extra}) for extra in extras)):
+                with suppress(PackageNotFoundError):
+                    inner = Distribution.from_name(name)
+                    told[name] = f"{inner.version}{_files(inner)}"
+                    waiting.append((inner, {""} | requirement.extras))
+    return told
+
+
 @cache
 def version(module: str) -> str:
     """Of the distributions that a module comes from, each with a digest of its files unless this package requires it: a
-    helper of a user's own may be installed anew, or edited where it lies, with the same version.  Of a module of none,
-    that of its own files.
+    helper of a user's own may be installed anew, or edited where it lies, with the same version.  Where nothing tells
+    what was installed, that of the module's own files.
     """
+    found = _distributions(module)
+    told = sorted(f"{one.version}{_files(one)}" for one in found)
+    if not any("@" in one for one in told) and not any(map(_is_required, found)):
+        told.append(_of_no_distribution(module))
+    return " ".join(told)
+
+
+def _distributions(module: str) -> list[Distribution]:
     try:
-        found = [Distribution.from_name(NAMES.get(module, module))]
+        return [Distribution.from_name(NAMES.get(module, module))]
     except PackageNotFoundError:
-        found = [Distribution.from_name(one) for one in {*packages_distributions().get(module, ())}]
-    return " ".join(sorted(f"{one.version}{_files(one)}" for one in found)) or _of_no_distribution(module)
+        return [Distribution.from_name(one) for one in {*packages_distributions().get(module, ())}]
+
+
+def _requirements(distribution: Distribution) -> Iterator[Requirement]:
+    for one in distribution.requires or ():
+        with suppress(InvalidRequirement):
+            yield Requirement(one)
+
+
+def _is_required(distribution: Distribution) -> bool:
+    return canonicalize_name(distribution.name) in _required()
 
 
 def _files(distribution: Distribution) -> str:
-    """A digest of all that was installed beside metadata and scripts, which tell where it lies: of Python's files as
-    they are, of others as they were installed."""
-    if canonicalize_name(distribution.name) in _required():
+    """A digest of all that was installed beside metadata and scripts, which tell where it lies."""
+    if _is_required(distribution):
         return ""
     files = [one for one in distribution.files or () if ".." not in one.parts and ".dist-info" not in one.parts[0]]
-    return _digest((str(one), _now(Path(str(one.locate()))) or one.hash.value) for one in files if one.hash)
+    told = list[tuple[str, str]]()
+    for one in files:
+        path = Path(str(one.locate()))
+        if one.hash and not (path.is_file() and path.stat().st_size <= LARGE):
+            told.append((str(one), one.hash.value))
+        else:  # a folder is one that was linked
+            told += [(f"{one}/{name}", held) for name, held in _held(path)]
+    return _digest(told)
 
 
 def _of_no_distribution(module: str) -> str:
     """Without a version, a digest of all files of a module that was copied there."""
     spec = find_spec(module)
-    folders = [Path(one) for one in (spec and spec.submodule_search_locations) or ()]
-    alone = [Path(spec.origin)] if spec and spec.has_location and spec.origin and not folders else []
-    places = [(one, one.parent) for one in alone] + [(one, folder) for folder in folders for one in folder.rglob("*")]
-    files = [(one, folder) for one, folder in places if one.is_file() and "__pycache__" not in one.parts]
-    return f"unknown{_digest((one.relative_to(folder).as_posix(), digest_of(one)) for one, folder in files)}"
+    alone = [Path(spec.origin)] if spec and spec.has_location and spec.origin else []
+    places = [Path(one) for one in (spec and spec.submodule_search_locations) or alone]
+    return f"unknown{_digest(one for place in places for one in _held(place))}"
 
 
-def _now(file: Path) -> str:
-    """A digest of a file of Python; none of others."""
-    return digest_of(file) if file.suffix == ".py" and file.is_file() else ""
+def _held(place: Path) -> Iterator[tuple[str, str]]:
+    """Digests of a file, or of all in a folder but what Python compiles, by their names from there."""
+    for one in [place] if place.is_file() else place.rglob("*"):
+        if one.is_file() and "__pycache__" not in one.parts:
+            yield one.relative_to(place.parent).as_posix(), digest_of(one)
 
 
 def _digest(told: Iterable[tuple[str, str]]) -> str:

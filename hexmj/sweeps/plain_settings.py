@@ -24,8 +24,9 @@ from hexmj.user_code.sources_as_run import is_users
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
 
-ORDER = "\0order"
-"""Key beside those of a dict that are not sorted, for their order; no name that anybody gives."""
+ORDER, LIST, ARRAY, PATH = "\0order", "\0list", "\0array", "\0path"
+"""Keys, no names that anybody gives: beside those of a dict that are not sorted, for their order; and of a list, an
+array and a path, which would be told as a tuple or a text is."""
 
 NUMBERS = np.bool_, np.int64, np.float64
 """Types of numbers in arrays that are settings."""
@@ -42,7 +43,8 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
     Args:
         value: of the setting.
         folders: where files are looked for, beside the current one.
-        exact: tell also the shape of an array, lists from tuples and the order of a dict, which code may go by.
+        exact: tell also the type and shape of an array, lists from tuples, paths from texts and the order of a dict,
+            which code may go by.
 
     Raises:
         InputError: it is none of the things that a setting can be.
@@ -57,7 +59,7 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         of_class = [*folders, *_folders(type(value))]
         return {"class": label(type(value))} | {name: plain(getattr(value, name), of_class, exact) for name in names}
     if type(value) is np.ndarray and value.dtype in NUMBERS:
-        return {"array": value.tolist(), "shape": list(value.shape)} if exact else value.tolist()
+        return {ARRAY: [str(value.dtype), list(value.shape), value.tolist()]} if exact else value.tolist()
     if isinstance(value, np.generic) and value.dtype in NUMBERS:
         return value.item()
     if type(value) is str and (folders or "." in value) and (held := _held(value, folders)):
@@ -66,14 +68,15 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         return value
     if type(value) is list or type(value) is tuple:
         items = [plain(item, folders, exact) for item in value]
-        return {"list": items} if exact and type(value) is list else items
+        return {LIST: items} if exact and type(value) is list else items
     if type(value) is dict and all(isinstance(key, str) for key in value):
         told = {key: plain(item, folders, exact) for key, item in value.items()}
         return told | {ORDER: list(value)} if exact and sorted(value) != list(value) else told
     if isinstance(value, Path):
         if value.is_dir():
             raise InputError(f"{value}, a folder, is no setting; expected files in fields, or its name as a text")
-        return f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
+        name = f"{_place(value, folders)}@{held}" if (held := _held(value, folders)) else str(value)
+        return {PATH: name} if exact else name
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple,"
         " member of an enumeration, or a tuple, dict or array (float64, int64, bool) of these"

@@ -80,13 +80,13 @@ _AT_FIRST: dict[str, tuple[int, ...]] = {}
 def computing(told: Iterable[Path], sources: set[str]) -> Iterator[None]:
     """While this thread computes a cell that tells some files by itself and whose classes stand in some sources."""
     mine = threading.get_ident()
-    outer = _COMPUTING.get(mine)
-    _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | (outer[1] if outer else set())
+    outer = _COMPUTING.get(mine, _NOTHING)
+    _COMPUTING[mine] = {os.path.realpath(file) for file in told}, sources | outer[1]
     try:
         yield
     finally:
         _COMPUTING.pop(mine, None)
-        if outer:
+        if outer is not _NOTHING:
             _COMPUTING[mine] = outer
 
 
@@ -105,16 +105,17 @@ def opened_by(sources: set[str]) -> set[str]:
     return set[str]().union(*(_OPENED.get(one, ()) for one in (*sources, _ANYBODY))) if sources else set[str]()
 
 
-def also_read(files: set[str], not_kept: str) -> None:
-    """Note for whose code is being called what a cell that it has swept has read; and, if that is of a cell that is
-    being computed, why the other one is not kept, unless it is."""
+def also_read(files: set[str], not_kept: str, by_a_cell: bool) -> None:
+    """Note for whose code is being called what a cell that it has swept has read; and, if a cell has swept it, why it
+    is not kept, unless it is."""
     new = {file for file in files if _is_data(file) and not _counts_by_itself(os.path.realpath(file))}
     whose = _whose(sys._getframe(1))
     for one in whose:
         _OPENED.setdefault(one, set()).update(new)
-    if serves():
+    if by_a_cell:
         seen(files)
-        _DOUBTS.update(dict.fromkeys(whose, not_kept) if not_kept else {})
+        for one in whose if not_kept else ():
+            _DOUBTS.setdefault(one, not_kept)
 
 
 def doubt(sources: set[str]) -> str:
@@ -191,11 +192,13 @@ def _note(file: str, opener: FrameType, read: bool) -> None:
 
 
 def _whose(opener: FrameType, file: str = "") -> set[str]:
-    """The user's sources that may know of what is opened: called functions' and those of the cell that this thread
-    computes; `_ANYBODY` where another thread than the main one has none, unless it looks at sources for no cell."""
-    found = _callers(opener, file) | _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
+    """The sources that may know of what is opened: called functions' and those of the cell that this thread computes;
+    `_ANYBODY`, too, where another thread than the main one has none of a user's, unless it looks at sources for no
+    cell."""
+    found, of_cell = _callers(opener, file), _COMPUTING.get(threading.get_ident(), _NOTHING)[1]
     aside = threading.current_thread() is not threading.main_thread() and (_COMPUTING or not file.endswith(".py"))
-    return found or ({_ANYBODY} if aside else set())
+    unknown = aside and not of_cell and not any(map(_is_code_of_users, found))
+    return found | of_cell | ({_ANYBODY} if unknown else set())
 
 
 def _counts_by_itself(really: str) -> bool:
@@ -216,21 +219,19 @@ def _is_of_a_sweep(opener: FrameType) -> bool:
 
 
 def _callers(frame: FrameType, file: str = "") -> set[str]:
-    """The user's sources of which functions or modules are being called; no script for a `.py` that it has this package
-    load, as a controller."""
+    """The sources of which functions or modules are being called, but Python's and ours; no script for a `.py` that it
+    has this package load, as a controller."""
     found, ours = set[str](), False
     for one, _ in walk_stack(frame):
         by = one.f_code.co_filename
         ours |= by.startswith(_OURS)
         loads = ours and file.endswith(".py") and one.f_globals.get("__name__") in _SCRIPTS
-        if _is_code_of_users(by) and not loads:
+        if not (loads or by.startswith((_OURS, "<")) or _is_of_python(by)):
             found.add(os.path.abspath(by))
     return found
 
 
-@cache
-def _is_code_of_users(by: str) -> bool:
-    return not by.startswith("<") and is_users(os.path.abspath(by))
+_is_code_of_users = cache(is_users)
 
 
 @cache

@@ -18,7 +18,7 @@ LONGEST = 1000
 
 _ONE = Lock()
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=lambda: globals().update(_ONE=Lock()))  # whose holder stays with the parent
+    os.register_at_fork(before=_ONE.acquire, after_in_parent=_ONE.release, after_in_child=_ONE.release)
 
 
 def parsed(source: bytes) -> ast.Module:

@@ -136,7 +136,7 @@ def _trials(shown: "xr.Dataset") -> Table:
         falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
         rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
     v = shown.attrs["tried_at"]
-    title = f"Falls at V = {v:g} in {starts_in_words(most)}; at last losses on paper without a leg.  {TOLD}"
+    title = f"Falls at V = {v:g} in {starts_in_words(most)}; at last losses on paper, mean of three lost legs.  {TOLD}"
     return Table(title, ("controller", *shown.trial.values, "paper"), rows)
 
 
