@@ -4,6 +4,7 @@ import base64
 import importlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -129,31 +130,81 @@ print(json.dumps(code(frozenset({{importable("{mine}").__name__}})).versions))
 
 def version_of_my_helper(mine: Path, folder: Path) -> tuple[str, str]:
     """Of `my_helper` in a folder of installed packages, and of NumPy, as a cell's name tells them."""
+    found = versions_with(mine, folder)
+    return found["my_helper"], found["numpy"]
+
+
+def versions_with(mine: Path, folder: Path) -> dict[str, str]:
+    """All that a cell's name tells of packages whose code imports `my_helper` in a folder of installed packages."""
     mine.write_text("import my_helper\nimport numpy")
     environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join([WITHOUT_DASK["PYTHONPATH"], str(folder)])}
     command = [sys.executable, "-c", VERSIONS.format(mine=mine)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    found = json.loads(done.stdout or done.stderr)
-    return found["my_helper"], found["numpy"]
+    return json.loads(done.stdout or done.stderr)
 
 
 def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_path: Path) -> None:
     """Installed anew from elsewhere, installed anew with other content, and edited where it lies."""
     found = []
     for i, (text, where) in enumerate((("GAIN = 1", "a"), ("GAIN = 1", "b"), ("GAIN = 2", "b"))):
-        told = (folder := tmp_path / str(i) / "site-packages") / "my_helper-1.0.dist-info"
-        told.mkdir(parents=True)
-        (folder / "my_helper.py").write_text(text)
-        (told / "METADATA").write_text("Metadata-Version: 2.1\nName: my-helper\nVersion: 1.0\n")
-        (told / "direct_url.json").write_text(where)
-        rows = {"my_helper.py": text, "my_helper-1.0.dist-info/direct_url.json": where, "../bin/my_helper": where}
-        sums = {name: base64.urlsafe_b64encode(sha256(held.encode()).digest()) for name, held in rows.items()}
-        (told / "RECORD").write_text("".join(f"{name},sha256={sums[name].decode()},8\n" for name in rows))
+        folder = tmp_path / str(i) / "site-packages"
+        rows = {"my_helper.py": text, "gains.txt": "1", "my_helper-1.0.dist-info/direct_url.json": where}
+        install(folder, "my_helper", "1.0", rows | {"../bin/my_helper": where})
         found.append(version_of_my_helper(tmp_path / "mine.py", folder))
-    (tmp_path / "0" / "site-packages" / "my_helper.py").write_text("GAIN = 3")
-    edited = version_of_my_helper(tmp_path / "mine.py", tmp_path / "0" / "site-packages")
-    assert found[0] == found[1] and len({*found, edited}) == 3
+    for name in ("my_helper.py", "gains.txt"):
+        (tmp_path / "0" / "site-packages" / name).write_text("GAIN = 3")
+        found.append(version_of_my_helper(tmp_path / "mine.py", tmp_path / "0" / "site-packages"))
+    assert found[0] == found[1] and len({*found}) == 4
     assert found[0][1] == np.__version__ and found[0][0].startswith("1.0@")
+
+
+def install(folder: Path, name: str, version: str, files: dict[str, str], more: str = "") -> None:
+    """Put files into a folder of installed packages, with what tells of them."""
+    told = folder / f"{name}-{version}.dist-info"
+    told.mkdir(parents=True)
+    (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{more}")
+    rows = []
+    for file, text in files.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text(text)
+        rows.append(f"{file},sha256={base64.urlsafe_b64encode(sha256(text.encode()).digest()).decode()},8\n")
+    (told / "RECORD").write_text("".join(rows))
+
+
+@pytest.mark.slow
+def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
+    """Directly or not; but not what it requires elsewhere, or as an extra that nobody asked for."""
+    more = 'Requires-Dist: deep-helper[fast]\nRequires-Dist: other; extra == "more"\nRequires-Dist: not a name\n'
+    deep = 'Requires-Dist: deepest (>0) ; extra == "fast"\nRequires-Dist: other; sys_platform == "nowhere"\n'
+    install(folder := tmp_path / "site-packages", "my_helper", "1.0", {"my_helper.py": "import deep_helper"}, more)
+    install(folder, "Deep.Helper", "1.0", {"deep_helper.py": "import deepest"}, deep)
+    found = []
+    for version, text in (("1.0", "GAIN = 1"), ("1.0", "GAIN = 2"), ("2.0", "GAIN = 2")):
+        for name in ("deepest", "other"):
+            install(folder, name, version, {f"{name}.py": text})
+        found.append(versions_with(tmp_path / "mine.py", folder))
+        assert "other" not in found[-1]
+        for name in ("deepest", "other"):
+            shutil.rmtree(folder / f"{name}-{version}.dist-info")
+    assert len({one["deepest"] for one in found}) == 3
+    assert len({one["deep-helper"] for one in found}) == len({one["my_helper"] for one in found}) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("record", ["my_helper,,\n", None])
+def test_an_installed_helper_that_was_linked_or_has_no_list_of_files_counts_by_them(
+    tmp_path: Path, record: str | None
+) -> None:
+    (source := tmp_path / "source").mkdir()
+    install(folder := tmp_path / "site-packages", "my_helper", "1.0", {})
+    list_of_files = folder / "my_helper-1.0.dist-info" / "RECORD"
+    list_of_files.write_text(record) if record else list_of_files.unlink()
+    (folder / "my_helper").symlink_to(source)
+    found = []
+    for text in ("GAIN = 1", "GAIN = 2"):
+        (source / "__init__.py").write_text(text)
+        found.append(version_of_my_helper(tmp_path / "mine.py", folder)[0])
+    assert found[0] != found[1]
 
 
 @pytest.mark.slow

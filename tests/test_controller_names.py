@@ -62,6 +62,9 @@ def mine(tmp_path, monkeypatch):
     path = tmp_path / "mine_of_a_user.py"
     path.write_text(MINE)
     (tmp_path / "broken.py").write_text("import nothing_of_this_name\n")
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "helps_it.py").write_text("")
+    (tmp_path / "deep" / "helped.py").write_text("import helps_it\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     yield path
@@ -281,8 +284,10 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("x" * 5000, "is neither one of"),
         ("nowhere.toml", "'nowhere.toml' is no file; expected the path of one"),
         ("nowhere.py:Still", "nowhere.py is no file; expected the path of one from the current folder"),
+        ("~/nowhere.py:Still", "~ is expanded by shells"),
+        ("deep/helped.py:Still", "No module named 'helps_it'; it lies beside it: expected to run in that folder"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
-        ("broken.py:Still", "broken.py cannot be loaded"),
+        ("broken.py:Still", "broken.py cannot be loaded: ModuleNotFoundError: No module named 'nothing_of_this_name'$"),
         ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched"),
         ("mine_of_a_user.py:Switched-without-1", "Switched-without-1' cannot be made: KeyError: 1; expected a"),
         ("mine_of_a_user.py:Switched-without-3", "Switched-without-3: controller = None; expected a controller"),

@@ -5,8 +5,12 @@ import os
 import py_compile
 import subprocess
 import sys
+import time
+import warnings
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -31,8 +35,21 @@ def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_process_that_is_forked_while_a_source_is_parsed_parses_its_own() -> None:
-    with parsing._alone():
-        child = get_context("fork").Process(target=parsing.parsed, args=(b"1",))
+    begun = Event()
+
+    def parses() -> None:
+        with parsing._alone():
+            begun.set()
+            time.sleep(0.3)
+
+    def hears() -> None:
+        parsing.parsed(b"1")
+        sys.exit(("ignore", None, Warning, None, 0) in warnings.filters)
+
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(parses)
+        begun.wait()
+        child = get_context("fork").Process(target=hears)
         child.start()
     child.join(20)
     child.kill()

@@ -228,6 +228,8 @@ def test_a_manifest_that_makes_no_sense_gets_a_sentence(run, flss, content, sent
 def test_no_manifest_gets_a_sentence(run, tmp_path):
     assert "holds no manifest.json" in run("rerun", tmp_path)[2]
     assert "nowhere cannot be read: No such file" in run("rerun", tmp_path / "nowhere")[2]
+    file = save_dataset(row([1.0]), tmp_path / "flss.nc")
+    assert "flss.nc is no manifest; expected one, or a folder" in run("rerun", file)[2]
 
 
 def test_a_result_that_cannot_be_read_gets_a_sentence_before_anything_is_repeated(run, flss, monkeypatch):
@@ -396,3 +398,10 @@ def row(values: object, *axes: str, **attributes: object) -> xr.Dataset:
 def test_all_that_a_netcdf_file_tells_counts(tmp_path, old, new, name):
     paths = [save_dataset(one, tmp_path / f"{n}.nc") for n, one in enumerate((old, new))]
     assert [one.name for one in compared(*paths) if one.differ] == [name]
+
+
+def test_digests_of_files_in_texts_are_the_manifests_to_compare(tmp_path):
+    told = ["mine.py@0123456789ab.Tripod", "mine.py@ba9876543210.Tripod", "mine.py@ba9876543210.Wave"]
+    paths = [save_dataset(row([1.0], k=one), tmp_path / f"{n}.nc") for n, one in enumerate(told)]
+    assert not any(one.differ for one in compared(paths[0], paths[1]))
+    assert [one.name for one in compared(paths[0], paths[2]) if one.differ] == ["(attributes)"]

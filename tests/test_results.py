@@ -4,6 +4,7 @@ import io
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,24 @@ import pytest
 import xarray as xr
 from matplotlib.text import Text
 from PIL import Image
+from xarray.backends.locks import HDF5_LOCK
 
 import hexmj
 from hexmj.errors import InputError
 from hexmj.plots import FIGURES
 from hexmj.search.stages import search
+from hexmj.storage import netcdf
 from hexmj.sweeps import Study, conduct
 from tiers import few_of
+
+
+def test_data_are_kept_and_read_though_xarray_s_lock_is_held() -> None:
+    """As it stays in a process that is forked while another thread of its parent has it."""
+    data = xr.Dataset({"a": ("x", np.arange(3.0))})
+    with ThreadPoolExecutor(1) as aside, HDF5_LOCK:
+        made = aside.submit(lambda: netcdf.decode(netcdf.encode(data), "")).result(timeout=20)
+    assert made.identical(data)
+
 
 ALPHA = "ß: 1 $"
 """A name that JSON escapes, and that figures would set as a formula."""

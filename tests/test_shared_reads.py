@@ -136,7 +136,6 @@ def test_what_a_cell_tells_counts_for_one_that_sweeps_it_in_a_thread_or_goes_on_
 @dataclass(frozen=True)
 class Picky:
     file: str
-    note: str = "no file"
     def cell(self):
         return xr.Dataset({"gain": gain}) if (gain := float(Path(self.file).read_text())) > 0 else {}
 
@@ -152,14 +151,58 @@ def swept():
     assert what_was_read() == {"one/gain"}
 
 
+@pytest.mark.parametrize("kind", ["Path", "str"])
+@pytest.mark.parametrize("pool", ["", "Process", "Thread"])
 @pytest.mark.usefixtures("computed")
-def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_a_swept_cell_missed_counts_for_the_outer_one(
+    monkeypatch: pytest.MonkeyPatch, pool: str, kind: str
+) -> None:
+    pool = pool and f", executor=__import__('concurrent.futures').futures.{pool}PoolExecutor(1)"
+    inner = "hexmj.sweeps.Cell('inner', Missing().cell, {})"
+    Path("reader.py").write_text(
+        READER.format(gain=f"hexmj.sweeps.run([{inner}]{pool})[0].gain.item()")
+        + f"""
+@dataclass(frozen=True)
+class Missing:
+    file: {kind} = {kind}("two/late")
+    def cell(self):
+        return xr.Dataset({{"gain": tried(self.file)}})
+"""
+    )
+    for gain in (0.0, 5.0):
+        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+        assert data.gain == gain
+        another_program(monkeypatch)
+        Path("two/late").write_text("5.0")
+
+
+@pytest.mark.parametrize("at_import", [False, True])
+@pytest.mark.usefixtures("computed")
+def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.MonkeyPatch, at_import: bool) -> None:
     Path("site-packages").mkdir()
-    Path("site-packages/my_reader.py").write_text(READER.format(gain="float(Path('one/gain').read_text())"))
+    gain = "float(Path('one/gain').read_text())"
+    text = f"{READER.format(gain='GAIN')}\nGAIN = {gain}" if at_import else READER.format(gain=gain)
+    name = f"my_reader_{at_import}"
+    Path(f"site-packages/{name}.py").write_text(text)
     monkeypatch.syspath_prepend("site-packages")
-    (data,) = run([Cell("reader", importlib.import_module("my_reader").Reader().cell, {})], Path("kept"))
+    (data,) = run([Cell("reader", importlib.import_module(name).Reader().cell, {})], Path("kept"))
     assert data.gain == 1.0
     assert what_was_read() == {"one/gain"}
+
+
+@pytest.mark.usefixtures("computed")
+def test_a_sweep_in_threads_that_begins_in_a_thread_keeps_what_it_may() -> None:
+    """It serves no cell: those that its own threads compute are none that it works for."""
+    Path("reader.py").write_text(READER.format(gain="tried('one/gain')"))
+    Path("bad_reader.py").write_text(READER.format(gain="runpy.run_path(f'{at}/gain.py')['GAIN']"))
+    cells = [
+        Cell("bad", importable("bad_reader.py").Reader().cell, {}),
+        *(Cell(f"good{n}", importable("reader.py").Reader(file=f"file {n}").cell, {}) for n in range(3)),
+    ]
+    told = pytest.warns(UserWarning, match="bad is not kept: its code opens or runs")
+    with ThreadPoolExecutor(1) as aside, ThreadPoolExecutor(2) as workers, told:
+        aside.submit(run, cells, Path("kept"), executor=workers).result()
+    assert len([*Path("kept").glob("good*.nc")]) == 3
 
 
 def test_what_a_cached_function_has_swept_before_counts(

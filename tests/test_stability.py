@@ -141,3 +141,10 @@ def test_unknown_after_a_fall():
     margin = walk_margin(walked)
     assert np.isnan(margin[50:, 1]).all()
     assert not np.isnan(margin[:, 0]).any()
+
+
+def test_a_foot_that_does_not_stand_may_be_unknown():
+    walked = walk(np.zeros((1, 6)), LDVS, 0.5, 30.0)
+    margin = walk_margin(walked)
+    walked.x[~walked.stance] = np.nan
+    assert np.array_equal(walk_margin(walked), margin)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import sparse
 
 import hexmj
 from hexmj import sweeps
@@ -350,6 +351,21 @@ def test_labelled_legs_may_come_in_any_order():
     for labels in ([*"abcdef"], [*LEGS[:5], "L1"], [1, 0, 2, 3, 4, 5]):
         with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
             walk(labelled.assign_coords(leg=labels))
+    assert np.array_equal(walk(Table(table[shuffled])).x, walk(starts).x)
+    numbered = labelled.drop_vars("leg").rename(leg="i").assign_coords(leg=(("start", "i"), starts))
+    assert np.array_equal(walk(numbered).x, walk(starts).x)
+    with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
+        walk(sparse.coo_array(starts))
+
+
+class Table:
+    """As polars has one: it knows its columns, and no index."""
+
+    def __init__(self, table: Any) -> None:
+        self.columns, self._values = [*table.columns], table.to_numpy()
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self._values, dtype=dtype)
 
 
 def test_labelled_legs_of_a_posture_may_come_in_any_order():
