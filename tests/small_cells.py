@@ -43,10 +43,11 @@ class Wave:
 
 
 class OfALeg(Exception):
-    """Cannot be unpickled, as those cannot that make a sentence of what they are given."""
+    """Cannot be pickled, nor unpickled, as those cannot that make a sentence of what they are given."""
 
     def __init__(self, leg: int, why: str) -> None:
         super().__init__(f"leg {leg} {why}")
+        self.why = lambda: why
 
 
 def slips(leg: int) -> xr.Dataset:

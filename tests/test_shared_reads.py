@@ -193,7 +193,7 @@ def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.
 @pytest.mark.usefixtures("computed")
 def test_a_sweep_in_threads_that_begins_in_a_thread_keeps_what_it_may() -> None:
     """It serves no cell: those that its own threads compute are none that it works for."""
-    Path("reader.py").write_text(READER.format(gain="tried('one/gain')"))
+    Path("reader.py").write_text(READER.format(gain="[tried('one/gain'), __import__('time').sleep(0.3)][0]"))
     Path("bad_reader.py").write_text(READER.format(gain="runpy.run_path(f'{at}/gain.py')['GAIN']"))
     cells = [
         Cell("bad", importable("bad_reader.py").Reader().cell, {}),
