@@ -61,7 +61,8 @@ class Search(WalkingCommand):
     """Individuals of a generation; the paper's L."""
     domain: float = 10.0
     """The first population's shifts [mm] and weights are drawn from 0 to this, neutral positions [mm] from minus this
-    to this; not printed in the paper.  Fields of a controller of your own: from 0 to this times the usual value."""
+    to this; not printed in the paper.  Fields of a controller of your own: from 0 to this times the usual value,
+    or to this where that is 0."""
     begin: str | None = None
     """A controller from which the population begins, with its order of updates and reading unless they are given;
     without it the paper's '0'-individual (evolution), the middle of the domain (cmaes), or the usual values of a
