@@ -87,6 +87,10 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         labels = [*values.axes[-1 - behind]]
     elif hasattr(values, "dims"):  # of xarray
         known = getattr(values, "coords", {})
+        legs = [axis for axis in values.dims if axis in known and {*map(str, known[axis].values)} == {*LEGS}]
+        if "leg" not in {*values.dims, *known} and len(legs) == 1:
+            values = values.rename({legs[0]: "leg"})
+            known = values.coords
         if "leg" in known and "leg" not in values.dims and len(known["leg"].dims) == 1:
             values = values.swap_dims({known["leg"].dims[0]: "leg"})
         if "leg" in values.dims:

@@ -173,11 +173,15 @@ def install(folder: Path, name: str, version: str, files: dict[str, str], more: 
 
 @pytest.mark.slow
 def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
-    """Directly or not; but not what it requires elsewhere, or as an extra that nobody asked for."""
-    more = 'Requires-Dist: deep-helper[fast]\nRequires-Dist: other; extra == "more"\nRequires-Dist: not a name\n'
+    """Directly or not, for an extra that another one asks for; but not what it requires elsewhere, or for an extra that
+    nobody asks for.  One is there in part."""
+    more = "Requires-Dist: deep-helper\nRequires-Dist: plain\nRequires-Dist: bare\nRequires-Dist: not a name\n"
+    more += 'Requires-Dist: other; extra == "more"\n'
     deep = 'Requires-Dist: deepest (>0) ; extra == "fast"\nRequires-Dist: other; sys_platform == "nowhere"\n'
     install(folder := tmp_path / "site-packages", "my_helper", "1.0", {"my_helper.py": "import deep_helper"}, more)
     install(folder, "Deep.Helper", "1.0", {"deep_helper.py": "import deepest"}, deep)
+    install(folder, "plain", "1.0", {}, "Requires-Dist: deep-helper[fast]\n")
+    (folder / "bare-1.0.dist-info").mkdir()
     found = []
     for version, text in (("1.0", "GAIN = 1"), ("1.0", "GAIN = 2"), ("2.0", "GAIN = 2")):
         for name in ("deepest", "other"):
@@ -187,6 +191,7 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
         for name in ("deepest", "other"):
             shutil.rmtree(folder / f"{name}-{version}.dist-info")
     assert len({one["deepest"] for one in found}) == 3
+    assert found[0]["bare"].startswith("None")
     assert len({one["deep-helper"] for one in found}) == len({one["my_helper"] for one in found}) == 1
 
 

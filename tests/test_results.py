@@ -27,7 +27,7 @@ from tiers import few_of
 
 def test_data_are_kept_and_read_though_xarray_s_lock_is_held() -> None:
     """As it stays in a process that is forked while another thread of its parent has it."""
-    data = xr.Dataset({"a": ("x", np.arange(3.0))})
+    data = xr.Dataset({"a": ("x", np.arange(3.0))}, coords={"x": ["für", "ω", "a"]})
     with ThreadPoolExecutor(1) as aside, HDF5_LOCK:
         made = aside.submit(lambda: netcdf.decode(netcdf.encode(data), "")).result(timeout=20)
     assert made.identical(data)

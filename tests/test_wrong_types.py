@@ -354,6 +354,8 @@ def test_labelled_legs_may_come_in_any_order():
     assert np.array_equal(walk(Table(table[shuffled])).x, walk(starts).x)
     numbered = labelled.drop_vars("leg").rename(leg="i").assign_coords(leg=(("start", "i"), starts))
     assert np.array_equal(walk(numbered).x, walk(starts).x)
+    for axes in ({"leg": "dim_1"}, {"leg": "legs"}):
+        assert np.array_equal(walk(labelled.sel(leg=shuffled).rename(axes).T).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 

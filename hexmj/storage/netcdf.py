@@ -108,7 +108,7 @@ def decode(content: bytes | None, otherwise: str) -> "xr.Dataset":
     if content is None:
         raise InputError(otherwise)
     try:
-        with h5netcdf.File(io.BytesIO(content), "r") as file:
+        with h5netcdf.File(io.BytesIO(content), "r", decode_vlen_strings=True) as file:
             claimed = sum(math.prod(one.shape) * one.dtype.itemsize for one in file.variables.values())
             if claimed <= len(content):
                 return xr.load_dataset(H5NetCDFStore(file, lock=_NO_LOCK), decode_times=False)

@@ -207,9 +207,10 @@ def _made_by_a_worker(
     try:
         return _made(cell, record, path, threads=threads)
     except BaseException as error:
-        if sender != _process() and not _travels(error):
-            raise RuntimeError(f"{type(error).__name__}: {error}") from error
-        raise
+        if sender == _process() or _travels(error):
+            raise
+        told = f"{type(error).__name__}: {error}"
+    raise RuntimeError(told)  # of which the error is no context, that something may want to pickle as well
 
 
 def _process() -> tuple[str, int]:

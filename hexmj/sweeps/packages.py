@@ -24,15 +24,17 @@ LARGE = 1_000_000
 def versions(modules: Iterable[str]) -> dict[str, str]:
     """Of some modules, see `version`, and of all that their distributions require, beyond what this package does."""
     told = {name: version(name) for name in modules}
-    waiting: list[tuple[Distribution, set[str]]] = [(one, {""}) for name in told for one in _distributions(name)]
-    for one, extras in waiting:
+    waiting, seen = [(one, "") for name in told for one in _distributions(name)], set[tuple[str, str]]()
+    for one, extra in waiting:
         for requirement in () if _is_required(one) else _requirements(one):
-            name, marker = canonicalize_name(requirement.name), requirement.marker
-            if name not in told and (not marker or any(marker.evaluate({"extra": extra}) for extra in extras)):
-                with suppress(PackageNotFoundError):
-                    inner = Distribution.from_name(name)
-                    told[name] = f"{inner.version}{_files(inner)}"
-                    waiting.append((inner, {""} | requirement.extras))
+            if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
+                continue
+            name = canonicalize_name(requirement.name)
+            with suppress(PackageNotFoundError):
+                inner, new = Distribution.from_name(name), {(name, more) for more in ("", *requirement.extras)} - seen
+                told.setdefault(name, version(name))
+                waiting += [(inner, more) for _, more in sorted(new)]
+                seen |= new
     return told
 
 
@@ -63,7 +65,7 @@ def _requirements(distribution: Distribution) -> Iterator[Requirement]:
 
 
 def _is_required(distribution: Distribution) -> bool:
-    return canonicalize_name(distribution.name) in _required()
+    return canonicalize_name(str(distribution.name)) in _required()  # none where its metadata are not there
 
 
 def _files(distribution: Distribution) -> str:

@@ -44,8 +44,10 @@ def importable(path: str | Path) -> ModuleType:
         told = f"{type(error).__name__}: {error}"
         if isinstance(error, ImportError) and (error.name or "").startswith("hexmj.user_code"):
             told = "it imports relatively; expected module:object of its package, or a file that stands alone"
-        if isinstance(error, ModuleNotFoundError) and path.with_name(f"{error.name}.py").is_file():
-            told += "; it lies beside it: expected to run in that folder, or with that in PYTHONPATH"
+        if isinstance(error, ModuleNotFoundError):
+            name = (error.name or "").partition(".")[0]
+            if name and any((path.parent / f"{name}{end}").exists() for end in (".py", os.sep)):
+                told += "; it lies beside it: expected to run in that folder, or with that in PYTHONPATH"
         raise InputError(f"{path} cannot be loaded: {told}") from error
 
 
