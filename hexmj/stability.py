@@ -66,7 +66,7 @@ def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
     typed("walk", walk, Walk)
     margin = stability_margin(walk.feet, walk.stance, threads)
-    return np.where(np.isnan(walk.x).all(axis=-1), np.nan, margin)
+    return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 
 
 def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Laws of static stability: the margin changes sign exactly where stability is lost."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -148,3 +150,6 @@ def test_a_foot_that_does_not_stand_may_be_unknown():
     margin = walk_margin(walked)
     walked.x[~walked.stance] = np.nan
     assert np.array_equal(walk_margin(walked), margin)
+    walked.stance[:] = False
+    nowhere = replace(walked, y=np.full_like(walked.y, np.nan))
+    assert np.isnan(walk_margin(nowhere)).all()
