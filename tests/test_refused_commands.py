@@ -72,7 +72,7 @@ NONSENSE = [
     (["walk", "--start", "-1"], "at least 0"),
     (["walk", "--physical", "--step-height", "40"], "step_height = 40.0; expected above 0 and at most 14 mm"),
     (["walk", "--physical", "--vp", "nan"], "vp = nan; expected"),
-    (["compare", "--models", "nowhere.toml"], "nor a TOML file"),
+    (["compare", "--models", "nowhere.toml"], "is no file; expected the path"),
     (["compare", "--models", "ldvs", "ldvs"], "none of them twice"),
     (["flss", "--window", "1e300"], "at most"),
     (["flss", "--starts", "100000000000000"], "at most 100000000"),
