@@ -176,7 +176,7 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
     """Directly or not, for an extra that another one asks for; but not what it requires elsewhere, or for an extra that
     nobody asks for.  One is there in part."""
     more = "Requires-Dist: deep-helper\nRequires-Dist: plain\nRequires-Dist: bare\nRequires-Dist: not a name\n"
-    more += 'Requires-Dist: other; extra == "more"\n'
+    more += 'Requires-Dist: other; extra == "more"\nRequires-Dist: other; sys_platform ~= "linux"\n'
     deep = 'Requires-Dist: deepest (>0) ; extra == "fast"\nRequires-Dist: other; sys_platform == "nowhere"\n'
     install(folder := tmp_path / "site-packages", "my_helper", "1.0", {"my_helper.py": "import deep_helper"}, more)
     install(folder, "Deep.Helper", "1.0", {"deep_helper.py": "import deepest"}, deep)

@@ -66,6 +66,7 @@ def mine(tmp_path, monkeypatch):
     (tmp_path / "deep" / "helps_it.py").write_text("")
     (tmp_path / "deep" / "helped.py").write_text("import helps_it\n")
     (tmp_path / "deep" / "helping").mkdir()
+    (tmp_path / "submodule.py").write_text("import deep.missing\n")
     (tmp_path / "deep" / "helped_too.py").write_text("import helping.it\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -289,6 +290,7 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("~/nowhere.py:Still", "~ is expanded by shells"),
         ("deep/helped.py:Still", "No module named 'helps_it'; it lies beside it: expected to run in that folder"),
         ("deep/helped_too.py:Still", "No module named 'helping'; it lies beside it"),
+        ("submodule.py:Still", r"No module named 'deep.missing'$"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
         ("broken.py:Still", "broken.py cannot be loaded: ModuleNotFoundError: No module named 'nothing_of_this_name'$"),
         ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched"),

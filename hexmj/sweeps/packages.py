@@ -7,6 +7,7 @@ from importlib.metadata import Distribution, PackageNotFoundError, packages_dist
 from importlib.util import find_spec
 from pathlib import Path
 
+from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
 from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
@@ -27,10 +28,10 @@ def versions(modules: Iterable[str]) -> dict[str, str]:
     waiting, seen = [(one, "") for name in told for one in _distributions(name)], set[tuple[str, str]]()
     for one, extra in waiting:
         for requirement in () if _is_required(one) else _requirements(one):
-            if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
-                continue
             name = canonicalize_name(requirement.name)
-            with suppress(PackageNotFoundError):
+            with suppress(PackageNotFoundError, UndefinedComparison, UndefinedEnvironmentName):
+                if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
+                    continue
                 inner, new = Distribution.from_name(name), {(name, more) for more in ("", *requirement.extras)} - seen
                 told.setdefault(name, version(name))
                 waiting += [(inner, more) for _, more in sorted(new)]

@@ -45,8 +45,8 @@ def importable(path: str | Path) -> ModuleType:
         if isinstance(error, ImportError) and (error.name or "").startswith("hexmj.user_code"):
             told = "it imports relatively; expected module:object of its package, or a file that stands alone"
         if isinstance(error, ModuleNotFoundError):
-            name = (error.name or "").partition(".")[0]
-            if name and any((path.parent / f"{name}{end}").exists() for end in (".py", os.sep)):
+            name = str(error.name or ".")
+            if "." not in name and any((path.parent / f"{name}{end}").exists() for end in (".py", os.sep)):
                 told += "; it lies beside it: expected to run in that folder, or with that in PYTHONPATH"
         raise InputError(f"{path} cannot be loaded: {told}") from error
 
