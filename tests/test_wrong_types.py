@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import sparse
 
 import hexmj
 from hexmj import sweeps
@@ -22,7 +21,6 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
 from hexmj.gaits import gait, limit_gait
-from hexmj.legs import LEGS
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
 from hexmj.paper.protocol import FULL
@@ -335,66 +333,6 @@ def test_numbers_of_numpy_are_numbers():
     falls = hexmj.physical_flss(LDVS, [0.3], n_starts=np.int8(2), **few)  # pyright: ignore
     assert falls.identical(hexmj.physical_flss(LDVS, [0.3], n_starts=2, **few))
     assert one_start(walk(), np.int64(1)).x.shape == (50, 1, 6)  # pyright: ignore
-
-
-def test_labelled_legs_may_come_in_any_order():
-    starts = hexmj.draw_starts(6, 0)
-    labelled = xr.DataArray(starts, dims=("start", "leg"), coords={"leg": [*LEGS]})
-    shuffled = ["L1", "R1", "L2", "R2", "L3", "R3"]
-    table: Any = labelled.to_pandas()
-    for given in (labelled.sel(leg=shuffled), labelled.T, table[shuffled], labelled.drop_vars("leg").T):
-        assert np.array_equal(walk(given).x, walk(starts).x)
-    assert not np.array_equal(walk(labelled.sel(leg=shuffled).to_numpy()).x, walk(starts).x)
-    assert np.array_equal(walk(labelled.assign_coords(leg=range(6))).x, walk(starts).x)
-    with pytest.raises(hexmj.InputError, match=r"^starts have the shape \(6,\)"):
-        walk(labelled[0])
-    for labels in ([*"abcdef"], [*LEGS[:5], "L1"], [1, 0, 2, 3, 4, 5]):
-        with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
-            walk(labelled.assign_coords(leg=labels))
-    assert np.array_equal(walk(Table(table[shuffled])).x, walk(starts).x)
-    numbered = labelled.drop_vars("leg").rename(leg="i").assign_coords(leg=(("start", "i"), starts))
-    assert np.array_equal(walk(numbered).x, walk(starts).x)
-    for axes in ({"leg": "dim_1"}, {"leg": "legs"}):
-        assert np.array_equal(walk(labelled.sel(leg=shuffled).rename(axes).T).x, walk(starts).x)
-    with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
-        walk(sparse.coo_array(starts))
-
-
-class Table:
-    """As polars has one: it knows its columns, and no index."""
-
-    def __init__(self, table: Any) -> None:
-        self.columns, self._values = [*table.columns], table.to_numpy()
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self._values, dtype=dtype)
-
-
-def test_labelled_legs_of_a_posture_may_come_in_any_order():
-    feet, stands = np.broadcast_to(FEET[0], (8, 6, 2)).copy(), np.random.default_rng(1).random((8, 6)) < 0.8
-    margin, shuffled = hexmj.stability_margin(feet, stands), ["R1", "L2", "R3", "L1", "L3", "R2"]
-    tips = xr.DataArray(feet, dims=("step", "leg", "xy"), coords={"leg": [*LEGS]})
-    down = xr.DataArray(stands, dims=("step", "leg"), coords={"leg": [*LEGS]})
-    table: Any = down.to_pandas()
-    for one in (feet, tips.sel(leg=shuffled), tips.transpose("leg", "step", "xy"), tips.drop_vars("leg")):
-        for other in (stands, down.sel(leg=shuffled), down.T, table[shuffled]):
-            assert np.array_equal(hexmj.stability_margin(one, other), margin)
-    polygon = hexmj.support_polygon(feet[0], stands[0])
-    places: Any = tips[0].to_pandas()
-    for one in (places, places.loc[shuffled]):
-        assert np.array_equal(hexmj.support_polygon(one, table.iloc[0][shuffled]), polygon)
-    for name in ("feet", "stance"):
-        with pytest.raises(hexmj.InputError, match=f"^{name} = "):
-            hexmj.stability_margin(**{"feet": feet, "stance": stands, name: down.to_dataset(name="down")})
-    along = down.rename(leg="i").assign_coords(leg=("i", [*LEGS])).drop_vars("i")[:, ::-1]
-    assert np.array_equal(hexmj.stability_margin(feet, along), margin)
-    assert np.array_equal(hexmj.stability_margin(feet[:6], table[shuffled][:6].T), margin[:6])
-    assert len(hexmj.support_polygon(places.loc[["R2", "L3", "L1"]], [1, 1, 1])) == 3
-    assert np.array_equal(hexmj.stability_margin(places.set_axis(range(6, 12)), stands[0]), margin[0])
-    with pytest.raises(hexmj.InputError, match=r"^feet \(6,\) and stance"):
-        hexmj.stability_margin(places.iloc[:, 0], stands[0])
-    with pytest.raises(hexmj.InputError, match=r"^stance of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
-        hexmj.stability_margin(feet, down.assign_coords(leg=[*"abcdef"]))
 
 
 def test_states_may_be_given_as_0_and_1():
