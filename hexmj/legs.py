@@ -74,7 +74,8 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers.
 
     Args:
-        values: of legs, or of some of them; an axis `leg` may stand anywhere, the others in their order.
+        values: of legs, or of some of them; an axis `leg`, or one that has all labels, may stand anywhere, the others
+            in their order.
         name: of the values, for sentences.
         behind: how many axes come after that of the legs.
 

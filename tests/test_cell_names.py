@@ -182,6 +182,7 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
     install(folder, "Deep.Helper", "1.0", {"deep_helper.py": "import deepest"}, deep)
     install(folder, "plain", "1.0", {}, "Requires-Dist: deep-helper[fast]\n")
     (folder / "bare-1.0.dist-info").mkdir()
+    (folder / "Deep.Helper-1.0.dist-info" / "RECORD").unlink()
     found = []
     for version, text in (("1.0", "GAIN = 1"), ("1.0", "GAIN = 2"), ("2.0", "GAIN = 2")):
         for name in ("deepest", "other"):
@@ -192,6 +193,8 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
             shutil.rmtree(folder / f"{name}-{version}.dist-info")
     assert len({one["deepest"] for one in found}) == 3
     assert found[0]["bare"].startswith("None")
+    (folder / "deep_helper.py").write_text("import deepest, json")
+    assert versions_with(tmp_path / "mine.py", folder)["deep-helper"] != found[0]["deep-helper"]
     assert len({one["deep-helper"] for one in found}) == len({one["my_helper"] for one in found}) == 1
 
 

@@ -17,7 +17,6 @@ NAMES = {"PIL": "pillow"}
 """Module -> distribution, of those that this package imports, where the names differ: to look through all that is
 installed takes a third of a second."""
 
-
 LARGE = 1_000_000
 """Files of more bytes are told as they were installed, since compiled libraries of some packages hold gigabytes."""
 
@@ -33,7 +32,7 @@ def versions(modules: Iterable[str]) -> dict[str, str]:
                 if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
                     continue
                 inner, new = Distribution.from_name(name), {(name, more) for more in ("", *requirement.extras)} - seen
-                told.setdefault(name, version(name))
+                told.setdefault(name, version(name.replace("-", "_")))  # as modules are mostly called
                 waiting += [(inner, more) for _, more in sorted(new)]
                 seen |= new
     return told
