@@ -5,6 +5,7 @@ paper's leg ``i + 1``: 1-3 on the left from front to rear, 4-6 on the right.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
@@ -70,12 +71,17 @@ CENTRED = Geometry(origins=(24.0, 0.0, -24.0))
 GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
 
 
+def _name_legs(labels: Iterable[Any]) -> bool:
+    """Whether one of some labels is a leg's name, if only in small letters."""
+    return not {str(one).upper() for one in labels}.isdisjoint(LEGS)
+
+
 def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers.
 
     Args:
-        values: of legs, or of some of them; an axis `leg`, or one that has all labels, may stand anywhere, the others
-            in their order.
+        values: of legs, or of some of them; an axis `leg`, or one that has labels of legs, may stand anywhere, the
+            others in their order.
         name: of the values, for sentences.
         behind: how many axes come after that of the legs.
 
@@ -84,20 +90,18 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     """
     labels = [] if behind else [*getattr(values, "columns", ())]
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
-        values = values.T if not behind and {*values.index} == {*LEGS} else values
+        values = values.T if not behind and _name_legs(values.index) and not _name_legs(labels) else values
         labels = [*values.axes[-1 - behind]]
     elif hasattr(values, "dims"):  # of xarray
-        known = getattr(values, "coords", {})
-        legs = [axis for axis in values.dims if axis in known and {*map(str, known[axis].values)} == {*LEGS}]
-        if "leg" not in {*values.dims, *known} and len(legs) == 1:
-            values = values.rename({legs[0]: "leg"})
-            known = values.coords
-        if "leg" in known and "leg" not in values.dims and len(known["leg"].dims) == 1:
-            values = values.swap_dims({known["leg"].dims[0]: "leg"})
-        if "leg" in values.dims:
-            others = [axis for axis in values.dims if axis != "leg"]
-            values = values.transpose(*others[: len(others) - behind], "leg", *others[len(others) - behind :])
-            labels = [*values.coords["leg"].values] if "leg" in known else []
+        single = {name: one for name, one in getattr(values, "coords", {}).items() if len(one.dims) == 1}
+        named = {one.dims[0]: one for one in single.values() if _name_legs(one.values)}
+        if "leg" in single:
+            named = {single["leg"].dims[0]: single["leg"]}
+        if "leg" in values.dims or len(named) == 1:
+            legs = "leg" if "leg" in values.dims else min(named)
+            others = [axis for axis in values.dims if axis != legs]
+            values = values.transpose(*others[: len(others) - behind], legs, *others[len(others) - behind :])
+            labels = [*named[legs].values] if legs in named else []
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
         return values

@@ -148,7 +148,11 @@ def test_an_installed_helper_counts_by_its_files_though_its_version_stays(tmp_pa
     found = []
     for i, (text, where) in enumerate((("GAIN = 1", "a"), ("GAIN = 1", "b"), ("GAIN = 2", "b"))):
         folder = tmp_path / str(i) / "site-packages"
-        rows = {"my_helper.py": text, "gains.txt": "1", "my_helper-1.0.dist-info/direct_url.json": where}
+        rows = {
+            "my_helper.py": text,
+            "gains.txt": "1",
+            "my_helper-1.0.dist-info/direct_url.json": f'{{"url": "{where}"}}',
+        }
         install(folder, "my_helper", "1.0", rows | {"../bin/my_helper": where})
         found.append(version_of_my_helper(tmp_path / "mine.py", folder))
     for name in ("my_helper.py", "gains.txt"):
@@ -196,6 +200,21 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
     (folder / "deep_helper.py").write_text("import deepest, json")
     assert versions_with(tmp_path / "mine.py", folder)["deep-helper"] != found[0]["deep-helper"]
     assert len({one["deep-helper"] for one in found}) == len({one["my_helper"] for one in found}) == 1
+
+
+@pytest.mark.slow
+def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_by_its_sources(tmp_path: Path) -> None:
+    """But not by what is installed within its folder."""
+    (source := tmp_path / "my project").mkdir()
+    origin = json.dumps({"url": source.as_uri(), "dir_info": {"editable": True}})
+    install(folder := tmp_path / "site-packages", "my_helper", "1.0", {"my_helper.py": ""}, "Requires-Dist: deep\n")
+    install(folder, "deep", "1.0", {"deep.pth": str(source), "deep-1.0.dist-info/direct_url.json": origin})
+    found = []
+    for name, text in (("deep.py", "GAIN = 1"), ("deep.py", "GAIN = 2"), (".venv/site-packages/other.py", "GAIN = 3")):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        (source / name).write_text(text)
+        found.append(versions_with(tmp_path / "mine.py", folder)["deep"])
+    assert found[0] != found[1] and found[1] == found[2]
 
 
 @pytest.mark.slow

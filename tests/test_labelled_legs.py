@@ -37,6 +37,14 @@ def test_labelled_legs_may_come_in_any_order():
     assert np.array_equal(walk(numbered).x, walk(starts).x)
     for axes in ({"leg": "dim_1"}, {"leg": "legs"}):
         assert np.array_equal(walk(labelled.sel(leg=shuffled).rename(axes).T).x, walk(starts).x)
+    foot = labelled.drop_vars("leg").rename(leg="k")
+    for axis, labels in (("k", shuffled), ("foot", shuffled), ("foot", [*LEGS[:5], "L1"]), ("k", ["l1", *LEGS[1:]])):
+        given = foot.sel(k=[LEGS.index(one.upper()) for one in labels]).assign_coords({axis: ("k", labels)})
+        if {*labels} == {*LEGS}:
+            assert np.array_equal(walk(given).x, walk(starts).x)
+            continue
+        with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
+            walk(given)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 

@@ -1,17 +1,21 @@
 """Installed packages as a cell's name tells them: by versions, and by files where these may change alone."""
 
+import json
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import Distribution, PackageNotFoundError, packages_distributions, requires
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
 from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
 from hexmj.storage.files import digest, digest_of
+from hexmj.user_code.sources_as_run import INSTALLED
 
 NAMES = {"PIL": "pillow"}
 """Module -> distribution, of those that this package imports, where the names differ: to look through all that is
@@ -80,7 +84,17 @@ def _files(distribution: Distribution) -> str:
             told.append((str(one), one.hash.value))
         else:  # a folder is one that was linked
             told += [(f"{one}/{name}", held) for name, held in _held(path)]
-    return _digest(told)
+    return _digest(told + _edited(distribution))
+
+
+def _edited(distribution: Distribution) -> list[tuple[str, str]]:
+    """Digests of the sources of a distribution that is installed to be edited, in the folder it tells of (PEP 610)."""
+    told = json.loads(distribution.read_text("direct_url.json") or "{}")
+    if not told.get("dir_info", {}).get("editable"):
+        return []
+    folder = Path(url2pathname(urlsplit(told["url"]).path))
+    found = [one for one in folder.rglob("*.py") if INSTALLED.isdisjoint(one.parts)]
+    return [(one.relative_to(folder).as_posix(), digest_of(one)) for one in found]
 
 
 def _of_no_distribution(module: str) -> str:
@@ -105,8 +119,8 @@ def _digest(told: Iterable[tuple[str, str]]) -> str:
 
 @cache
 def _required() -> set[str]:
-    """Distributions that this package requires, llvmlite by way of numba."""
+    """This package, whose modules a cell's name tells one by one, and what it requires, llvmlite by way of numba."""
     told = list[str]()
     with suppress(PackageNotFoundError):  # where it runs without having been installed
         told += requires("hexmj") or []
-    return {canonicalize_name(Requirement(one).name) for one in told} | {"llvmlite"}
+    return {canonicalize_name(Requirement(one).name) for one in told} | {"hexmj", "llvmlite"}
