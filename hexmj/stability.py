@@ -40,11 +40,13 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
         InputError: shapes that do not fit, or a standing foot that is nowhere.
     """
     tips, stands = _of_legs(feet, stance)
+    if tips.shape[-2:] != (6, 2) or stands.shape != tips.shape[:-1]:
+        raise InputError(f"feet {tips.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs")
+    return _margins_of(tips, stands, threads)
+
+
+def _margins_of(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np.ndarray:
     points = np.ascontiguousarray(tips)
-    if points.shape[-2:] != (6, 2) or stands.shape != points.shape[:-1]:
-        raise InputError(
-            f"feet {points.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs"
-        )
     if not np.isfinite(points[stands]).all():
         raise InputError(NOWHERE)
     shape = stands.shape[:-1]
@@ -65,7 +67,7 @@ def _of_legs(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
     typed("walk", walk, Walk)
-    margin = stability_margin(walk.feet, walk.stance, threads)
+    margin = _margins_of(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 
 

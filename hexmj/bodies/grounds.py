@@ -13,6 +13,9 @@ from hexmj.conditions import Ground
 BUMPS = (15, 9)
 """Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
 
+WITH_ENDS = "step", "hurdle", "gap"
+"""Grounds whose pieces end where nobody can see it; bumps end on the plane."""
+
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
 
@@ -67,12 +70,10 @@ def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.nda
 def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.ndarray:
     """Whether feet, spheres around (..., 3) in the world [mm], are beyond the ends of the pieces that were laid, (...).
 
-    There the ground is another than it is told; but bumps end on the plane, as anybody can see.
+    There the ground is another than it is told, of those `WITH_ENDS`.
     """
     x, y, near, far = feet[..., 0], feet[..., 1], ground.ground_at, lengths.ground_reach
     past = {"hurdle": near + ground.ground_length, "gap": near + ground.ground_length + far, "step": near + far}
-    if ground.ground not in past:
-        return np.zeros(x.shape, dtype=bool)
     begin, end = -far if ground.ground == "gap" else near, past[ground.ground]
     aside = (np.abs(y) > lengths.ground_half_width) & (x > begin) & (x < end)
     return aside | ((x > end) & (ground.ground != "hurdle")) | ((x < begin) & (ground.ground == "gap"))

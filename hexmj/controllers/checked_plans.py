@@ -140,11 +140,11 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
         raise InputError(f"a plan is at step {plan.done} after it was asked for {steps} more; expected {end}")
     if walk.stance.shape != (expected := (steps, *np.shape(plan.starts))):
         raise InputError(f"a plan was asked for {steps} steps, and gave {walk.stance.shape}; expected {expected}")
-    for name in ("time", "velocity", *PLANNED):
+    for name in ("time", "velocity", "x", "y", "aep", "height"):
         values = getattr(walk, name)
         may_be_unknown = name in ("aep", "height")
         bad = np.isinf(values) if may_be_unknown else ~np.isfinite(values)
-        if bad.any():
+        if np.count_nonzero(bad):
             at, known = np.argwhere(bad)[0], "a number, or NaN where nothing tells" if may_be_unknown else "a number"
             raise InputError(
                 f"a plan's {name} is {values[tuple(at)]} in {place(walk, at, end - steps)}; expected {known}"

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.grounds import beyond_the_ground
+from hexmj.bodies.grounds import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import Plan, ReadingPlan
 from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
@@ -78,7 +78,7 @@ class Walkers:
         self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
         self._grasps = task.conditions.contact.grasp > 0
-        self._ends = task.conditions.ground.ground != "flat"  # where ground is laid it ends somewhere
+        self._ends = task.conditions.ground.ground in WITH_ENDS
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.grounds import beyond_the_ground
+from hexmj.bodies.grounds import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
@@ -118,6 +118,8 @@ class Insects:
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
         """Refuse walks, (n, substep, column) until they fall, that lead beyond the ground that was laid."""
         conditions, body = self.settled.conditions, self.settled.conditions.body
+        if conditions.ground.ground not in WITH_ENDS:
+            return
         feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
         beyond = beyond_the_ground(conditions.ground, body.lengths, feet).any(axis=2)
         beyond &= np.arange(sensors.shape[1]) < valid[:, None]
