@@ -156,6 +156,17 @@ def test_mirrored_starts_give_mirrored_outcomes():
     assert one.speed == pytest.approx(other.speed, abs=0.01)
 
 
+def test_an_insect_alone_walks_as_among_others():
+    """To the last bit, though more of its plan is asked for at once; one of these falls."""
+    starts = draw_starts(1000, 0)[[3, 1]]
+    both = physical_outcomes(settle(starts), LDVS, 0.7, 34.5)
+    for i, start in enumerate(starts):
+        alone = physical_outcomes(settle(start[np.newaxis]), LDVS, 0.7, 34.5)
+        for name, values in vars(both).items():
+            assert np.array_equal(getattr(alone, name), values[i : i + 1]), name
+    assert np.isfinite(both.fall).any() and not np.isfinite(both.fall).all()
+
+
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
     with pytest.raises(SimulationError, match="start 0 did not settle in 1 ms"):
         settle(draw_starts(2, 0), Conditions.of(settling_time=1.0))

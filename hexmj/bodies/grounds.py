@@ -73,6 +73,8 @@ def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.
     There the ground is another than it is told, of those `WITH_ENDS`.
     """
     x, y, near, far = feet[..., 0], feet[..., 1], ground.ground_at, lengths.ground_reach
+    if ground.ground not in WITH_ENDS:
+        return np.zeros(x.shape, dtype=bool)
     past = {"hurdle": near + ground.ground_length, "gap": near + ground.ground_length + far, "step": near + far}
     begin, end = -far if ground.ground == "gap" else near, past[ground.ground]
     aside = (np.abs(y) > lengths.ground_half_width) & (x > begin) & (x < end)
