@@ -57,9 +57,9 @@ def draw_slabs(n_starts: int, seed: int, stride: Stride, first: int = 0) -> Iter
         yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - begin), 6))
 
 
-def check_draw(n_starts: int, seed: int, name: str = "starts") -> tuple[int, int]:
+def check_draw(n_starts: int, seed: int, name: str = "starts", seed_name: str = "seed") -> tuple[int, int]:
     """A number of starts and a seed, unless they make no sense."""
-    return whole(name, n_starts, 1, MOST_STARTS), whole("seed", seed, 0)
+    return whole(name, n_starts, 1, MOST_STARTS), whole(seed_name, seed, 0)
 
 
 def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:

@@ -61,6 +61,7 @@ def mine(tmp_path, monkeypatch):
     """A file of a user's own, which is also a module."""
     path = tmp_path / "mine_of_a_user.py"
     path.write_text(MINE)
+    (tmp_path / "notes.txt").write_text("")
     (tmp_path / "broken.py").write_text("import nothing_of_this_name\n")
     (tmp_path / "deep").mkdir()
     (tmp_path / "deep" / "helps_it.py").write_text("")
@@ -291,6 +292,8 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("deep/helped.py:Still", "No module named 'helps_it'; it lies beside it: expected to run in that folder"),
         ("deep/helped_too.py:Still", "No module named 'helping'; it lies beside it"),
         ("submodule.py:Still", r"No module named 'deep.missing'$"),
+        ("notes.txt:Still", "notes.txt is neither a module nor a file that ends in .py$"),
+        ("./mine_of_a_user:Still", "./mine_of_a_user is neither a module nor a file that ends in .py$"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
         ("broken.py:Still", "broken.py cannot be loaded: ModuleNotFoundError: No module named 'nothing_of_this_name'$"),
         ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched"),

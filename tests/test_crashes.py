@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -176,6 +177,12 @@ def test_evaluations_that_are_removed_in_the_middle(tmp_path: Path, gone: str) -
         values(rows)
     assert KeptValues(cell, folder)(rows).tolist() == [1.0] * 4
     assert KeptValues(cell, folder).known == 4
+
+
+@pytest.mark.parametrize("odd", [[[1.0, 2.0], [3.0]], [1.0, 2.0]])
+def test_rows_that_are_none_are_refused(odd: Any) -> None:
+    with pytest.raises(InputError, match=r"^rows .*; expected"):
+        KeptValues(Cell("squares", squares, {}))(odd)
 
 
 def test_a_line_after_one_that_was_torn_stands_by_itself(tmp_path: Path) -> None:

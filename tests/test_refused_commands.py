@@ -49,6 +49,7 @@ NONSENSE = [
     (["search", "--refine-starts", "0"], "refine_starts = 0; expected"),
     (["search", "--verdict-starts", "0"], "verdict_starts = 0; expected"),
     (["search", "--verdict-seed", "0"], "expected another, for fresh starts"),
+    (["search", "--verdict-seed", "-1"], "verdict_seed = -1; expected"),
     (["search", "--domain", "nan"], "domain = nan; expected"),
     (["search", "--form", "lvds"], "forms of the 1998 network: hws, ldvs, mirrored, general"),
     (["search", "--form", "own"], "no field of the type float"),

@@ -99,7 +99,7 @@ class Search(WalkingCommand):
         self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         size = self._size(self.verdict_starts, 7 * SAMPLE, 200)
-        fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts"))
+        fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts", "verdict_seed"))
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
         found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
         with progress_bar("judging") as progress:

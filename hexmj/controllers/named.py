@@ -144,6 +144,8 @@ def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:
 
 def _module(where: str, name: str) -> ModuleType:
     here = os.getcwd()
+    if not where.endswith(".py") and (isfile(where) or not all(map(str.isidentifier, where.split(".")))):
+        raise InputError(f"controller {name!r}: {where} is neither a module nor a file that ends in .py")
     try:
         if not where.endswith(".py"):
             return import_module(where)

@@ -58,12 +58,15 @@ class KeptValues:
         """The values, (row,), of rows (row, number).
 
         Raises:
-            InputError: the function gives no number for each row; what it depends on has changed, or the file is gone.
+            InputError: no rows of numbers; the function gives no number for each; what it depends on has changed; the
+                file is gone.
 
         Warns:
             UserWarning: values are not kept, or of a file that has changed since, as of `finish`.
         """
-        rows = np.ascontiguousarray(rows, dtype=float)
+        rows = np.ascontiguousarray(numbers("rows", rows))
+        if rows.ndim != 2:
+            raise InputError(f"rows have the shape {rows.shape}; expected (row, number)")
         keys, by_a_cell = [row.tobytes() for row in rows], serves()
         self._replayed |= self._held.intersection(keys)
         new = {key: i for i, key in enumerate(keys) if key not in self._values}

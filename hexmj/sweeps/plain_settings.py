@@ -138,7 +138,7 @@ def named_files(value: Any, folders: Sequence[Path] = ()) -> Iterator[Path]:
     elif isinstance(value, list | tuple):
         for item in value:
             yield from named_files(item, folders)
-    elif isinstance(value, Path) or (type(value) is str and (folders or "." in value) and "\0" not in value):
+    elif (isinstance(value, Path) or (type(value) is str and (folders or "." in value))) and "\0" not in str(value):
         for path in _paths(value, folders):
             yield from parts(path) if isfile(path) else [path]
 
