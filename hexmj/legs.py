@@ -71,37 +71,27 @@ CENTRED = Geometry(origins=(24.0, 0.0, -24.0))
 GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
 
 
-def _name_legs(labels: Iterable[Any]) -> bool:
-    """Whether one of some labels is a leg's name, if only in small letters."""
-    return not {str(one).upper() for one in labels}.isdisjoint(LEGS)
-
-
 def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers.
 
     Args:
-        values: of legs, or of some of them; an axis `leg`, or one that has labels of legs, may stand anywhere, the
-            others in their order.
+        values: of legs, or of some of them; an axis `leg`, or one that has all labels, may stand anywhere, the others
+            in their order.
         name: of the values, for sentences.
         behind: how many axes come after that of the legs.
 
     Raises:
         InputError: labels of other legs, or of one twice.
     """
+    several: Iterable[Any] = values if type(values) in (list, tuple) else ()
+    if any(hasattr(one, "iloc") or hasattr(one, "dims") for one in several):
+        return [in_order(one, name, behind) for one in several]
     labels = [] if behind else [*getattr(values, "columns", ())]
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
-        values = values.T if not behind and _name_legs(values.index) and not _name_legs(labels) else values
+        values = values.T if not behind and {*values.index} == {*LEGS} and not _name_legs(labels) else values
         labels = [*values.axes[-1 - behind]]
-    elif hasattr(values, "dims"):  # of xarray
-        single = {name: one for name, one in getattr(values, "coords", {}).items() if len(one.dims) == 1}
-        named = {one.dims[0]: one for one in single.values() if _name_legs(one.values)}
-        if "leg" in single:
-            named = {single["leg"].dims[0]: single["leg"]}
-        if "leg" in values.dims or len(named) == 1:
-            legs = "leg" if "leg" in values.dims else min(named)
-            others = [axis for axis in values.dims if axis != legs]
-            values = values.transpose(*others[: len(others) - behind], legs, *others[len(others) - behind :])
-            labels = [*named[legs].values] if legs in named else []
+    elif hasattr(values, "dims") and len(values.dims) > behind:  # of xarray
+        values, labels = _of_xarray(values, behind)
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
         return values
@@ -109,3 +99,25 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     if len(places) != len(labels):
         raise InputError(f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
     return np.take(np.asarray(values), places, axis=-1 - behind)
+
+
+def _of_xarray(values: Any, behind: int) -> tuple[Any, list[Any]]:
+    """Values, their axis of the legs where it is expected, and its labels: its own, or the only others with a leg's
+    name."""
+    single = {name: one for name, one in getattr(values, "coords", {}).items() if len(one.dims) == 1}
+    whole = [axis for axis in values.dims if axis in single and {*map(str, single[axis].values)} == {*LEGS}]
+    expected = [*values.dims][-1 - behind]
+    axis = "leg" if "leg" in values.dims else whole[0] if len(whole) == 1 else expected
+    if "leg" in single:
+        axis = single["leg"].dims[0]
+    others = [one for one in values.dims if one != axis]
+    values = values.transpose(*others[: len(others) - behind], axis, *others[len(others) - behind :])
+    beside = [name for name, one in single.items() if one.dims == (axis,) and _name_legs(one.values)]
+    of_its_own = [name for name in ("leg", axis) if name in single and (name == "leg" or name in beside)]
+    named = of_its_own[:1] or (beside if len(beside) == 1 else [])
+    return values, [label for name in named for label in single[name].values]
+
+
+def _name_legs(labels: Iterable[Any]) -> bool:
+    """Whether one of some labels is a leg's name, if only in small letters."""
+    return not {str(one).upper() for one in labels}.isdisjoint(LEGS)

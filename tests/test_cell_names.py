@@ -10,6 +10,7 @@ import sys
 import zipfile
 from hashlib import sha256
 from importlib import metadata
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -210,11 +211,17 @@ def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_
     install(folder := tmp_path / "site-packages", "my_helper", "1.0", {"my_helper.py": ""}, "Requires-Dist: deep\n")
     install(folder, "deep", "1.0", {"deep.pth": str(source), "deep-1.0.dist-info/direct_url.json": origin})
     found = []
-    for name, text in (("deep.py", "GAIN = 1"), ("deep.py", "GAIN = 2"), (".venv/site-packages/other.py", "GAIN = 3")):
+    compiled = f"inner/deepest{EXTENSION_SUFFIXES[0]}"
+    for name, text in (("deep.py", "1"), ("deep.py", "2"), (compiled, "3"), (".venv/site-packages/other.py", "4")):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         (source / name).write_text(text)
         found.append(versions_with(tmp_path / "mine.py", folder)["deep"])
-    assert found[0] != found[1] and found[1] == found[2]
+    (source / ".#edited.py").symlink_to("nowhere")
+    (source / "folder.py").mkdir()
+    assert len({*found}) == 3 and found[2] == found[3] == versions_with(tmp_path / "mine.py", folder)["deep"]
+    for odd in ("", "null", "[]", '{"dir_info": {"editable": true}}', '{"dir_info": null}'):
+        (folder / "deep-1.0.dist-info" / "direct_url.json").write_text(odd)
+        assert versions_with(tmp_path / "mine.py", folder)["deep"].startswith("1.0@")
 
 
 @pytest.mark.slow

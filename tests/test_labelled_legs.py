@@ -8,7 +8,7 @@ import xarray as xr
 from scipy import sparse
 
 import hexmj
-from hexmj.legs import FIG1, LEGS
+from hexmj.legs import FIG1, LEGS, MIRROR
 from hexmj.walks import PlannedWalk
 
 FEET = np.column_stack([FIG1.origin, FIG1.y])
@@ -45,6 +45,12 @@ def test_labelled_legs_may_come_in_any_order():
             continue
         with pytest.raises(hexmj.InputError, match=r"^starts of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
             walk(given)
+    tips = labelled.sel(leg=shuffled).rename(leg="tip")
+    other = labelled.drop_vars("leg").rename(leg="tip")
+    opposite, lost = ("tip", [LEGS[MIRROR[LEGS.index(one)]] for one in shuffled]), ("start", ["L1", "R2", *"abcd"])
+    for given in (tips.assign_coords(opposite=opposite, lost=lost), other.assign_coords(lost=("start", [*LEGS]))):
+        assert np.array_equal(walk(given).x, walk(starts).x)
+    assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 

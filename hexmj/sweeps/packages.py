@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import Distribution, PackageNotFoundError, packages_distributions, requires
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +21,9 @@ from hexmj.user_code.sources_as_run import INSTALLED
 NAMES = {"PIL": "pillow"}
 """Module -> distribution, of those that this package imports, where the names differ: to look through all that is
 installed takes a third of a second."""
+
+SOURCES = ".py", *EXTENSION_SUFFIXES
+"""Ends of the names of modules that are sources, or were compiled in place."""
 
 LARGE = 1_000_000
 """Files of more bytes are told as they were installed, since compiled libraries of some packages hold gigabytes."""
@@ -89,12 +93,13 @@ def _files(distribution: Distribution) -> str:
 
 def _edited(distribution: Distribution) -> list[tuple[str, str]]:
     """Digests of the sources of a distribution that is installed to be edited, in the folder it tells of (PEP 610)."""
-    told = json.loads(distribution.read_text("direct_url.json") or "{}")
-    if not told.get("dir_info", {}).get("editable"):
-        return []
-    folder = Path(url2pathname(urlsplit(told["url"]).path))
-    found = [one for one in folder.rglob("*.py") if INSTALLED.isdisjoint(one.parts)]
-    return [(one.relative_to(folder).as_posix(), digest_of(one)) for one in found]
+    with suppress(ValueError, AttributeError, KeyError):  # of what tells nothing
+        told = json.loads(distribution.read_text("direct_url.json") or "{}")
+        if told.get("dir_info", {}).get("editable"):
+            folder = Path(url2pathname(urlsplit(told["url"]).path))
+            found = [one for one in folder.rglob("*") if one.name.endswith(SOURCES) and INSTALLED.isdisjoint(one.parts)]
+            return [(one.relative_to(folder).as_posix(), digest_of(one)) for one in found if one.is_file()]
+    return []
 
 
 def _of_no_distribution(module: str) -> str:
