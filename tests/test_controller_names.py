@@ -68,6 +68,7 @@ def mine(tmp_path, monkeypatch):
     (tmp_path / "deep" / "helped.py").write_text("import helps_it\n")
     (tmp_path / "deep" / "helping").mkdir()
     (tmp_path / "submodule.py").write_text("import deep.missing\n")
+    (tmp_path / "long.py").write_text("raise ModuleNotFoundError(name='a' * 5000)\n")
     (tmp_path / "deep" / "helped_too.py").write_text("import helping.it\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -291,6 +292,7 @@ def test_toml_that_names_itself_is_refused(tmp_path):
         ("~/nowhere.py:Still", "~ is expanded by shells"),
         ("deep/helped.py:Still", "No module named 'helps_it'; it lies beside it: expected to run in that folder"),
         ("deep/helped_too.py:Still", "No module named 'helping'; it lies beside it"),
+        ("long.py:Still", r"cannot be loaded: ModuleNotFoundError: $"),
         ("submodule.py:Still", r"No module named 'deep.missing'$"),
         ("notes.txt:Still", "notes.txt is neither a module nor a file that ends in .py$"),
         ("./mine_of_a_user:Still", "./mine_of_a_user is neither a module nor a file that ends in .py$"),

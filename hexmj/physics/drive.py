@@ -2,7 +2,8 @@
 
 Settled starts go in, what was measured comes out, chunk by chunk; a start whose trunk has touched the ground is
 dropped.  A plan that reads the legs is told of them before each of its steps.  Any other goes on by itself: while
-MuJoCo's threads step one chunk, this one plans the next and the caller measures the last.
+MuJoCo's threads step one chunk, this one plans the next, of one insect the next eight, and the caller measures the
+last.
 """
 
 from collections.abc import Iterator

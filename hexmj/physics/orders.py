@@ -66,7 +66,7 @@ class OrdersFromPlan:
         check_plan(plan, settled.starts, settled.stride)
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._steps = plan, settled, int(steps_within(duration, settled.stride))
-        self._chunk, self._done, self._planned = steps_in_chunk(settled.substeps, multiple), 0, list[PlannedWalk]()
+        self._chunk, self._planned = steps_in_chunk(settled.substeps, multiple), list[PlannedWalk]()
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
@@ -84,7 +84,6 @@ class OrdersFromPlan:
         if done == self._steps:
             return None
         plan = self._next_chunk() if steps is None else advanced(self._plan, steps)
-        self._done += len(plan.time)
         tips = self._follow(plan, ids)
         joints, reachable = self._settled.compiled.inverse(tips)
         for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
@@ -98,6 +97,11 @@ class OrdersFromPlan:
         if self._done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, done * m, ids, control, tips[:, : control.shape[1]], ~reachable)
+
+    @property
+    def _done(self) -> int:
+        """Steps of the plan that are ordered."""
+        return self._plan.done - sum(len(one.time) for one in self._planned)
 
     def _next_chunk(self) -> PlannedWalk:
         if not self._planned:

@@ -97,8 +97,10 @@ def _edited(distribution: Distribution) -> list[tuple[str, str]]:
         told = json.loads(distribution.read_text("direct_url.json") or "{}")
         if told.get("dir_info", {}).get("editable"):
             folder = Path(url2pathname(urlsplit(told["url"]).path))
-            found = [one for one in folder.rglob("*") if one.name.endswith(SOURCES) and INSTALLED.isdisjoint(one.parts)]
-            return [(one.relative_to(folder).as_posix(), digest_of(one)) for one in found if one.is_file()]
+            found = [
+                one.relative_to(folder) for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()
+            ]
+            return [(one.as_posix(), digest_of(folder / one)) for one in found if INSTALLED.isdisjoint(one.parts)]
     return []
 
 

@@ -42,11 +42,12 @@ def importable(path: str | Path) -> ModuleType:
         raise
     except Exception as error:
         told = f"{type(error).__name__}: {error}"
-        if isinstance(error, ImportError) and (error.name or "").startswith("hexmj.user_code"):
+        missing = str(error.name) if isinstance(error, ImportError) else ""
+        if missing.startswith("hexmj.user_code"):
             told = "it imports relatively; expected module:object of its package, or a file that stands alone"
         if isinstance(error, ModuleNotFoundError):
-            name = str(error.name or ".")
-            if "." not in name and any((path.parent / f"{name}{end}").exists() for end in (".py", os.sep)):
+            beside = (path.parent / f"{missing}{end}" for end in (".py", os.sep))
+            if missing.isidentifier() and any(map(os.path.exists, beside)):
                 told += "; it lies beside it: expected to run in that folder, or with that in PYTHONPATH"
         raise InputError(f"{path} cannot be loaded: {told}") from error
 
