@@ -224,6 +224,36 @@ def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_
         assert versions_with(tmp_path / "mine.py", folder)["deep"].startswith("1.0@")
 
 
+SWEEP = """
+from pathlib import Path
+import xarray as xr
+from hexmj.sweeps import Cell, run
+import mine
+run([Cell("gain", mine.gain, {})], Path("kept"))
+"""
+
+
+@pytest.mark.slow
+def test_cells_of_such_sources_are_kept_until_one_is_edited(tmp_path: Path) -> None:
+    (source := tmp_path / "project").mkdir()
+    origin = json.dumps({"url": source.as_uri(), "dir_info": {"editable": True}})
+    helper = {"my_helper.py": "from deep import GAIN"}
+    install(folder := tmp_path / "site-packages", "my_helper", "1.0", helper, "Requires-Dist: deep\n")
+    install(folder, "deep", "1.0", {"deep-1.0.dist-info/direct_url.json": origin})
+    mine = "import my_helper\nimport xarray as xr\ndef gain(): return xr.Dataset({'gain': my_helper.GAIN})"
+    (tmp_path / "mine.py").write_text(mine)
+    paths = [WITHOUT_DASK["PYTHONPATH"], str(folder), str(source), str(tmp_path)]
+    kept = []
+    for text in ("GAIN = 1", "GAIN = 1", "GAIN = 2.5"):
+        (source / "deep.py").write_text(text)
+        environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join(paths)}
+        command = [sys.executable, "-W", "error", "-c", SWEEP]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert not done.returncode, done.stderr
+        kept.append({path.name for path in (tmp_path / "kept").iterdir()})
+    assert len(kept[0]) == 1 and kept[0] == kept[1] and len(kept[2]) == 2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("record", ["my_helper,,\n", None])
 def test_an_installed_helper_that_was_linked_or_has_no_list_of_files_counts_by_them(

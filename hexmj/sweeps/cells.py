@@ -14,7 +14,14 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.code import OPEN_BY_THEMSELVES, code, data_of_users, files_of_classes, sources_of_users
+from hexmj.sweeps.code import (
+    OPEN_BY_THEMSELVES,
+    code,
+    data_of_users,
+    files_of_classes,
+    sources_of_users,
+    sources_to_edit,
+)
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
 from hexmj.user_code.opened_files import (
     also_read,
@@ -103,6 +110,7 @@ class Cell:
             if swept := doubt(sources):
                 return {}, f"{self.name} is not kept: {swept}"
             unheard, named = data_of_users(self._modules())
+            sources |= (to_edit := sources_to_edit(self._modules()))
             files = _beyond(opened_by(sources) | unheard | heard(named), {*told, *sources})
             if ran := sorted(file for file in files if file.endswith(".py")):
                 return {}, (
@@ -113,7 +121,7 @@ class Cell:
             read = dict.fromkeys(_beyond(named, told), _THERE) | {file: _held(file) for file in files}
         except InputError as error:
             return {}, f"{self.name} is not kept: {error}"
-        if outdated := changed({*told, *files}):
+        if outdated := changed({*told, *files, *to_edit}):
             since = f"{outdated[0]} has changed since it was opened first, and code may remember it"
             return {}, f"{self.name} is not kept: {since}; start the program again"
         return (read | {_HERE: os.getcwd()} if read else {}), ""

@@ -102,6 +102,8 @@ class _Needed(NamedTuple):
     """Files of a user's own modules, with their texts."""
     missing: set[str]
     """Modules without a file."""
+    to_edit: set[str]
+    """Files of what installed packages require and is installed to be edited."""
 
 
 _KNOWN: dict[frozenset[str], _Needed] = {}
@@ -131,6 +133,15 @@ def sources_of_users(modules: frozenset[str]) -> set[str]:
         InputError: a module has no source.
     """
     return {os.path.abspath(file) for file, _ in _needed(modules).theirs}
+
+
+def sources_to_edit(modules: frozenset[str]) -> set[str]:
+    """Files of what installed packages require, of those that some need, and is installed to be edited.
+
+    Raises:
+        InputError: a module has no source.
+    """
+    return _needed(modules).to_edit
 
 
 def files_of_classes(modules: frozenset[str]) -> set[str]:
@@ -211,11 +222,11 @@ def _follow(modules: frozenset[str]) -> _Needed:
             if file is None and top in installed:
                 missing |= {name, f"{name}.{attribute}" if attribute.strip(_ALL) else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())
-    from hexmj.sweeps.packages import versions
+    from hexmj.sweeps.packages import sources_to_edit, versions
 
     told = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"} | versions(sorted(names))
     theirs = [(file, module.texts) for _, file, module in read if not file.is_relative_to(PACKAGE)]
-    return _Needed(sources, told, read, theirs, missing)
+    return _Needed(sources, told, read, theirs, missing, sources_to_edit(names))
 
 
 def _of_our_own(attribute: str, module: _Module, inner: list[_Wanted]) -> Sequence[_Wanted]:

@@ -1,6 +1,7 @@
 """Installed packages as a cell's name tells them: by versions, and by files where these may change alone."""
 
 import json
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -32,7 +33,19 @@ LARGE = 1_000_000
 def versions(modules: Iterable[str]) -> dict[str, str]:
     """Of some modules, see `version`, and of all that their distributions require, beyond what this package does."""
     told = {name: version(name) for name in modules}
-    waiting, seen = [(one, "") for name in told for one in _distributions(name)], set[tuple[str, str]]()
+    for name in _required_by(told):
+        told.setdefault(name, version(name.replace("-", "_")))  # as modules are mostly called
+    return told
+
+
+def sources_to_edit(modules: Iterable[str]) -> set[str]:
+    """Files of what these require, as `versions` tells it, and is installed to be edited."""
+    return {os.path.realpath(file) for name in _required_by(modules) for file in _to_edit(Distribution.from_name(name))}
+
+
+def _required_by(modules: Iterable[str]) -> set[str]:
+    """Names of the distributions that those of some modules require."""
+    waiting, seen = [(one, "") for name in modules for one in _distributions(name)], set[tuple[str, str]]()
     for one, extra in waiting:
         for requirement in () if _is_required(one) else _requirements(one):
             name = canonicalize_name(requirement.name)
@@ -40,10 +53,9 @@ def versions(modules: Iterable[str]) -> dict[str, str]:
                 if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
                     continue
                 inner, new = Distribution.from_name(name), {(name, more) for more in ("", *requirement.extras)} - seen
-                told.setdefault(name, version(name.replace("-", "_")))  # as modules are mostly called
                 waiting += [(inner, more) for _, more in sorted(new)]
                 seen |= new
-    return told
+    return {name for name, _ in seen}
 
 
 @cache
@@ -88,11 +100,12 @@ def _files(distribution: Distribution) -> str:
             told.append((str(one), one.hash.value))
         else:  # a folder is one that was linked
             told += [(f"{one}/{name}", held) for name, held in _held(path)]
-    return _digest(told + _edited(distribution))
+    told += [(name, digest_of(Path(file))) for file, name in _to_edit(distribution).items()]
+    return _digest(told)
 
 
-def _edited(distribution: Distribution) -> list[tuple[str, str]]:
-    """Digests of the sources of a distribution that is installed to be edited, in the folder it tells of (PEP 610)."""
+def _to_edit(distribution: Distribution) -> dict[str, str]:
+    """Sources of a distribution that is installed to be edited, and their names in the folder it tells of (PEP 610)."""
     with suppress(ValueError, AttributeError, KeyError):  # of what tells nothing
         told = json.loads(distribution.read_text("direct_url.json") or "{}")
         if told.get("dir_info", {}).get("editable"):
@@ -100,8 +113,8 @@ def _edited(distribution: Distribution) -> list[tuple[str, str]]:
             found = [
                 one.relative_to(folder) for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()
             ]
-            return [(one.as_posix(), digest_of(folder / one)) for one in found if INSTALLED.isdisjoint(one.parts)]
-    return []
+            return {str(folder / one): one.as_posix() for one in found if INSTALLED.isdisjoint(one.parts)}
+    return {}
 
 
 def _of_no_distribution(module: str) -> str:
