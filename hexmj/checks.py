@@ -168,10 +168,13 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return wanted(number) + 0  # and -0.0 is 0.0
             return value
     elif origin is Literal:
-        if isinstance(value, str | int) and value in inner:
-            return value
+        for one in inner if isinstance(value, str | int) else ():
+            if one == value and isinstance(one, bool) == isinstance(value, bool):
+                return one
     elif getattr(wanted, "_is_protocol", False) or wanted is Any:
         return value  # looked at where it is used
+    elif wanted is str and isinstance(value, np.str_):
+        return str(value)
     elif isinstance(value, origin or wanted) and not (origin is Callable and isinstance(value, type)):
         return value
     elif wanted is bool and isinstance(value, np.bool_):

@@ -132,9 +132,10 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
 KINDS = """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
+import numpy as np
 from hexmj import timing
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Optional, Sequence
 
@@ -194,6 +195,9 @@ class Odd:
     modes: tuple[Mode, ...] = ()
     inners: tuple[Inner, ...] = ()
     some: Sequence = ()
+    bare: tuple = ()
+    gains: np.ndarray = field(default_factory=lambda: np.ones(1))
+    level: Literal["a", 1] = 1
     fixed: ClassVar[int] = 3
     own: Own = Own.HERE
     which: Named | Inner = Inner()
@@ -225,6 +229,9 @@ class Odd:
         ('[fields]\nmade = {g = "x"}', "g = 'x'; expected a number"),
         ("[fields]\neither = 1.5", "either = 1.5; expected a whole number or a text"),
         ('[fields]\nmixed = ["b", true]', "mixed = .*; expected 2 values: True or False, a text"),
+        ("[fields]\nlevel = true", "level = True; valid names: a, 1"),
+        ('[fields]\nbare = "a"', "bare = 'a'; expected a tuple"),
+        ('[fields]\ngains = "a"', "gains = 'a'; expected a ndarray"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -248,12 +255,14 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("odd.py").write_text(KINDS)
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
+    told |= {"bare": [1, "a"], "gains": [1, 2], "level": 1}
     told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
     told |= {"heir": {"g": 3}, "other_kind": {"c": 4}}
     told |= {"usual": {"g": 4}, "part": {"c": 4, "deep": {"a": 7}}, "file": "gains.toml", "files": ["a", "b"]}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
+    assert repr([odd.bare, odd.gains, odd.level]) == "[(1, 'a'), array([1., 2.]), 1]"
     assert repr([odd.modes, odd.inners, odd.some]) == "[(<Mode.SLOW: 'slow'>,), (Inner(g=2.0),), [1, 2]]"
     assert repr([odd.own, odd.which]) == "[<Own.HERE: 1>, Inner(g=2.0)]"
     assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"

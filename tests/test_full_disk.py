@@ -92,6 +92,12 @@ def test_a_film_that_does_not_fit_says_why(tmp_path):
         noise(tmp_path / "film.mp4")
 
 
+def test_a_manifest_names_nothing_that_is_gone(tmp_path):
+    with pytest.raises(InputError, match=r"gone\.nc was removed or renamed while the command ran; expected it to stay"):
+        save_manifest(Flss(), {}, [tmp_path / "gone.nc"], tmp_path / "manifest.json")
+    assert not list(tmp_path.iterdir())
+
+
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):
     with little_room(), pytest.raises(InputError, match=r"numbers-1-.*\.nc cannot be written: File too large"):
         run(cells(10_000), tmp_path)

@@ -67,9 +67,13 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
     The code is followed from the module of the command's options.
 
     Raises:
-        InputError: the code, or what a controller names, was edited meanwhile, or a file cannot be written or read.
+        InputError: the code, or what a controller names, was edited meanwhile, one of those files was removed, or a
+            file cannot be written or read.
     """
     check_loaded()
+    for file in (written := [*written]):
+        if not file.is_file():
+            raise InputError(f"{file} was removed or renamed while the command ran; expected it to stay")
     typed = command_words.command()
     own = {str(file): one for file, one in command_words.own().items()}
     made = code(frozenset({type(command).__module__, *_modules(typed)}))

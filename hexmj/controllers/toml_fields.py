@@ -12,6 +12,8 @@ from pathlib import PurePath
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from hexmj.checks import typed
 from hexmj.errors import InputError
 
@@ -75,9 +77,9 @@ def _is_checked(kind: Any) -> bool:
     if (origin := get_origin(kind)) in (*_CHOICES, *_ROWS):
         of = get_args(kind)
         return bool(of) and all(one is Ellipsis or _is_checked(one) for one in of)
-    if origin is Literal or kind in (*_PLAIN, NoneType):
+    if origin in (Literal, np.ndarray) or kind in (*_PLAIN, NoneType, tuple, list):
         return True
-    return isinstance(kind, type) and (issubclass(kind, Enum | PurePath) or _is_record(kind))
+    return isinstance(kind, type) and (issubclass(kind, Enum | PurePath | np.ndarray) or _is_record(kind))
 
 
 def _is_record(kind: Any) -> bool:
@@ -101,7 +103,8 @@ def _fitting(name: str, value: Any, kind: Any, usual: Any = None) -> Any:
 
 
 def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
-    """A member of an enumeration, path, record or row, as a file tells them; None where it tells something else."""
+    """A member of an enumeration, path, record, row or array, as a file tells them; None where it tells something
+    else."""
     if isinstance(kind, type) and issubclass(kind, Enum):
         if isinstance(value, str) and value in kind.__members__:
             return kind[value]
@@ -114,6 +117,10 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
         kind = type(usual) if isinstance(usual, kind) else kind
         if value.keys() <= signature(kind).parameters.keys():
             return _made(kind, usual, value)
+    elif np.ndarray in (kind, get_origin(kind)) and isinstance(value, list):
+        return np.array(value, dtype=usual.dtype if isinstance(usual, np.ndarray) else None)
+    elif kind is tuple and isinstance(value, list):
+        return tuple(value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):
         of = get_args(kind)
         each = of[:1] * len(value) if Ellipsis in of or get_origin(kind) is Sequence else of

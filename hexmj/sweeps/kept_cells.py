@@ -30,10 +30,10 @@ def write(path: Path, record: str, read: dict[str, str], data: "xr.Dataset") -> 
     Raises:
         InputError: they cannot be written, or the sweep's folder is no longer there.
     """
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent} was removed or renamed while it was in use; nothing more is written there")
     told = {RECORD: record} | ({READ: json.dumps(read, sort_keys=True)} if read else {})
     content = netcdf.encode(data.assign_attrs(told))
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent} was removed or renamed while it was in use; nothing more is written there")
     write_whole(path, sealed(content))
     return _decode(path, content, record)[0]
 
