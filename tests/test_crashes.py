@@ -17,6 +17,7 @@ from hexmj.errors import InputError
 from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
+from hexmj.storage import netcdf
 from hexmj.storage.files import PART, prepare, remove_leftovers, replacing
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import ENVIRONMENT, moves, numbers, squares
@@ -162,6 +163,14 @@ def test_a_folder_that_is_renamed_in_the_middle(tmp_path: Path) -> None:
         run(cells, folder)
     assert not folder.exists()
     assert [path.name[:2] for path in to.iterdir()] == ["0-"]
+
+
+def test_a_folder_that_goes_away_as_a_cell_is_encoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    encode, folder = netcdf.encode, tmp_path / "kept"
+    monkeypatch.setattr(netcdf, "encode", lambda data: [encode(data), folder.rmdir()][0])
+    with pytest.raises(InputError, match=r"kept was removed or renamed while it was in use; nothing more is written"):
+        run([Cell("numbers", numbers, {"seed": 0})], folder)
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("gone", ["folder", "file"])
