@@ -88,10 +88,11 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         return [in_order(one, name, behind) for one in several]
     labels = [] if behind else [*getattr(values, "columns", ())]
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
-        values = values.T if not behind and {*values.index} == {*LEGS} and not _name_legs(labels) else values
+        on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
+        values = values.T if on_its_side and (len(values) == len(LEGS) or {*values.index} == {*LEGS}) else values
         labels = [*values.axes[-1 - behind]]
     elif hasattr(values, "dims") and len(values.dims) > behind:  # of xarray
-        values, labels = _of_xarray(values, behind)
+        values, labels = _of_xarray(values, name, behind)
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
         return values
@@ -101,21 +102,25 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     return np.take(np.asarray(values), places, axis=-1 - behind)
 
 
-def _of_xarray(values: Any, behind: int) -> tuple[Any, list[Any]]:
+def _of_xarray(values: Any, name: str, behind: int) -> tuple[Any, list[Any]]:
     """Values, their axis of the legs where it is expected, and its labels: its own, or the only others with a leg's
     name."""
     single = {name: one for name, one in getattr(values, "coords", {}).items() if len(one.dims) == 1}
     whole = [axis for axis in values.dims if axis in single and {*map(str, single[axis].values)} == {*LEGS}]
-    expected = [*values.dims][-1 - behind]
-    axis = "leg" if "leg" in values.dims else whole[0] if len(whole) == 1 else expected
+    axis = "leg" if "leg" in values.dims else whole[0] if len(whole) == 1 else [*values.dims][-1 - behind]
     if "leg" in single:
         axis = single["leg"].dims[0]
     others = [one for one in values.dims if one != axis]
     values = values.transpose(*others[: len(others) - behind], axis, *others[len(others) - behind :])
-    beside = [name for name, one in single.items() if one.dims == (axis,) and _name_legs(one.values)]
-    of_its_own = [name for name in ("leg", axis) if name in single and (name == "leg" or name in beside)]
-    named = of_its_own[:1] or (beside if len(beside) == 1 else [])
-    return values, [label for name in named for label in single[name].values]
+    named = {key: one for key, one in single.items() if _name_legs(one.values)}
+    beside = [one.values for one in named.values() if one.dims == (axis,)]
+    own = [single["leg"].values] if "leg" in single else [named[axis].values] if axis in named else []
+    many = [
+        one.dims[0] for one in named.values() if one.dims != (axis,) and len(one) == len(LEGS) == values.sizes[axis]
+    ]
+    if not own and (len(beside) > 1 or (many and not beside and axis != "leg")):
+        raise InputError(f"{name} have several labels of legs, or none along {axis}; expected those of an axis leg")
+    return values, [label for labels in own or beside for label in labels]
 
 
 def _name_legs(labels: Iterable[Any]) -> bool:

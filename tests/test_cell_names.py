@@ -229,29 +229,40 @@ from pathlib import Path
 import xarray as xr
 from hexmj.sweeps import Cell, run
 import mine
-run([Cell("gain", mine.gain, {})], Path("kept"))
+run([Cell("gain", mine.gain, {"asked": ASKED})], Path("kept"))
+"""
+
+LAZY = """
+import my_helper
+import xarray as xr
+def gain(asked): return xr.Dataset({'gain': my_helper.gain() if asked else 0.0})
 """
 
 
 @pytest.mark.slow
 def test_cells_of_such_sources_are_kept_until_one_is_edited(tmp_path: Path) -> None:
+    """Not those that take what was edited since their names were made."""
     (source := tmp_path / "project").mkdir()
     origin = json.dumps({"url": source.as_uri(), "dir_info": {"editable": True}})
-    helper = {"my_helper.py": "from deep import GAIN"}
+    helper = {"my_helper.py": "def gain():\n    from deep import GAIN\n    return GAIN"}
     install(folder := tmp_path / "site-packages", "my_helper", "1.0", helper, "Requires-Dist: deep\n")
     install(folder, "deep", "1.0", {"deep-1.0.dist-info/direct_url.json": origin})
-    mine = "import my_helper\nimport xarray as xr\ndef gain(): return xr.Dataset({'gain': my_helper.GAIN})"
-    (tmp_path / "mine.py").write_text(mine)
+    (tmp_path / "mine.py").write_text(LAZY)
     paths = [WITHOUT_DASK["PYTHONPATH"], str(folder), str(source), str(tmp_path)]
-    kept = []
-    for text in ("GAIN = 1", "GAIN = 1", "GAIN = 2.5"):
+    environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join(paths)}
+    every, edit = SWEEP.replace("ASKED", "True"), 'Path("project/deep.py").write_text("GAIN = 33.5")'
+    told, kept = [], []
+    for text, script in (
+        *((text, every) for text in ("GAIN = 1", "GAIN = 1", "GAIN = 2.5")),
+        ("GAIN = 4", SWEEP.replace("ASKED", "False") + edit + every),
+    ):
         (source / "deep.py").write_text(text)
-        environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join(paths)}
-        command = [sys.executable, "-W", "error", "-c", SWEEP]
+        command = [sys.executable, "-c", script]
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-        assert not done.returncode, done.stderr
+        told.append(done.stderr)
         kept.append({path.name for path in (tmp_path / "kept").iterdir()})
-    assert len(kept[0]) == 1 and kept[0] == kept[1] and len(kept[2]) == 2
+    assert len(kept[0]) == 1 and kept[0] == kept[1] and [*map(len, kept)] == [1, 1, 2, 3]
+    assert not any(told[:3]) and "deep.py has changed since it was opened first" in told[3]
 
 
 @pytest.mark.slow

@@ -196,6 +196,7 @@ class Odd:
     inners: tuple[Inner, ...] = ()
     some: Sequence = ()
     bare: tuple = ()
+    whole: np.ndarray = field(default_factory=lambda: np.ones(1, int))
     gains: np.ndarray = field(default_factory=lambda: np.ones(1))
     level: Literal["a", 1] = 1
     fixed: ClassVar[int] = 3
@@ -232,6 +233,7 @@ class Odd:
         ("[fields]\nlevel = true", "level = True; valid names: a, 1"),
         ('[fields]\nbare = "a"', "bare = 'a'; expected a tuple"),
         ('[fields]\ngains = "a"', "gains = 'a'; expected a ndarray"),
+        ("[fields]\ngains = [[1], [2, 3]]", "gains = .*; expected a ndarray"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -255,14 +257,14 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("odd.py").write_text(KINDS)
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
-    told |= {"bare": [1, "a"], "gains": [1, 2], "level": 1}
+    told |= {"bare": [1, "a"], "gains": [1, 2], "whole": [0.5], "level": 1}
     told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
     told |= {"heir": {"g": 3}, "other_kind": {"c": 4}}
     told |= {"usual": {"g": 4}, "part": {"c": 4, "deep": {"a": 7}}, "file": "gains.toml", "files": ["a", "b"]}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
-    assert repr([odd.bare, odd.gains, odd.level]) == "[(1, 'a'), array([1., 2.]), 1]"
+    assert repr([odd.bare, odd.gains, odd.whole, odd.level]) == "[(1, 'a'), array([1., 2.]), array([0.5]), 1]"
     assert repr([odd.modes, odd.inners, odd.some]) == "[(<Mode.SLOW: 'slow'>,), (Inner(g=2.0),), [1, 2]]"
     assert repr([odd.own, odd.which]) == "[<Own.HERE: 1>, Inner(g=2.0)]"
     assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"

@@ -48,8 +48,18 @@ def test_labelled_legs_may_come_in_any_order():
     tips = labelled.sel(leg=shuffled).rename(leg="tip")
     other = labelled.drop_vars("leg").rename(leg="tip")
     opposite, lost = ("tip", [LEGS[MIRROR[LEGS.index(one)]] for one in shuffled]), ("start", ["L1", "R2", *"abcd"])
-    for given in (tips.assign_coords(opposite=opposite, lost=lost), other.assign_coords(lost=("start", [*LEGS]))):
-        assert np.array_equal(walk(given).x, walk(starts).x)
+    five = other[:5].assign_coords(lost=("start", [*LEGS[:5]]))
+    for given, those in ((tips.assign_coords(opposite=opposite, lost=lost), starts), (five, starts[:5])):
+        assert np.array_equal(walk(given).x, walk(those).x)
+    twice = other.assign_coords(one=("tip", [*LEGS]), other=opposite)
+    sideways = labelled.rename(leg="tip").T
+    for given in (
+        *(other.assign_coords(lost=("start", names)) for names in ([*LEGS], ["L1", "L1", *LEGS[2:]])),
+        *(twice, sideways.assign_coords(tip=[one.lower() for one in LEGS])),
+        *(table.T.set_axis(names) for names in ([one.lower() for one in LEGS], ["L1", "L1", *LEGS[2:]])),
+    ):
+        with pytest.raises(hexmj.InputError, match=r"^starts (have|of) .*; expected "):
+            walk(given)
     assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))

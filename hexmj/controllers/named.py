@@ -144,7 +144,7 @@ def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:
 
 def _module(where: str, name: str) -> ModuleType:
     here = os.getcwd()
-    if not where.endswith(".py") and (isfile(where) or not all(map(str.isidentifier, where.split(".")))):
+    if not where.endswith(".py") and (os.sep in where or ("." in where and isfile(where))):
         raise InputError(f"controller {name!r}: {where} is neither a module nor a file that ends in .py")
     try:
         if not where.endswith(".py"):

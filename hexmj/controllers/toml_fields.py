@@ -118,7 +118,10 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
         if value.keys() <= signature(kind).parameters.keys():
             return _made(kind, usual, value)
     elif np.ndarray in (kind, get_origin(kind)) and isinstance(value, list):
-        return np.array(value, dtype=usual.dtype if isinstance(usual, np.ndarray) else None)
+        with suppress(ValueError):  # of rows of several lengths
+            made = np.array(value)
+            floats = isinstance(usual, np.ndarray) and usual.dtype.kind == "f" and made.dtype.kind == "i"
+            return made.astype(usual.dtype) if floats else made
     elif kind is tuple and isinstance(value, list):
         return tuple(value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):

@@ -82,6 +82,7 @@ class Cell:
         told, modules = self._told(), self._modules()
         made = code(modules)
         unheard, others = data_of_users(modules)
+        seen(sources_to_edit(modules))
         seen(unheard | others if OPEN_BY_THEMSELVES & made.versions.keys() else unheard)
         return json.dumps(told | {"sources": made.sources, "versions": made.versions}, sort_keys=True)
 
