@@ -34,6 +34,7 @@ _NAMES = {
     bool: "True or False",
     str: "a text",
     NoneType: "None",
+    np.ndarray: "an array",
     Callable: "a function",
 }
 """What is expected, by type; of any other class one of its objects."""

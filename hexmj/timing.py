@@ -81,6 +81,11 @@ class Acceleration:
         """Time until V_r is reached [time units]."""
         return (velocity - self.start) / self.rate
 
+    def lag(self, velocity: Any, time: Any) -> Any:
+        """What is walked less within a time [time units] than at V_r throughout [mm]."""
+        short = np.minimum(time, self.duration(velocity))
+        return (velocity - self.start) * short - self.rate * short**2 / 2
+
 
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
     """Refuse velocities V_r, (...) fractions of V_p, that an acceleration (Eq. 11) steps over.

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -100,6 +101,8 @@ def test_weights_of_a_controller_of_ones_own_are_no_preset_s(run, tmp_path):
         (["--model", "own-0.4"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "own-0.4-without-3"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
         (["--model", "copy.toml"], "seed 0, on whose starts a search found own-0.4 (others: --seed 1998)"),
+        (["--model", "found.toml"], "seed 0, on whose starts a search found found.toml (others: --seed 1998)"),
+        (["--model", "evolved"], "seed 0, on whose starts a search found evolved (others: --seed 1998)"),
         (["--pep0", -9, "--geometry", "centred"], "; seed 0; pep0 -9.0; geometry centred"),
     ],
 )
@@ -107,6 +110,8 @@ def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     Path("sums.py").write_text(SUMS)
     Path("copy.toml").write_text(network_toml(hexmj.PRESETS["own-0.4"]))
+    found = network_toml(replace(hexmj.LDVS, weights=hexmj.Symmetric(p1_i=1.25)))
+    Path("found.toml").write_text(f"searched = {{seed = 0}}\n{found}")
     Path("mine.toml").write_text("controller = 'own-0.4'\n[fields]\norder = 'undelayed'\n")
     short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
     assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")

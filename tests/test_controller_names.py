@@ -52,6 +52,7 @@ class Switched(Still):
         return {2: self, 3: None}[part]
 
 taller = Still("taller", 3.0)
+Switched.usual = Still()
 number = 6
 '''
 
@@ -87,6 +88,12 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     assert hexmj.load_controller("robot").name == "taller"
     assert "robot" in named.known_names()
+    parted = EntryPoint("still-without-3", "mine_of_a_user:Switched.usual", named.ENTRY_POINTS)
+    monkeypatch.setattr(
+        named, "entry_points", lambda name="", **_: [one for one in (point, parted) if one.name == name]
+    )
+    assert hexmj.load_controller("still-without-3").name == "still"
+    monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}
 
@@ -232,8 +239,8 @@ class Odd:
         ('[fields]\nmixed = ["b", true]', "mixed = .*; expected 2 values: True or False, a text"),
         ("[fields]\nlevel = true", "level = True; valid names: a, 1"),
         ('[fields]\nbare = "a"', "bare = 'a'; expected a tuple"),
-        ('[fields]\ngains = "a"', "gains = 'a'; expected a ndarray"),
-        ("[fields]\ngains = [[1], [2, 3]]", "gains = .*; expected a ndarray"),
+        ('[fields]\ngains = "a"', "gains = 'a'; expected an array"),
+        ("[fields]\ngains = [[1], [2, 3]]", "gains = .*; expected an array"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),

@@ -67,6 +67,17 @@ def test_windows():
     assert observation_time(12.5, v, Stride()) == pytest.approx([12.5, 12.5])
     accelerated = observation_time("start", v, Stride(), Acceleration(0.001, 0.1))
     assert accelerated == pytest.approx([40.0, 440.0])
+    flss(LDVS, [0.1, 0.5], n_starts=2, window=401.0, acceleration=Acceleration(0.001))
+    with pytest.raises(InputError, match=r"^V = 0.5 is reached at 400 time units, window = 399 ends before; expected"):
+        flss(LDVS, [0.1, 0.5], n_starts=2, window=399.0, acceleration=Acceleration(0.001))
+
+
+def test_walks_that_accelerate_lag_behind():
+    slow, v, t = Acceleration(0.01, 0.1), np.array([0.1, 0.5, 0.9]), np.arange(0.0, 100.0, 0.001)
+    walked = np.minimum(v, 0.1 + 0.01 * t[:, np.newaxis])
+    for end in (20.0, 60.0, 100.0):
+        lag = (v - walked[t < end]).sum(axis=0) * 0.001
+        assert slow.lag(v, end) == pytest.approx(lag, abs=1e-3)
 
 
 def test_threads_do_not_matter():

@@ -14,6 +14,7 @@ import xarray as xr
 import hexmj
 from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import READINGS, Cruse1998
+from hexmj.controllers.named import searched_on
 from waiting_legs import OWN
 
 PNG = b"\x89PNG"
@@ -31,6 +32,7 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
     assert answer["replayed"] == 0
     found = hexmj.load_controller(str(tmp_path / "found.toml"))
     assert found == hexmj.Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
+    assert searched_on(str(tmp_path / "found.toml")) == 0
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
     assert history.best.values[-1] == answer["cost"]

@@ -199,6 +199,10 @@ class Search(WalkingCommand):
         return "physical" if self.physical else "kinematic"
 
     @property
+    def commanded(self) -> tuple[float, float]:
+        return self._range
+
+    @property
     def _range(self) -> tuple[float, float]:
         v = 0.3 if self.velocity is None else self.velocity
         return self.velocities or (v, v)
@@ -219,7 +223,8 @@ class Search(WalkingCommand):
     def _write(self, problem: "Problem", found: "Found", settings: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
 
-        text = f"# hexmj search: {self._title}\n{self._toml(problem, found)}"
+        seed = self.walks.seed
+        text = f"# hexmj search: {self._title}\nsearched = {{ seed = {seed} }}\n{self._toml(problem, found)}"
         history = found.history.assign_attrs(title=self._title)
         files = [
             save_dataset(history, self.out / "history.nc"),

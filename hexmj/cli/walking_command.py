@@ -51,9 +51,15 @@ class WalkingCommand:
         own = vars(self)
         return own.get("models", [own["model"]] if "model" in own else [])
 
+    @property
+    def commanded(self) -> Sequence[float] | float:
+        """V_r at which is walked, as far as that is asked for."""
+        own = vars(self)
+        return own.get("velocities") or own.get("velocity") or []
+
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
-        from hexmj.controllers.cruse1998.presets import searched_on
+        from hexmj.controllers.named import searched_on
 
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
         bases = dict.fromkeys(self.controlled.preset_of(name) for name in self.names)
@@ -79,13 +85,13 @@ class WalkingCommand:
         """That no foot gets to what lies ahead, where even the farthest walk is too short."""
         from hexmj.studies.terrain.study import reach
 
-        ground, own = self.conditions.ground, vars(self)
-        velocities = numbers("velocities", own.get("velocities") or own.get("velocity") or [])
+        ground, velocities = self.conditions.ground, numbers("velocities", self.commanded)
         if ground.ground == "flat" or not velocities.size:
             return ""
-        stride = self.walks.stride
-        time = observation_time(self.walks.time, velocities, stride, self.accelerating.procedure)
-        farthest = float((velocities * time).max())
+        stride, acceleration = self.walks.stride, self.accelerating.procedure
+        time = observation_time(self.walks.time, velocities, stride, acceleration)
+        lag = acceleration.lag(velocities, time) if acceleration else 0.0
+        farthest = float((velocities * time - lag).max())
         if farthest + reach(stride)[0] > ground.ground_at:
             return ""
         return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"

@@ -5,13 +5,14 @@ import re
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
+from operator import attrgetter
 from os.path import isfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from hexmj.checks import typed
-from hexmj.controllers.cruse1998 import PRESETS
+from hexmj.controllers.cruse1998 import PRESETS, presets
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.toml_fields import with_fields
@@ -28,6 +29,9 @@ NO_FILE = "expected the path of one from the current folder; ~ is expanded by sh
 
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
+
+SEARCHED = "searched"
+"""What a file that `hexmj search` wrote tells of its starts."""
 
 PART = re.compile(r"(-(without|with)-\d)+$")
 """The end of such names."""
@@ -50,13 +54,13 @@ def load_controller(name: str) -> Controller:
         return PRESETS[name]
     if name in (rivals := _rivals()):
         return rivals[name]
-    if varied := VARIED.fullmatch(name):
-        return _varied(varied["name"], varied["how"], int(varied["which"]))
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():
         return _found(where, what, name)
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return _found(point.module, point.attr, name)
+    if varied := VARIED.fullmatch(name):
+        return _varied(varied["name"], varied["how"], int(varied["which"]))
     path = Path(name)
     if path.suffix == ".py" and isfile(path):
         return _found(name, "", name)
@@ -68,11 +72,27 @@ def load_controller(name: str) -> Controller:
             " nor module:object or file.py:object"
         )
     table = read_toml(path)
+    table.pop(SEARCHED, None)
     if "controller" in table:
         if not (table.keys() <= {"controller", "fields"} and isinstance(table.get("fields", {}), dict)):
             raise InputError(f"{path} holds {literal(', '.join(table)):.300}; expected controller and a table [fields]")
         return _with_fields(path, str(table["controller"]), table.get("fields", {}))
     return read_network(table, name, literal(path.stem))
+
+
+def searched_on(name: str) -> int | None:
+    """The seed of the starts on which a search found a controller, as its file tells: there it looks better than it is.
+
+    Raises:
+        InputError: a file that cannot be read.
+    """
+    if name in PRESETS:
+        return presets.searched_on(name)
+    from hexmj.controllers.rivals.evolved import FOUND
+
+    file = FOUND if name == "evolved" else Path(name)
+    told = read_toml(file).get(SEARCHED) if file.suffix == ".toml" and isfile(file) else None
+    return told.get("seed") if isinstance(told, dict) else None
 
 
 def known_names() -> Iterator[str]:
@@ -117,13 +137,13 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
 def _found(where: str, what: str, name: str) -> Controller:
     """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
     module = _module(where, name)
-    if what not in vars(module) and not hasattr(module, "__getattr__"):
+    if what.partition(".")[0] not in vars(module) and not hasattr(module, "__getattr__"):
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
         missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
         raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(classes) or 'none'}")
 
     def make() -> Any:
-        found = getattr(module, what)
+        found = attrgetter(what)(module)
         return found() if isinstance(found, type) else found
 
     return _made(make, name, "expected a class with defaults for all fields")

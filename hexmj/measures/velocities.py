@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hexmj.errors import InputError
 from hexmj.starts import checked_list
 from hexmj.timing import Acceleration, Stride, check_reached, observation_time, steps_within
 
@@ -25,11 +26,16 @@ def observed(
     """The velocities of a table and their observation times [time units], both (velocity,), if they make sense.
 
     Raises:
-        InputError: a velocity that is none, comes twice or is not reached, or a time without steps.
+        InputError: a velocity that is none, comes twice or is not reached within its time, or a time without steps.
     """
     v = checked_list(several(velocities), acceleration)
     check_reached(v, stride, acceleration)
     duration = observation_time(window, v, stride, acceleration)
+    if acceleration and (late := v[duration < acceleration.duration(v)]).size:
+        raise InputError(
+            f"V = {late[0]:g} is reached at {acceleration.duration(late[0]):g} time units, window = {window:g} ends"
+            " before; expected a longer one, or walk or start, which are counted from then"
+        )
     steps_within(duration, stride)
     return v, duration
 

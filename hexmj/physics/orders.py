@@ -101,7 +101,7 @@ class OrdersFromPlan:
     @property
     def _done(self) -> int:
         """Steps of the plan that are ordered."""
-        return self._plan.done - sum(len(one.time) for one in self._planned)
+        return int(self._plan.done) - sum(len(one.time) for one in self._planned)
 
     def _next_chunk(self) -> PlannedWalk:
         if not self._planned:

@@ -40,7 +40,8 @@ def versions(modules: Iterable[str]) -> dict[str, str]:
 
 def sources_to_edit(modules: Iterable[str]) -> set[str]:
     """Files of what these require, as `versions` tells it, and is installed to be edited."""
-    return {os.path.realpath(file) for name in _required_by(modules) for file in _to_edit(Distribution.from_name(name))}
+    required = [one for one in map(Distribution.from_name, _required_by(modules)) if not _is_required(one)]
+    return {os.path.realpath(file) for one in required for file in _to_edit(one)}
 
 
 def _required_by(modules: Iterable[str]) -> set[str]:
@@ -106,9 +107,9 @@ def _files(distribution: Distribution) -> str:
 
 def _to_edit(distribution: Distribution) -> dict[str, str]:
     """Sources of a distribution that is installed to be edited, and their names in the folder it tells of (PEP 610)."""
-    with suppress(ValueError, AttributeError, KeyError):  # of what tells nothing
+    with suppress(ValueError, AttributeError, KeyError, TypeError):  # of what tells nothing
         told = json.loads(distribution.read_text("direct_url.json") or "{}")
-        if told.get("dir_info", {}).get("editable"):
+        if told.get("dir_info", {}).get("editable") and told["url"]:
             folder = Path(url2pathname(urlsplit(told["url"]).path))
             found = [
                 one.relative_to(folder) for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()
