@@ -50,7 +50,7 @@ def flss() -> xr.Dataset:
 
 def compared() -> xr.Dataset:
     conditions = hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5)
-    slow = hexmj.Acceleration(rate=0.01)
+    slow = hexmj.Acceleration(rate=0.02)
     models = {ALPHA: hexmj.LDVS, "null": hexmj.load_controller("graham")}
     how: Any = {"n_starts": 3, "window": 20.0, "conditions": conditions, "acceleration": slow}
     return hexmj.compare(models, [0.3, 0.5], **how)
@@ -185,7 +185,7 @@ def test_settings_are_told_as_they_were_given():
     assert told["study"] == "compare"
     assert [*told["controllers"]] == [ALPHA, "null"]
     assert told["conditions"] == hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5).settings()
-    assert told["acceleration"] == {"rate": 0.01, "start": 0.1}
+    assert told["acceleration"] == {"rate": 0.02, "start": 0.1}
     assert (told["window"], told["starts"], told["seed"]) == (20.0, 3, 0)
     assert hexmj.settings(flss())["seed"] == 2**70
     assert hexmj.settings(flss())["acceleration"] is None
@@ -201,7 +201,7 @@ def test_the_title_tells_what_was_chosen():
         "= 200 mm/s",
         "friction 0.5",
         "ground: step",
-        "a = 0.01",
+        "a = 0.02",
     ):
         assert words in title
     assert "height" not in title, "what is as usual is not told"

@@ -123,7 +123,7 @@ def test_what_no_leg_reaches_is_never_found():
         (lambda: Askew(box_is=([1.0, 1.0], [0.0, 1.0])), "the form's box is"),
         (lambda: Askew(begin=np.zeros(3)), "a search begins at .*; expected 2 finite numbers"),
         (lambda: Askew(binary=np.zeros(3, dtype=bool)), "the form's binary = .*; expected True or False for 2"),
-        (lambda: Askew(binary=[False, False]), "binary of the form = .*; expected a ndarray"),
+        (lambda: Askew(binary=[False, False]), "binary of the form = .*; expected an array"),
     ],
 )
 def test_forms_that_make_no_sense_are_refused(form, sentence):

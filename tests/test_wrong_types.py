@@ -243,7 +243,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: environment_step(np.zeros(18) + 1j), "action = array([0.+1.j, "),
     (lambda: environment_step(["0.1"] * 18), "action = ['0.1', "),
     (lambda: hexmj.loss_time(replace(walk(), time=np.ones(3))), "a walk's time is float64 of the shape (3,); expected"),
-    (lambda: hexmj.loss_time(replace(walk(), x="no")), "a walk's x = 'no'; expected a ndarray"),
+    (lambda: hexmj.loss_time(replace(walk(), x="no")), "a walk's x = 'no'; expected an array"),
     (lambda: hexmj.loss_time(replace(walk(), geometry=3)), "geometry = 3; expected a Geometry"),
     (lambda: hexmj.loss_time(part_of(walk(), slice(0))), "a walk of 0 steps; expected at least 1"),
     (
