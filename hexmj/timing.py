@@ -100,6 +100,20 @@ def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Accelerati
         )
 
 
+def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
+    """Refuse velocities V_r, (velocity,), that an acceleration does not reach within a time, (velocity,) [time units].
+
+    Raises:
+        InputError: one of them.
+    """
+    if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity))).size:
+        v, end = velocity[late[0]], duration[late[0]]
+        raise InputError(
+            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, the window ends at {end:g}; expected a"
+            " longer one, or walk or start, which are counted from then"
+        )
+
+
 def observation_time(
     window: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:

@@ -50,6 +50,10 @@ NONSENSE = [
     (["search", "--verdict-starts", "0"], "verdict_starts = 0; expected"),
     (["search", "--verdict-seed", "0"], "expected another, for fresh starts"),
     (["search", "--verdict-seed", "-1"], "verdict_seed = -1; expected"),
+    (
+        ["search", "--acceleration", "0.01", "--window", "19"],
+        "V = 0.3 is reached at 20 time units, the window ends at 19",
+    ),
     (["search", "--domain", "nan"], "domain = nan; expected"),
     (["search", "--form", "lvds"], "forms of the 1998 network: hws, ldvs, mirrored, general"),
     (["search", "--form", "own"], "no field of the type float"),

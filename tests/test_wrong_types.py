@@ -326,6 +326,7 @@ def test_numbers_of_numpy_are_numbers():
     assert json.dumps(given.attrs) == json.dumps(usual.attrs)
     assert type(hexmj.Conditions.of(ground=np.str_("rough")).ground.ground) is str
     assert type(hexmj.Cruse1998(hexmj.LDVS.weights, name=np.str_("own")).name) is str
+    assert flss(n_starts=3, velocities=np.array(0.5)).identical(flss(n_starts=3, velocities=0.5))
     assert flss(n_starts=3, window=np.str_("start")).identical(flss(n_starts=3, window="start"))
     assert hexmj.Conditions.of(vp=np.float32(40.0), ground_seed=np.int32(2)).flat()["vp"] == 40.0
     stride = hexmj.Stride(dt=np.float32(0.25), geometry=hexmj.Geometry(origins=np.array([24, 0, -24])))  # pyright: ignore

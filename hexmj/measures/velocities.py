@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.errors import InputError
 from hexmj.starts import checked_list
-from hexmj.timing import Acceleration, Stride, check_reached, observation_time, steps_within
+from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_time, steps_within
 
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of an axis of velocities."""
@@ -16,7 +15,9 @@ VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 
 def several(velocities: Sequence[float] | float) -> Sequence[float]:
     """Velocities as a list, one alone too."""
-    alone = isinstance(velocities, Real) and not isinstance(velocities, bool)
+    alone = getattr(velocities, "ndim", None) == 0 or (
+        isinstance(velocities, Real) and not isinstance(velocities, bool)
+    )
     return [velocities] if alone else velocities  # pyright: ignore[reportReturnType]
 
 
@@ -31,11 +32,7 @@ def observed(
     v = checked_list(several(velocities), acceleration)
     check_reached(v, stride, acceleration)
     duration = observation_time(window, v, stride, acceleration)
-    if acceleration and (late := v[duration < acceleration.duration(v)]).size:
-        raise InputError(
-            f"V = {late[0]:g} is reached at {acceleration.duration(late[0]):g} time units, window = {window:g} ends"
-            " before; expected a longer one, or walk or start, which are counted from then"
-        )
+    check_in_time(v, duration, acceleration)
     steps_within(duration, stride)
     return v, duration
 

@@ -15,7 +15,7 @@ from hexmj.search.forms import Form
 from hexmj.search.network_forms import NetworkForm
 from hexmj.starts import checked_velocities
 from hexmj.sweeps.plain_settings import plain
-from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
+from hexmj.timing import WINDOWS, Acceleration, Stride, check_in_time, observation_time, steps_within
 from hexmj.variants import variants, varied
 
 FARTHEST = 1e6
@@ -69,7 +69,9 @@ class Problem:
                 f"over = {self.over!r} with {self.form!r:.80}; expected it with the 1998 network, whose rules vary"
             )
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
-        steps_within(observation_time(self.window, ends, self.stride, self.acceleration), self.stride)
+        duration = observation_time(self.window, ends, self.stride, self.acceleration)
+        check_in_time(ends, duration, self.acceleration)
+        steps_within(duration, self.stride)
         _ = self.variants
 
     @property
