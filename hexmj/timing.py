@@ -106,7 +106,7 @@ def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acce
     Raises:
         InputError: one of them.
     """
-    if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity))).size:
+    if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
         raise InputError(
             f"V = {v:g} is reached at {acceleration.duration(v):g} time units, the window ends at {end:g}; expected a"

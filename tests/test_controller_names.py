@@ -93,6 +93,12 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
         named, "entry_points", lambda name="", **_: [one for one in (point, parted) if one.name == name]
     )
     assert hexmj.load_controller("still-without-3").name == "still"
+    alone, ours = (EntryPoint(one, "mine_of_a_user", named.ENTRY_POINTS) for one in ("alone", "ldvs-without-1"))
+    points = point, parted, alone, ours
+    monkeypatch.setattr(named, "entry_points", lambda name="", **_: [one for one in points if one.name == name])
+    assert hexmj.load_controller("ldvs-without-1") == LDVS.without(1)
+    with pytest.raises(hexmj.InputError, match=r"^controller 'alone': a file, and which controller of it\?"):
+        hexmj.load_controller("alone")
     monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}

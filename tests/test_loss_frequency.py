@@ -67,7 +67,7 @@ def test_windows():
     assert observation_time(12.5, v, Stride()) == pytest.approx([12.5, 12.5])
     accelerated = observation_time("start", v, Stride(), Acceleration(0.001, 0.1))
     assert accelerated == pytest.approx([40.0, 440.0])
-    flss(LDVS, [0.1, 0.5], n_starts=2, window=401.0, acceleration=Acceleration(0.001))
+    flss(LDVS, [0.1, 0.4], n_starts=2, window=300.0, acceleration=Acceleration(0.001))
     with pytest.raises(InputError, match=r"^V = 0.5 is reached at 400 time units, the window ends at 399; expected"):
         flss(LDVS, [0.1, 0.5], n_starts=2, window=399.0, acceleration=Acceleration(0.001))
 

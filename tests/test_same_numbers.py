@@ -38,7 +38,7 @@ def test_json_and_toml_are_compared_by_their_keys(tmp_path):
         Compared("(structure)", 1, 0, None),
     ]
     (tmp_path / "old.toml").write_text("[weights]\na = 0.1\nb = [1, 2]\n")
-    (tmp_path / "new.toml").write_text("[weights]\na = 0.10000000000000002\nb = [1]\n")
+    (tmp_path / "new.toml").write_text("searched = { seeds = [0] }\n[weights]\na = 0.10000000000000002\nb = [1]\n")
     a, b, structure = compared(tmp_path / "old.toml", tmp_path / "new.toml")
     assert (a.differ, a.most) == (1, pytest.approx(1.4e-17, rel=0.1))
     assert (b.differ, b.misfit) == (2, "shape (2,) then, (1,) now")

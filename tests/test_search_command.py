@@ -32,7 +32,7 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
     assert answer["replayed"] == 0
     found = hexmj.load_controller(str(tmp_path / "found.toml"))
     assert found == hexmj.Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
-    assert searched_on(str(tmp_path / "found.toml")) == 0
+    assert searched_on(str(tmp_path / "found.toml")) == [0]
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
     assert history.best.values[-1] == answer["cost"]
@@ -226,7 +226,10 @@ def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path)
         code, _, error = run(*words, *option, "--out", first)
         assert code == 2
         assert "the search begins with found.toml there; expected another folder" in error
-    assert run(*words, "--form", found, "--out", again)[0] == 0
+    code, _, error = run(*words, "--form", found, "--seed", 1, "--verdict-seed", 0, "--out", again)
+    assert code == 2 and "--verdict-seed = 0 is that of the search that found what this one begins with" in error
+    assert run(*words, "--form", found, "--seed", 1, "--out", again)[0] == 0
+    assert searched_on(str(again / "found.toml")) == [0, 1]
     one = hexmj.load_controller(str(again / "found.toml"))
     assert type(one).__name__ == "Waits"
     assert one.name == "gewählt"

@@ -129,6 +129,11 @@ class Search(WalkingCommand):
             self.refuse_physical("without --physical")
         if self.verdict_seed == self.walks.seed:
             raise InputError(f"--verdict-seed = {self.verdict_seed} is also --seed; expected another, for fresh starts")
+        if self.verdict_seed in self._seeds:
+            raise InputError(
+                f"--verdict-seed = {self.verdict_seed} is that of the search that found what this one begins with;"
+                " expected another, for fresh starts"
+            )
         if any(one and Path(one).resolve() == (self.out / FOUND).resolve() for one in (self.form, self.begin)):
             raise InputError(f"--out {self.out}: the search begins with {FOUND} there; expected another folder")
         if self.velocity is not None and self.velocities is not None:
@@ -203,6 +208,13 @@ class Search(WalkingCommand):
         return self._range
 
     @property
+    def _seeds(self) -> list[int]:
+        """Of the searches that found what this one begins with."""
+        from hexmj.controllers.named import searched_on
+
+        return [seed for one in (self.form, self.begin) if one for seed in searched_on(one)]
+
+    @property
     def _range(self) -> tuple[float, float]:
         v = 0.3 if self.velocity is None else self.velocity
         return self.velocities or (v, v)
@@ -223,8 +235,8 @@ class Search(WalkingCommand):
     def _write(self, problem: "Problem", found: "Found", settings: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
 
-        seed = self.walks.seed
-        text = f"# hexmj search: {self._title}\nsearched = {{ seed = {seed} }}\n{self._toml(problem, found)}"
+        seeds = [*self._seeds, self.walks.seed]
+        text = f"# hexmj search: {self._title}\nsearched = {{ seeds = {seeds} }}\n{self._toml(problem, found)}"
         history = found.history.assign_attrs(title=self._title)
         files = [
             save_dataset(history, self.out / "history.nc"),

@@ -63,7 +63,7 @@ class WalkingCommand:
 
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
         bases = dict.fromkeys(self.controlled.preset_of(name) for name in self.names)
-        known = [name for name in bases if searched_on(name) == self.walks.seed]
+        known = [name for name in bases if self.walks.seed in searched_on(name)]
         line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
         stride = self.walks.stride
         told = vars(stride) | {"geometry": {one: name for name, one in GEOMETRIES.items()}[stride.geometry]}

@@ -17,7 +17,7 @@ from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.toml_fields import with_fields
 from hexmj.errors import InputError
-from hexmj.storage.files import read_toml
+from hexmj.storage.files import SEARCHED, read_toml
 from hexmj.storage.literal import literal
 from hexmj.user_code.loaded import importable
 
@@ -29,9 +29,6 @@ NO_FILE = "expected the path of one from the current folder; ~ is expanded by sh
 
 VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
 """Names of controllers of which one mechanism or rule is left out, or switched on."""
-
-SEARCHED = "searched"
-"""What a file that `hexmj search` wrote tells of its starts."""
 
 PART = re.compile(r"(-(without|with)-\d)+$")
 """The end of such names."""
@@ -57,9 +54,10 @@ def load_controller(name: str) -> Controller:
     where, colon, what = name.rpartition(":")
     if colon and where and what.isidentifier():
         return _found(where, what, name)
-    for point in entry_points(group=ENTRY_POINTS, name=name):
-        return _found(point.module, point.attr, name)
-    if varied := VARIED.fullmatch(name):
+    varied, ours = VARIED.fullmatch(name), PART.sub("", name) in {*PRESETS, *rivals}
+    for point in () if varied and ours else entry_points(group=ENTRY_POINTS, name=name):
+        return _found(point.module, point.attr or "", name)
+    if varied:
         return _varied(varied["name"], varied["how"], int(varied["which"]))
     path = Path(name)
     if path.suffix == ".py" and isfile(path):
@@ -80,19 +78,20 @@ def load_controller(name: str) -> Controller:
     return read_network(table, name, literal(path.stem))
 
 
-def searched_on(name: str) -> int | None:
-    """The seed of the starts on which a search found a controller, as its file tells: there it looks better than it is.
+def searched_on(name: str) -> list[int]:
+    """Seeds of the starts on which searches found a controller, as its file tells: there it looks better than it is.
 
     Raises:
         InputError: a file that cannot be read.
     """
     if name in PRESETS:
-        return presets.searched_on(name)
+        seed = presets.searched_on(name)
+        return [] if seed is None else [seed]
     from hexmj.controllers.rivals.evolved import FOUND
 
     file = FOUND if name == "evolved" else Path(name)
     told = read_toml(file).get(SEARCHED) if file.suffix == ".toml" and isfile(file) else None
-    return told.get("seed") if isinstance(told, dict) else None
+    return told.get("seeds", [told.get("seed")]) if isinstance(told, dict) else []
 
 
 def known_names() -> Iterator[str]:

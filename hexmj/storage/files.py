@@ -24,6 +24,9 @@ MARK = b"\nhexmj, sha256 "
 SEAL = len(MARK) + 64
 """Length of both [bytes]."""
 
+SEARCHED = "searched"
+"""What a TOML that `hexmj search` wrote tells of the starts on which it searched."""
+
 WRITTEN: dict[Path, str] = {}
 """File -> SHA-256 of what this process wrote to it last, whatever another one has put there since."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.storage import netcdf
-from hexmj.storage.files import STAMP, read_bytes, read_text, read_toml, unsealed
+from hexmj.storage.files import SEARCHED, STAMP, read_bytes, read_text, read_toml, unsealed
 
 ATTRIBUTES = "(attributes)"
 """Stands for all attributes of a NetCDF file and of its variables."""
@@ -159,5 +159,10 @@ def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:
         yield keys, math.nan if value is None else value  # what JSON has for numbers that are not finite
 
 
-_READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": lambda path: _gathered(read_toml(path))}
+def _of_toml(path: Path) -> dict[str, np.ndarray]:
+    """What was found; on which starts stands in its title, too, and not at all in older files."""
+    return _gathered({key: one for key, one in read_toml(path).items() if key != SEARCHED})
+
+
+_READERS = {".nc": _of_netcdf, ".json": _of_json, ".toml": _of_toml}
 """End of a file's name -> what reads all that it holds, by name."""
