@@ -298,6 +298,23 @@ def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
     assert hexmj.load_controller(str(path)) == replace(usual, name="found")
 
 
+@pytest.mark.parametrize(
+    ("told", "seeds"),
+    [
+        ("{ seeds = [4, 5] }", [4, 5]),
+        ("{ starts = 40, seed = 0 }", [0]),
+        ("{ seeds = 5 }", []),
+        ('"x"', []),
+        ("[]", []),
+    ],
+)
+def test_a_file_tells_the_seeds_of_the_searches_that_found_it(told, seeds, tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(f"searched = {told}\n{network_toml(LDVS)}")
+    assert named.searched_on(str(path)) == seeds
+    assert hexmj.load_controller(str(path)) == replace(LDVS, name="found")
+
+
 def test_toml_that_names_itself_is_refused(tmp_path):
     path = tmp_path / "ring.toml"
     path.write_text(f"controller = '{path}'\n[fields]\n")

@@ -91,7 +91,8 @@ def searched_on(name: str) -> list[int]:
 
     file = FOUND if name == "evolved" else Path(name)
     told = read_toml(file).get(SEARCHED) if file.suffix == ".toml" and isfile(file) else None
-    return told.get("seeds", [told.get("seed")]) if isinstance(told, dict) else []
+    seeds = told.get("seeds", [told.get("seed")]) if isinstance(told, dict) else []
+    return seeds if isinstance(seeds, list) else []
 
 
 def known_names() -> Iterator[str]:
