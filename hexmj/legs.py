@@ -81,7 +81,7 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         behind: how many axes come after that of the legs.
 
     Raises:
-        InputError: labels of other legs, or of one twice.
+        InputError: labels of other legs, of one twice, or that could be of two axes.
     """
     several: Iterable[Any] = values if type(values) in (list, tuple) else ()
     if any(hasattr(one, "iloc") or hasattr(one, "dims") for one in several):
@@ -104,7 +104,11 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
 
 def _of_xarray(values: Any, name: str, behind: int) -> tuple[Any, list[Any]]:
     """Values, their axis of the legs where it is expected, and its labels: its own, or the only others with a leg's
-    name."""
+    name.
+
+    Raises:
+        InputError: labels that could be of two axes, or several along one.
+    """
     single = {name: one for name, one in getattr(values, "coords", {}).items() if len(one.dims) == 1}
     whole = [axis for axis in values.dims if axis in single and {*map(str, single[axis].values)} == {*LEGS}]
     axis = "leg" if "leg" in values.dims else whole[0] if len(whole) == 1 else [*values.dims][-1 - behind]
@@ -115,10 +119,8 @@ def _of_xarray(values: Any, name: str, behind: int) -> tuple[Any, list[Any]]:
     named = {key: one for key, one in single.items() if _name_legs(one.values)}
     beside = [one.values for one in named.values() if one.dims == (axis,)]
     own = [single["leg"].values] if "leg" in single else [named[axis].values] if axis in named else []
-    many = [
-        one.dims[0] for one in named.values() if one.dims != (axis,) and len(one) == len(LEGS) == values.sizes[axis]
-    ]
-    if not own and (len(beside) > 1 or (many and not beside and axis != "leg")):
+    elsewhere = [one for one in named.values() if one.dims != (axis,) and len(one) == len(LEGS) == values.sizes[axis]]
+    if not own and (len(beside) > 1 or (elsewhere and not beside and axis != "leg")):
         raise InputError(f"{name} have several labels of legs, or none along {axis}; expected those of an axis leg")
     return values, [label for labels in own or beside for label in labels]
 

@@ -82,7 +82,7 @@ class Acceleration:
         return (velocity - self.start) / self.rate
 
     def lag(self, velocity: Any, time: Any) -> Any:
-        """What is walked less within a time [time units] than at V_r throughout [mm]."""
+        """What is walked less within a time [time units] by Eq. 11 than at V_r throughout [mm]."""
         short = np.minimum(time, self.duration(velocity))
         return (velocity - self.start) * short - self.rate * short**2 / 2
 
@@ -101,7 +101,7 @@ def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Accelerati
 
 
 def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
-    """Refuse velocities V_r, (velocity,), that an acceleration does not reach within a time, (velocity,) [time units].
+    """Refuse V_r, (velocity,) fractions of V_p, not reached by Eq. 11 within a time, (velocity,) [time units].
 
     Raises:
         InputError: one of them.

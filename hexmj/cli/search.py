@@ -147,7 +147,7 @@ class Search(WalkingCommand):
         how = {name: value for name, value in self.walked.items() if name != "seed"}
         conditions = self.conditions if self.physical else None
         chosen = {"feedback": self.controlled.feedback, "over": self.over, "ties": self.ties}
-        return Problem(self._form(), *self._range, **how, conditions=conditions, **chosen)
+        return Problem(self._form(), *self.commanded, **how, conditions=conditions, **chosen)
 
     @property
     def _as_begun(self) -> Controlled:
@@ -204,10 +204,6 @@ class Search(WalkingCommand):
         return "physical" if self.physical else "kinematic"
 
     @property
-    def commanded(self) -> tuple[float, float]:
-        return self._range
-
-    @property
     def _seeds(self) -> list[int]:
         """Of the searches that found what this one begins with."""
         from hexmj.controllers.named import searched_on
@@ -215,7 +211,7 @@ class Search(WalkingCommand):
         return [seed for one in (self.form, self.begin) if one for seed in searched_on(one)]
 
     @property
-    def _range(self) -> tuple[float, float]:
+    def commanded(self) -> tuple[float, float]:
         v = 0.3 if self.velocity is None else self.velocity
         return self.velocities or (v, v)
 
@@ -225,7 +221,7 @@ class Search(WalkingCommand):
 
     @property
     def _title(self) -> str:
-        low, high = self._range
+        low, high = self.commanded
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
         at += f", {self.over} of all variants" if self.over != "usual" else ""
         at += ", later losses first among equals" if self.ties == "later" else ""

@@ -85,8 +85,7 @@ def searched_on(name: str) -> list[int]:
         InputError: a file that cannot be read.
     """
     if name in PRESETS:
-        seed = presets.searched_on(name)
-        return [] if seed is None else [seed]
+        return presets.searched_on(name)
     from hexmj.controllers.rivals.evolved import FOUND
 
     file = FOUND if name == "evolved" else Path(name)

@@ -138,7 +138,7 @@ def _entries() -> dict[str, Any]:
     return read_toml(OWN)
 
 
-def searched_on(name: str) -> int | None:
-    """The seed of the starts on which a search found a set of our own, where it looks better than it is."""
+def searched_on(name: str) -> list[int]:
+    """The seed of the starts on which a search found a set of our own, where it looks better than it is; or none."""
     found = re.search(r"--seed (\d+)", _entries()[name]["command"]) if name not in _PAPER and name in PRESETS else None
-    return int(found[1]) if found else None
+    return [int(found[1])] if found else []
