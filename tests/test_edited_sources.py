@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, KeptValues
-from hexmj.sweeps import code as sources
+from hexmj.sweeps import Cell, KeptValues, module_sources
 from hexmj.sweeps.code import code
 from hexmj.user_code import parsing
 from hexmj.user_code.loaded import importable
@@ -26,10 +25,10 @@ from toy_project import write_toy
 
 
 def test_a_source_that_was_edited_since_the_program_began_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    name, file = "hexmj.errors", sources.PACKAGE / "errors.py"
-    monkeypatch.setitem(sources._AT_FIRST, str(file), 0)
+    name, file = "hexmj.errors", module_sources.PACKAGE / "errors.py"
+    monkeypatch.setitem(module_sources.AT_FIRST, str(file), 0)
     with pytest.raises(InputError, match=r"errors\.py was edited since this program began; start it again"):
-        sources._read.__wrapped__(name, file)
+        module_sources.read_module.__wrapped__(name, file)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")

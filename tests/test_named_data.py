@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from hexmj.sweeps import code
-from hexmj.sweeps.code import data_of_users, sources_of_users
+from hexmj.sweeps import code, module_files, named_data
+from hexmj.sweeps.code import sources_of_users
+from hexmj.sweeps.named_data import data_of_users
 
 
 @pytest.mark.parametrize(
@@ -38,8 +39,8 @@ def test_what_libraries_open_by_themselves_is_found(
         f"{here}from named_by_helper import *\nFILE = {mine.format(root=tmp_path, HERE='{HERE}')}\n"
     )
     monkeypatch.syspath_prepend(src)
-    for known in ("_FILES", "_KNOWN"):
-        monkeypatch.setattr(code, known, {})
+    monkeypatch.setattr(module_files, "_FILES", {})
+    monkeypatch.setattr(code, "_KNOWN", {})
     importlib.invalidate_caches()
     modules = frozenset({"named_by_mine"})
     unheard, others = data_of_users(modules)
@@ -48,4 +49,4 @@ def test_what_libraries_open_by_themselves_is_found(
 
 
 def test_an_mjcf_that_is_gone_as_it_is_looked_through_is_not_there(tmp_path: Path) -> None:
-    assert code._parts(tmp_path / "leg.xml") == []
+    assert named_data._parts(tmp_path / "leg.xml") == []

@@ -14,14 +14,8 @@ from typing import Any
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.code import (
-    OPEN_BY_THEMSELVES,
-    code,
-    data_of_users,
-    files_of_classes,
-    sources_of_users,
-    sources_to_edit,
-)
+from hexmj.sweeps.code import code, files_of_classes, sources_of_users, sources_to_edit
+from hexmj.sweeps.named_data import OPEN_BY_THEMSELVES, data_of_users
 from hexmj.sweeps.plain_settings import classes, label, named_files, plain, stands_there
 from hexmj.user_code.opened_files import (
     also_read,
