@@ -84,14 +84,14 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         InputError: labels of other legs, of one twice, or that could be of two axes.
     """
     several: Iterable[Any] = values if type(values) in (list, tuple) else ()
-    if any(hasattr(one, "iloc") or hasattr(one, "dims") for one in several):
+    if any(hasattr(one, "iloc") or _is_of_xarray(one) for one in several):
         return [in_order(one, name, behind) for one in several]
     labels = [] if behind else [*getattr(values, "columns", ())]
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
         on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
-        values = values.T if on_its_side and (len(values) == len(LEGS) or {*values.index} == {*LEGS}) else values
+        values = values.T if on_its_side and len(values) == len(LEGS) else values
         labels = [*values.axes[-1 - behind]]
-    elif hasattr(values, "dims") and len(values.dims) > behind:  # of xarray
+    elif _is_of_xarray(values) and len(values.dims) > behind:
         values, labels = _of_xarray(values, name, behind)
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
@@ -100,6 +100,10 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     if len(places) != len(labels):
         raise InputError(f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
     return np.take(np.asarray(values), places, axis=-1 - behind)
+
+
+def _is_of_xarray(values: Any) -> bool:
+    return hasattr(values, "dims") and hasattr(values, "sizes")
 
 
 def _of_xarray(values: Any, name: str, behind: int) -> tuple[Any, list[Any]]:

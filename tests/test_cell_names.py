@@ -204,6 +204,22 @@ def test_what_an_installed_helper_requires_counts(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_installed_helper_that_requires_this_package_may_use_all_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    helper = {"my_helper.py": ""}
+    install(folder := tmp_path / "site-packages", "my_helper", "1.0", helper, "Requires-Dist: hexmj\n")
+    found = []
+    for edit in ("# 1", "# 2"):
+        package = tmp_path / edit / "hexmj"
+        shutil.copytree(packages.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+        (package / "gaits.py").write_text(f"{(package / 'gaits.py').read_text()}{edit}\n")
+        monkeypatch.chdir(package.parent)  # where Python looks first
+        found.append(versions_with(tmp_path / "mine.py", folder))
+    assert found[0].pop("hexmj") != found[1].pop("hexmj")
+    assert found[0] == found[1]
+
+
 def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_by_its_sources(tmp_path: Path) -> None:
     """But not by what is installed within its folder."""
     (source := tmp_path / "my project").mkdir()

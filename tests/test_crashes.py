@@ -194,6 +194,10 @@ def test_rows_that_are_none_are_refused(odd: Any) -> None:
         KeptValues(Cell("squares", squares, {}))(odd)
 
 
+def test_no_rows_have_no_values() -> None:
+    assert KeptValues(Cell("squares", squares, {}))(np.array([])).tolist() == []
+
+
 def test_a_line_after_one_that_was_torn_stands_by_itself(tmp_path: Path) -> None:
     rows, cell = np.eye(4), Cell("squares", squares, {})
     values = KeptValues(cell, tmp_path)

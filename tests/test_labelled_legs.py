@@ -2,7 +2,9 @@
 
 from typing import Any
 
+import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from scipy import sparse
@@ -51,6 +53,13 @@ def test_labelled_legs_may_come_in_any_order():
     five = other[:5].assign_coords(lost=("start", [*LEGS[:5]]))
     for given, those in ((tips.assign_coords(opposite=opposite, lost=lost), starts), (five, starts[:5])):
         assert np.array_equal(walk(given).x, walk(those).x)
+    first = labelled.sel(leg=shuffled).rename(leg="k").T.drop_vars("k").assign_coords(leg=("k", shuffled))
+    assert np.array_equal(walk(first).x, walk(starts).x)
+    for index in (["R1", "L1", "R2", "R3", "L2", "L3"], [*LEGS, "L1", "none"]):  # which leg each lost first
+        many = np.resize(starts, (len(index), 6))
+        assert np.array_equal(walk(pd.DataFrame(many, index, [*LEGS])).x, walk(many).x)
+        if len(index) > 6:
+            assert np.array_equal(walk(pd.DataFrame(many, index)).x, walk(many).x)
     twice = other.assign_coords(one=("tip", [*LEGS]), other=opposite)
     sideways = labelled.rename(leg="tip").T
     for given in (
@@ -96,6 +105,9 @@ def test_labelled_legs_of_a_posture_may_come_in_any_order():
     assert np.array_equal(hexmj.stability_margin(feet[:6], table[shuffled][:6].T), margin[:6])
     assert len(hexmj.support_polygon(places.loc[["R2", "L3", "L1"]], [1, 1, 1])) == 3
     assert np.array_equal(hexmj.stability_margin(places.set_axis(range(6, 12)), stands[0]), margin[0])
+    with h5py.File("kept", "w", driver="core", backing_store=False) as kept:  # its datasets have axes without names
+        kept["feet"] = feet
+        assert np.array_equal(hexmj.stability_margin(kept["feet"], stands), margin)
     with pytest.raises(hexmj.InputError, match=r"^feet \(6,\) and stance"):
         hexmj.stability_margin(places.iloc[:, 0], stands[0])
     with pytest.raises(hexmj.InputError, match=r"^stance of the legs .*; expected L1, L2, L3, R1, R2, R3$"):

@@ -118,10 +118,7 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
         if value.keys() <= signature(kind).parameters.keys():
             return _made(kind, usual, value)
     elif np.ndarray in (kind, get_origin(kind)) and isinstance(value, list):
-        with suppress(ValueError):  # of rows of several lengths
-            made = np.array(value)
-            floats = isinstance(usual, np.ndarray) and usual.dtype.kind == "f" and made.dtype.kind == "i"
-            return made.astype(usual.dtype) if floats else made
+        return _as_array(value, kind, usual)
     elif kind is tuple and isinstance(value, list):
         return tuple(value)
     elif get_origin(kind) in _ROWS and isinstance(value, list):
@@ -130,4 +127,28 @@ def _as_one(name: str, value: Any, kind: Any, usual: Any) -> Any:
         if len(each) == len(value):
             with suppress(InputError):  # the sentence is of the whole row
                 return tuple(map(_fitting, repeat(name), value, each))
+    return None
+
+
+def _as_array(value: list[Any], kind: Any, usual: Any) -> np.ndarray | None:
+    """An array of numbers, truth values or texts, as it is annotated, or as the usual one where that has floats; None
+    of a mixture, of rows of several lengths, and of numbers that the type does not hold."""
+    with suppress(ValueError):
+        made = np.array(value)
+        kinds = {float if type(one) is int else type(one) for one in np.array(value, dtype=object).flat}
+        if len(kinds) > 1 or made.dtype.kind not in "biufU":
+            return None
+        floats = isinstance(usual, np.ndarray) and usual.dtype.kind == "f"
+        wanted = _annotated(kind) or (usual.dtype if floats else made.dtype)
+        alike = wanted.kind == made.dtype.kind or (wanted.kind in "fc" and made.dtype.kind in "iuf")
+        return made.astype(wanted) if alike else None
+    return None
+
+
+def _annotated(kind: Any) -> np.dtype | None:
+    """The type of an array's elements, as `NDArray[np.float64]` has it; None where it tells no single one."""
+    for inner in (one for of in get_args(kind)[1:] for one in get_args(of)):
+        one = {np.floating: np.float64, np.inexact: np.float64, np.integer: np.int64}.get(inner, inner)
+        if isinstance(one, type) and issubclass(one, np.generic) and not one.__subclasses__():
+            return np.dtype(one)
     return None

@@ -65,7 +65,7 @@ class KeptValues:
             UserWarning: values are not kept, or of a file that has changed since, as of `finish`.
         """
         rows = np.ascontiguousarray(numbers("rows", rows))
-        if rows.ndim != 2:
+        if rows.ndim != 2 and len(rows):
             raise InputError(f"rows have the shape {rows.shape}; expected (row, number)")
         keys, by_a_cell = [row.tobytes() for row in rows], serves()
         self._replayed |= self._held.intersection(keys)

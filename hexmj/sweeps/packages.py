@@ -17,6 +17,7 @@ from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
 from hexmj.storage.files import digest, digest_of
+from hexmj.sweeps.plain_settings import PACKAGE
 from hexmj.user_code.sources_as_run import INSTALLED
 
 NAMES = {"PIL": "pillow"}
@@ -31,10 +32,13 @@ LARGE = 1_000_000
 
 
 def versions(modules: Iterable[str]) -> dict[str, str]:
-    """Of some modules, see `version`, and of all that their distributions require, beyond what this package does."""
+    """Of some modules, see `version`, and of all that their distributions require, beyond what this package does; this
+    one with a digest of its files, since nobody knows which of them they use."""
     told = {name: version(name) for name in modules}
     for name in _required_by(told):
         told.setdefault(name, version(name.replace("-", "_")))  # as modules are mostly called
+    if PACKAGE.name in told:
+        told[PACKAGE.name] += _digest(_held(PACKAGE))
     return told
 
 
@@ -110,12 +114,16 @@ def _to_edit(distribution: Distribution) -> dict[str, str]:
     with suppress(ValueError, AttributeError, KeyError, TypeError):  # of what tells nothing
         told = json.loads(distribution.read_text("direct_url.json") or "{}")
         if told.get("dir_info", {}).get("editable") and told["url"]:
-            folder = Path(url2pathname(urlsplit(told["url"]).path))
-            found = [
-                one.relative_to(folder) for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()
-            ]
-            return {str(folder / one): one.as_posix() for one in found if INSTALLED.isdisjoint(one.parts)}
+            return _sources(Path(url2pathname(urlsplit(told["url"]).path)))
     return {}
+
+
+@cache
+def _sources(folder: Path) -> dict[str, str]:
+    """Files of what can be imported from a folder, and their names in it."""
+    found = [one for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()]
+    names = {str(one): one.relative_to(folder) for one in found if os.access(one, os.R_OK)}
+    return {file: name.as_posix() for file, name in names.items() if INSTALLED.isdisjoint(name.parts)}
 
 
 def _of_no_distribution(module: str) -> str:
