@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -111,7 +112,7 @@ def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, 
     Path("sums.py").write_text(SUMS)
     Path("copy.toml").write_text(network_toml(hexmj.PRESETS["own-0.4"]))
     found = network_toml(replace(hexmj.LDVS, weights=hexmj.Symmetric(p1_i=1.25)))
-    Path("found.toml").write_text(f"searched = {{seed = 0}}\n{found}")
+    Path("found.toml").write_text(f"searched = {{seeds = [0]}}\n{found}")
     Path("mine.toml").write_text("controller = 'own-0.4'\n[fields]\norder = 'undelayed'\n")
     short = ["--velocities", 0.4, "--starts", 2, "--window", 3]
     assert told in run("flss", *words, *short)[1].replace("\n", " ").replace("  ", " ")
@@ -138,6 +139,24 @@ def test_the_last_line_tells_of_a_ground_that_nobody_gets_to(run, tmp_path, word
     out = run("walk", "--physical", "--window", 20, *usual, *words, "--out", tmp_path / "walk")[1]
     assert ("; nobody gets to what lies ahead: 10 mm are walked at most" in " ".join(out.split())) == told
     assert ("nobody" in out) == told
+
+
+@pytest.mark.parametrize(
+    ("at", "told"), [(150, ""), (170, "; nobody gets to what lies ahead: 120 mm are walked at most")]
+)
+def test_a_walk_that_accelerates_gets_less_far(run, at, told):
+    """In 400 time units 200 mm at V = 0.5, less (0.5 - 0.1)^2 / (2 a) that it is late, with front feet 38 mm ahead."""
+    words = ["flss", "--physical", "--starts", 1, "--velocities", 0.5, "--window", 400, "--acceleration", 0.001]
+    out = run(*words, "--initial-velocity", 0.1, "--ground", "step", "--ground-height", 0.1, "--ground-at", at)[1]
+    assert told in " ".join(out.split()) and ("nobody" in out) == bool(told)
+
+
+def test_the_last_line_tells_so_of_who_stands_and_of_the_animals_walks(run, tmp_path):
+    far = ["--ground", "step", "--ground-at", 5000]
+    words = ["walk", "--physical", "--velocity", 0, "--window", 10], ["biology", "--starts", 1, "--periods", 4]
+    for one, told in zip(words, ("0", "[0-9.]+"), strict=True):
+        out = run(*one, *far, "--out", tmp_path / one[0])[1]
+        assert re.search(f"; nobody gets to what lies ahead: {told} mm are walked at most", " ".join(out.split()))
 
 
 @pytest.mark.thorough

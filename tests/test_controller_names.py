@@ -14,6 +14,7 @@ import hexmj
 from hexmj.controllers import named
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.protocol import settings_of
+from hexmj.controllers.searched import searched_on
 from hexmj.sweeps.plain_settings import plain
 from stepwise_ldvs import Own
 
@@ -97,11 +98,16 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     points = point, parted, alone, ours
     monkeypatch.setattr(named, "entry_points", lambda name="", **_: [one for one in points if one.name == name])
     assert hexmj.load_controller("ldvs-without-1") == LDVS.without(1)
-    with pytest.raises(hexmj.InputError, match=r"^controller 'alone': a file, and which controller of it\?"):
+    with pytest.raises(hexmj.InputError, match=r"^entry point 'alone' = 'mine_of_a_user'; expected module:object$"):
         hexmj.load_controller("alone")
     monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}
+    monkeypatch.setattr(
+        named, "entry_points", lambda name="still-without-3", **_: [parted] if name == parted.name else []
+    )
+    (tmp_path / "tall.toml").write_text('controller = "still-without-3"\n[fields]\nname = "own"\n')
+    assert hexmj.load_controller("tall.toml").name == "own"
 
 
 def test_a_field_may_have_a_type_for_type_checkers_alone(mine, tmp_path):
@@ -149,6 +155,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 import numpy as np
+from numpy.typing import NDArray
 from hexmj import timing
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Optional, Sequence
 
@@ -211,6 +218,8 @@ class Odd:
     bare: tuple = ()
     whole: np.ndarray = field(default_factory=lambda: np.ones(1, int))
     gains: np.ndarray = field(default_factory=lambda: np.ones(1))
+    counts: NDArray[np.int64] | None = None
+    phases: NDArray[np.floating] | None = None
     level: Literal["a", 1] = 1
     fixed: ClassVar[int] = 3
     own: Own = Own.HERE
@@ -247,6 +256,9 @@ class Odd:
         ('[fields]\nbare = "a"', "bare = 'a'; expected a tuple"),
         ('[fields]\ngains = "a"', "gains = 'a'; expected an array"),
         ("[fields]\ngains = [[1], [2, 3]]", "gains = .*; expected an array"),
+        ('[fields]\ngains = [1, "a"]', "gains = .*; expected an array"),
+        ("[fields]\ngains = [true, 2]", "gains = .*; expected an array"),
+        ("[fields]\ncounts = [1.5]", "counts = .*; expected an array"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -272,12 +284,13 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     told = {"modes": ["SLOW"], "inners": [{"g": 2}], "some": [1, 2], "own": "HERE", "which": {"g": 2.0}}
     told |= {"bare": [1, "a"], "gains": [1, 2], "whole": [0.5], "level": 1}
     told |= {"place": "there", "legs": [1, 2], "mode": "SLOW", "other": "slow", "plain": {"g": 2}, "inner": {"g": 2}}
-    told |= {"heir": {"g": 3}, "other_kind": {"c": 4}}
+    told |= {"heir": {"g": 3}, "other_kind": {"c": 4}, "counts": [3], "phases": [1, 2]}
     told |= {"usual": {"g": 4}, "part": {"c": 4, "deep": {"a": 7}}, "file": "gains.toml", "files": ["a", "b"]}
     Path("odd.toml").write_text(tomli_w.dumps({"controller": "odd.py:Odd", "fields": told}))
     odd: Any = hexmj.load_controller("odd.toml")
     assert repr(odd.legs) == "(1.0, 2.0)"
     assert repr([odd.bare, odd.gains, odd.whole, odd.level]) == "[(1, 'a'), array([1., 2.]), array([0.5]), 1]"
+    assert [str(one.dtype) for one in (odd.counts, odd.phases)] == ["int64", "float64"]
     assert repr([odd.modes, odd.inners, odd.some]) == "[(<Mode.SLOW: 'slow'>,), (Inner(g=2.0),), [1, 2]]"
     assert repr([odd.own, odd.which]) == "[<Own.HERE: 1>, Inner(g=2.0)]"
     assert repr([odd.mode, odd.other]) == "[<Mode.SLOW: 'slow'>, <Mode.SLOW: 'slow'>]"
@@ -302,17 +315,40 @@ def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
     ("told", "seeds"),
     [
         ("{ seeds = [4, 5] }", [4, 5]),
-        ("{ starts = 40, seed = 0 }", [0]),
+        ('{ seeds = [4, true, "x", 2020-01-01] }', [4]),
+        ("{ starts = 40, seed = 0 }", []),
         ("{ seeds = 5 }", []),
         ('"x"', []),
         ("[]", []),
     ],
 )
 def test_a_file_tells_the_seeds_of_the_searches_that_found_it(told, seeds, tmp_path):
-    path = tmp_path / "found.toml"
-    path.write_text(f"searched = {told}\n{network_toml(LDVS)}")
-    assert named.searched_on(str(path)) == seeds
-    assert hexmj.load_controller(str(path)) == replace(LDVS, name="found")
+    for name in ("found.toml", "found"):
+        path = tmp_path / name
+        path.write_text(f"searched = {told}\n{network_toml(LDVS)}")
+        found = hexmj.load_controller(str(path))
+        assert found == replace(LDVS, name="found")
+        for one in (str(path), f"{path}-without-3"):
+            assert searched_on(one, found) == ({str(path): seeds} if seeds else {})
+
+
+def test_our_own_sets_are_known_by_any_name(tmp_path):
+    (tmp_path / "mine.toml").write_text(f"searched = {{ seeds = [7] }}\n{network_toml(hexmj.PRESETS['own-0.4'])}")
+    (tmp_path / "same.toml").write_text('controller = "evolved"\n')
+    (tmp_path / "other.toml").write_text('controller = "evolved"\nfields = { tau = 0.0 }\n')
+    mine = str(tmp_path / "mine.toml")
+    for name, seeds in (
+        (mine, {"own-0.4": [0], mine: [7]}),
+        ("own-0.4-without-3", {"own-0.4": [0]}),
+        ("robust-0.3", {"robust-0.3": [0, 5]}),
+        ("hexmj:LDVS", {}),
+        ("uncoordinated", {}),
+        ("walknet", {}),
+        *((one, {"evolved": [0]}) for one in ("evolved", "hexmj.controllers.rivals.evolved:EVOLVED")),
+        (str(tmp_path / "same.toml"), {"evolved": [0]}),
+        (str(tmp_path / "other.toml"), {}),
+    ):
+        assert searched_on(name, hexmj.load_controller(name)) == seeds
 
 
 def test_toml_that_names_itself_is_refused(tmp_path):

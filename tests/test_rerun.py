@@ -284,6 +284,8 @@ def test_words_that_decide_nothing_are_left_out(tmp_path, monkeypatch):
     assert files(["render", "a.nc", "--model=mine.py:X", "--beside", "weights.toml"]) == [
         *map(Path, ("a.nc", "mine.py", "weights.toml"))
     ]
+    Path("weights.toml").write_text("controller = 'mine.py:X-without-1'")
+    assert files(["flss", "--model", "weights.toml-without-2"]) == [*map(Path, ("weights.toml", "mine.py"))]
 
 
 def test_files_that_are_named_like_a_window_a_number_or_a_controller_do_not_count(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,19 @@ import xarray as xr
 import hexmj
 from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import READINGS, Cruse1998
-from hexmj.controllers.named import searched_on
+from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.searched import searched_on
 from waiting_legs import OWN
 
 PNG = b"\x89PNG"
 
 SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "start", "--starts", 40, "--budget", 40,
           "--refine-starts", 100, "--refine-budget", 20, "--verdict-starts", 500]  # fmt: skip
+
+
+def found_on(path: Path) -> dict[str, list[int]]:
+    """What a file tells of the searches that found it."""
+    return searched_on(str(path), hexmj.load_controller(str(path)))
 
 
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
@@ -32,7 +39,7 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
     assert answer["replayed"] == 0
     found = hexmj.load_controller(str(tmp_path / "found.toml"))
     assert found == hexmj.Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
-    assert searched_on(str(tmp_path / "found.toml")) == [0]
+    assert [*found_on(tmp_path / "found.toml").values()] == [[0]]
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.sizes == {"evaluation": answer["evaluations"], "parameter": 9}
     assert history.best.values[-1] == answer["cost"]
@@ -222,17 +229,31 @@ def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path)
     assert run(*words, "--form", form, "--out", first)[0] == 0
     found = first / "found.toml"
     found.write_text(found.read_text() + 'name = "gewählt"\n')
-    for option in (["--form", found], ["--form", form, "--begin", found]):
+    for option in (["--form", found], *(["--form", form, "--begin", f"{found}{part}"] for part in ("", "-without-1"))):
         code, _, error = run(*words, *option, "--out", first)
         assert code == 2
         assert "the search begins with found.toml there; expected another folder" in error
+    code, _, error = run(*words, "--form", f"{found}-without-1", "--out", again)
+    assert code == 2 and f"--form = {found}-without-1; expected {found}, or the controller" in " ".join(error.split())
     code, _, error = run(*words, "--form", found, "--seed", 1, "--verdict-seed", 0, "--out", again)
     assert code == 2 and "--verdict-seed = 0 is that of the search that found what this one begins with" in error
     assert run(*words, "--form", found, "--seed", 1, "--out", again)[0] == 0
-    assert searched_on(str(again / "found.toml")) == [0, 1]
+    assert [*found_on(again / "found.toml").values()] == [[0, 1]]
     one = hexmj.load_controller(str(again / "found.toml"))
     assert type(one).__name__ == "Waits"
     assert one.name == "gewählt"
+
+
+@pytest.mark.parametrize(
+    ("begin", "seed"), [("own-0.4-without-3", 0), ("robust-0.3", 0), ("robust-0.3", 5), ("mine.toml-without-3", 7)]
+)
+def test_a_verdict_on_starts_of_earlier_searches_is_refused(run, tmp_path, monkeypatch, begin, seed):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(f"searched = {{ seeds = [7] }}\n{network_toml(hexmj.LDVS)}")
+    words = ["--begin", begin, "--seed", 1, "--verdict-seed", seed, "--form", "mirrored"]
+    code, _, error = run("search", *words, "--out", tmp_path / "out")
+    assert code == 2 and f"--verdict-seed = {seed} is that of the search" in error
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):

@@ -57,6 +57,11 @@ class Biology(StudyCommand):
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
 
+    def farthest(self) -> float:
+        """At the greatest speed [mm]."""
+        velocity = max(biology.SPEEDS) / self.conditions.time.vp
+        return float(velocity * self.periods * self.walks.stride.periods(velocity))
+
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The table as Markdown."""
         return [save_text(biology_markdown(result), self.out / TABLE)]

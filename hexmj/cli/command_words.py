@@ -92,13 +92,16 @@ def deciding(words: Sequence[str]) -> list[str]:
 
 
 def named(words: Sequence[str]) -> Iterator[str]:
-    """Everything that may be a name: words, values behind `=`, and controllers that TOML files among them name."""
+    """Everything that may be a name: words, values behind `=`, and controllers that TOML files among them name; all
+    without what tells that a mechanism is left out."""
+    from hexmj.controllers.named import PART
+
     for word in words:
-        name = word.partition("=")[2] if word.startswith("--") else word
+        name = PART.sub("", word.partition("=")[2] if word.startswith("--") else word)
         yield name
         if isfile(name) and not name.endswith(NO_TOML):
             with suppress(InputError):
-                yield str(read_toml(Path(name)).get("controller", ""))
+                yield PART.sub("", str(read_toml(Path(name)).get("controller", "")))
 
 
 def files(words: Sequence[str]) -> list[Path]:

@@ -9,11 +9,10 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
 
-from hexmj.cli.loaded import LOADED, loaded
+from hexmj.cli.loaded import loaded
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
-from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride
 
 CONTROLLER = (
@@ -116,7 +115,7 @@ class Controlled:
         from hexmj.controllers.cruse1998 import Cruse1998
         from hexmj.controllers.cruse1998.readings import Reading, in_words
 
-        found, _ = LOADED.get(name, (None, None))
+        found = loaded(name)
         if not isinstance(found, Cruse1998):
             return ""
         reading = in_words(found.reading) if isinstance(found.reading, Reading) else str(found.reading)  # an heir's
@@ -124,19 +123,6 @@ class Controlled:
         return ", ".join(
             f"{rule} {told}" for rule, told in rules.items() if told != "printed" and rule not in self.rules
         )
-
-    def preset_of(self, name: str) -> str:
-        """The preset whose weights a controller has, or of which parts are left out."""
-        from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
-        from hexmj.controllers.named import PART
-
-        found, _ = LOADED.get(name, (None, None))
-        if isinstance(found, Cruse1998):
-            weights = plain(found.weights)
-            for preset, usual in PRESETS.items():
-                if plain(usual.weights) == weights:
-                    return preset
-        return PART.sub("", name)
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""

@@ -1,13 +1,12 @@
 """`hexmj search`."""
 
 from dataclasses import dataclass, field, replace
-from os.path import isfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.loaded import loaded
+from hexmj.cli.loaded import loaded, seeds_of_searches
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, print_json, save_figure, show, table
@@ -95,6 +94,7 @@ class Search(WalkingCommand):
             return
         self._check()
         problem, effort = self._problem(), self._effort()
+        self._check_fresh()
         beside = {name: self.controlled.controller(controller) for name, controller in self._beside.items()}
         self.refuse_contact_gap(next(iter(beside.values())))
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
@@ -124,22 +124,28 @@ class Search(WalkingCommand):
 
     def _check(self) -> None:
         """Refuse what makes no sense together, or would not be obeyed."""
+        from hexmj.controllers.named import PART
+
         thread_count(self.workers.threads)
         if not self.physical:
             self.refuse_physical("without --physical")
         if self.verdict_seed == self.walks.seed:
             raise InputError(f"--verdict-seed = {self.verdict_seed} is also --seed; expected another, for fresh starts")
-        if self.verdict_seed in self._seeds:
-            raise InputError(
-                f"--verdict-seed = {self.verdict_seed} is that of the search that found what this one begins with;"
-                " expected another, for fresh starts"
-            )
-        if any(one and Path(one).resolve() == (self.out / FOUND).resolve() for one in (self.form, self.begin)):
+        begun = [Path(PART.sub("", one)).resolve() for one in (self.form, self.begin) if one]
+        if (self.out / FOUND).resolve() in begun:
             raise InputError(f"--out {self.out}: the search begins with {FOUND} there; expected another folder")
         if self.velocity is not None and self.velocities is not None:
             raise InputError("--velocity and --velocities were both given; expected one velocity or one range")
         if self.refine_starts is not None and not self.refine_budget:
             raise InputError("--refine-starts was given with --refine-budget 0; expected evaluations that walk them")
+
+    def _check_fresh(self) -> None:
+        """Refuse a verdict on starts on which an earlier search found what this one begins with."""
+        if self.verdict_seed in self._seeds:
+            raise InputError(
+                f"--verdict-seed = {self.verdict_seed} is that of the search that found what this one begins with;"
+                " expected another, for fresh starts"
+            )
 
     def _problem(self) -> "Problem":
         from hexmj.search.problems import Problem
@@ -164,6 +170,7 @@ class Search(WalkingCommand):
         return replace(self.controlled, **taken)
 
     def _form(self) -> "Form":
+        from hexmj.controllers.named import PART, parameter_file
         from hexmj.search.forms import FieldsForm
         from hexmj.search.network_forms import FORMS, NetworkForm
 
@@ -171,6 +178,8 @@ class Search(WalkingCommand):
             return NetworkForm(self.form, **self.controlled.rules)
         for name in self.controlled.rules:
             raise InputError(f"--{name} with {self.form}; expected it with {', '.join(FORMS)}")
+        if (whole := PART.sub("", self.form)) != self.form and parameter_file(whole):
+            raise InputError(f"--form = {self.form}; expected {whole}, or the controller that it names, without a part")
         try:
             return FieldsForm(loaded(self.form))
         except InputError as error:
@@ -206,9 +215,10 @@ class Search(WalkingCommand):
     @property
     def _seeds(self) -> list[int]:
         """Of the searches that found what this one begins with."""
-        from hexmj.controllers.named import searched_on
+        from hexmj.search.network_forms import FORMS
 
-        return [seed for one in (self.form, self.begin) if one for seed in searched_on(one)]
+        begun = [one for one in (self.form, self.begin) if one and one not in FORMS]
+        return [seed for one in begun for seeds in seeds_of_searches(one).values() for seed in seeds]
 
     @property
     def commanded(self) -> tuple[float, float]:
@@ -231,7 +241,7 @@ class Search(WalkingCommand):
     def _write(self, problem: "Problem", found: "Found", settings: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
 
-        seeds = [*self._seeds, self.walks.seed]
+        seeds = sorted({*self._seeds, self.walks.seed})
         text = f"# hexmj search: {self._title}\nsearched = {{ seeds = {seeds} }}\n{self._toml(problem, found)}"
         history = found.history.assign_attrs(title=self._title)
         files = [
@@ -246,13 +256,13 @@ class Search(WalkingCommand):
         import tomli_w
 
         from hexmj.controllers.cruse1998.presets import network_toml
-        from hexmj.controllers.named import known_names
+        from hexmj.controllers.named import parameter_file
         from hexmj.search.network_forms import NetworkForm
 
         if isinstance(problem.form, NetworkForm):
             return network_toml(problem.form.controller(found.vector))
-        in_file = isfile(self.form) and self.form not in known_names()
-        told = read_toml(Path(self.form)) if in_file else {"controller": self.form, "fields": {}}
+        file = parameter_file(self.form)
+        told = read_toml(file) if file else {"controller": self.form, "fields": {}}
         values = told.get("fields", {}) | dict(zip(problem.form.names, found.vector.tolist(), strict=True))
         return tomli_w.dumps({"controller": told["controller"], "fields": values})
 

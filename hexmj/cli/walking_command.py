@@ -1,12 +1,15 @@
 """What commands that walk have in common: the options of the walks, and the line that tells them."""
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import numbers
+from hexmj.cli.loaded import seeds_of_searches
 from hexmj.cli.options import Accelerating, Controlled, Walks
 from hexmj.cli.registry import changed
 from hexmj.conditions import Conditions, Numerics, unusual
@@ -55,16 +58,15 @@ class WalkingCommand:
     def commanded(self) -> Sequence[float] | float:
         """V_r at which is walked, as far as that is asked for."""
         own = vars(self)
-        return own.get("velocities") or own.get("velocity") or []
+        return own["velocities"] if own.get("velocities") is not None else own.get("velocity", [])
 
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
-        from hexmj.controllers.named import searched_on
-
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
-        bases = dict.fromkeys(self.controlled.preset_of(name) for name in self.names)
-        known = [name for name in bases if self.walks.seed in searched_on(name)]
-        line += f", on whose starts a search found {', '.join(known)} (others: --seed 1998)" if known else ""
+        found = [one for name in self.names for one in seeds_of_searches(name).items()]
+        known = dict.fromkeys(what for what, seeds in found if self.walks.seed in seeds)
+        other = next(seed for seed in count(1998) if not any(seed in seeds for _, seeds in found))
+        line += f", on whose starts a search found {', '.join(known)} (others: --seed {other})" if known else ""
         stride = self.walks.stride
         told = vars(stride) | {"geometry": {one: name for name, one in GEOMETRIES.items()}[stride.geometry]}
         line += "".join(f"; {name} {told[name]}" for name in changed(stride, Stride()))
@@ -85,16 +87,20 @@ class WalkingCommand:
         """That no foot gets to what lies ahead, where even the farthest walk is too short."""
         from hexmj.studies.terrain.study import reach
 
-        ground, velocities = self.conditions.ground, numbers("velocities", self.commanded)
-        if ground.ground == "flat" or not velocities.size:
-            return ""
-        stride, acceleration = self.walks.stride, self.accelerating.procedure
-        time = observation_time(self.walks.time, velocities, stride, acceleration)
-        lag = acceleration.lag(velocities, time) if acceleration else 0.0
-        farthest = float((velocities * time - lag).max())
-        if farthest + reach(stride)[0] > ground.ground_at:
+        ground = self.conditions.ground
+        if ground.ground == "flat" or (farthest := self.farthest()) + reach(self.walks.stride)[0] > ground.ground_at:
             return ""
         return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
+
+    def farthest(self) -> float:
+        """How far is walked at most [mm], infinitely where nobody knows."""
+        velocities = numbers("velocities", self.commanded)
+        if not velocities.size:
+            return math.inf
+        acceleration = self.accelerating.procedure
+        time = observation_time(self.walks.time, velocities, self.walks.stride, acceleration)
+        lag = acceleration.lag(velocities, time) if acceleration else 0.0
+        return float((velocities * time - lag).max())
 
     def refuse_physical(self, reason: str, obeyed: Collection[str] = ()) -> None:
         """Refuse what only a body obeys, where none walks for a reason such as 'without --physical'; what is `obeyed`

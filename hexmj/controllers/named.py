@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from hexmj.checks import typed
-from hexmj.controllers.cruse1998 import PRESETS, presets
+from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.toml_fields import with_fields
@@ -51,12 +51,14 @@ def load_controller(name: str) -> Controller:
         return PRESETS[name]
     if name in (rivals := _rivals()):
         return rivals[name]
-    where, colon, what = name.rpartition(":")
-    if colon and where and what.isidentifier():
+    if _object(name):
+        where, _, what = name.rpartition(":")
         return _found(where, what, name)
     varied, ours = VARIED.fullmatch(name), PART.sub("", name) in {*PRESETS, *rivals}
     for point in () if varied and ours else entry_points(group=ENTRY_POINTS, name=name):
-        return _found(point.module, point.attr or "", name)
+        if not point.attr:
+            raise InputError(f"entry point {name!r} = {point.value!r:.200}; expected module:object")
+        return _found(point.module, point.attr, name)
     if varied:
         return _varied(varied["name"], varied["how"], int(varied["which"]))
     path = Path(name)
@@ -78,20 +80,10 @@ def load_controller(name: str) -> Controller:
     return read_network(table, name, literal(path.stem))
 
 
-def searched_on(name: str) -> list[int]:
-    """Seeds of the starts on which searches found a controller, as its file tells: there it looks better than it is.
-
-    Raises:
-        InputError: a file that cannot be read.
-    """
-    if name in PRESETS:
-        return presets.searched_on(name)
-    from hexmj.controllers.rivals.evolved import FOUND
-
-    file = FOUND if name == "evolved" else Path(name)
-    told = read_toml(file).get(SEARCHED) if file.suffix == ".toml" and isfile(file) else None
-    seeds = told.get("seeds", [told.get("seed")]) if isinstance(told, dict) else []
-    return seeds if isinstance(seeds, list) else []
+def parameter_file(name: str) -> Path | None:
+    """The TOML file that a name of a controller means, if it means one that is there."""
+    means_other = VARIED.fullmatch(name) or _object(name) or name.endswith(".py")
+    return Path(name) if isfile(name) and not means_other and name not in known_names() else None
 
 
 def known_names() -> Iterator[str]:
@@ -99,6 +91,12 @@ def known_names() -> Iterator[str]:
     yield from PRESETS
     yield from _rivals()
     yield from (point.name for point in entry_points(group=ENTRY_POINTS))
+
+
+def _object(name: str) -> bool:
+    """Whether a name is that of an object in a module or file."""
+    where, _, what = name.rpartition(":")
+    return bool(where) and what.isidentifier()
 
 
 def _rivals() -> dict[str, Controller]:
@@ -122,7 +120,7 @@ def _varied(name: str, how: str, which: int) -> Controller:
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     """The controller that a file names, with these fields; named like the file, unless it tells a name."""
     varied = VARIED.fullmatch(named)
-    if ":" not in named and (varied["name"] if varied else named) not in known_names():
+    if ":" not in named and {named, varied["name"] if varied else named}.isdisjoint(known_names()):
         raise InputError(
             f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
         )

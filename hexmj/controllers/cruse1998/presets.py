@@ -1,6 +1,5 @@
 """Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
 from functools import cache
@@ -20,7 +19,7 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.errors import InputError
-from hexmj.storage.files import read_toml
+from hexmj.storage.files import SEARCHED, read_toml
 
 OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""
@@ -129,16 +128,11 @@ PRESETS: Mapping[str, Cruse1998] = _Presets()
 
 @cache
 def _own() -> dict[str, Cruse1998]:
-    tables = {name: {key: one for key, one in entry.items() if key != "command"} for name, entry in _entries().items()}
+    tables = {name: {key: one[key] for key in one.keys() - {"command", SEARCHED}} for name, one in own_tables().items()}
     return {name: read_network(table, f"{OWN.name} [{name}]", name) for name, table in tables.items()}
 
 
 @cache
-def _entries() -> dict[str, Any]:
+def own_tables() -> dict[str, Any]:
+    """What the file tells of each set of our own: its command, on which starts it was searched, and its weights."""
     return read_toml(OWN)
-
-
-def searched_on(name: str) -> list[int]:
-    """The seed of the starts on which a search found a set of our own, where it looks better than it is; or none."""
-    found = re.search(r"--seed (\d+)", _entries()[name]["command"]) if name not in _PAPER and name in PRESETS else None
-    return [int(found[1])] if found else []
