@@ -290,7 +290,7 @@ class Search(WalkingCommand):
             self._title,
             table(("parameter", "found", *vectors), numbers),
             f"{over}{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
-            table(("model", *(f"window {window}" for window in windows)), judged),
+            table(("model", *(f"window {window.removesuffix('.0')}" for window in windows)), judged),
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
             f" least cost {found.cost:.4g}{self._counted(problem, found)}{refused}",
             self.conditions_line(self.physical),

@@ -163,7 +163,7 @@ class Sample:
                 "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
                 "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             },
-            coords={"controller": list(controllers), "window": [str(window).removesuffix(".0") for window in windows]},
+            coords={"controller": list(controllers), "window": [str(window) for window in windows]},
         )
 
     def _times(
