@@ -240,6 +240,40 @@ def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_
         assert versions_with(tmp_path / "mine.py", folder)["deep"].startswith("1.0@")
 
 
+INSTALLED = """
+from pathlib import Path
+import hexmj
+import walkers.legs
+from hexmj.sweeps.code import code
+if "{edited}":
+    Path(walkers.__file__).with_name("{edited}").write_text("GAIN = 30")
+print(code(frozenset({{"walkers.legs"}})).versions["walkers"])
+"""
+
+
+@pytest.mark.slow
+def test_of_an_installed_controllers_package_all_files_count(tmp_path: Path) -> None:
+    """Data, too, and modules that it finds by a name; not once it is another one than that which was imported."""
+    folder, found = tmp_path / "site-packages", []
+    environment = WITHOUT_DASK | {"PYTHONPATH": os.pathsep.join([WITHOUT_DASK["PYTHONPATH"], str(folder)])}
+
+    def versions_told(edited: str = "") -> str:
+        command = [sys.executable, "-c", INSTALLED.format(edited=edited)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        return (done.stdout or done.stderr).strip().splitlines()[-1]
+
+    files = {"__init__.py": "from walkers import gains", "legs.py": "GAIN = 1", "gains.py": "", "gain.json": "1"}
+    install(folder, "walkers", "1.0", {f"walkers/{name}": text for name, text in files.items()})
+    for name, text in (("gain.json", "1"), ("gain.json", "2"), ("found_by_name.py", "1"), ("found_by_name.py", "2")):
+        (folder / "walkers" / name).write_text(text)
+        (record := folder / "walkers-1.0.dist-info" / "RECORD").write_text(f"{record.read_text()}walkers/{name},,\n")
+        found.append(versions_told())
+    assert len({*found}) == 4 and all(one.startswith("1.0@") for one in found)
+    for edited in ("legs.py", "gains.py"):
+        told = versions_told(edited)
+        assert told.endswith(f"{edited} was installed anew, or edited, while this program used it; start it again")
+
+
 SWEEP = """
 from pathlib import Path
 import xarray as xr

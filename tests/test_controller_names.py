@@ -100,6 +100,11 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     assert hexmj.load_controller("ldvs-without-1") == LDVS.without(1)
     with pytest.raises(hexmj.InputError, match=r"^entry point 'alone' = 'mine_of_a_user'; expected module:object$"):
         hexmj.load_controller("alone")
+    twice = point, EntryPoint("robot", "mine_of_a_user:Still", named.ENTRY_POINTS)
+    monkeypatch.setattr(named, "entry_points", lambda **_: twice)
+    assert [*named.known_names()].count("robot") == 1
+    with pytest.raises(hexmj.InputError, match=r"several packages; expected one of \S+:taller, \S+:Still$"):
+        hexmj.load_controller("robot")
     monkeypatch.setattr(named, "entry_points", lambda name="robot", **_: [point] if name == "robot" else [])
     (tmp_path / "tall.toml").write_text('controller = "robot"\n[fields]\nheight = 4.0\n')
     assert settings_of(hexmj.load_controller("tall.toml")) == {"name": "tall", "height": 4.0}

@@ -3,6 +3,7 @@
 import json
 import sys
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -96,6 +97,13 @@ def test_a_failure_is_reported_with_its_remedy(run, monkeypatch, tmp_path, name,
     assert check["name"] == name and check["well"] is False
     assert found in check["found"]
     assert check["remedy"] == CHECKS[name][1]
+
+
+def test_files_in_the_current_folder_are_no_pythons_own(run, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("random.py").write_text("raise RuntimeError('mine')")
+    only(monkeypatch, "rendering")
+    assert run("doctor")[0] == 0
 
 
 def test_what_was_left_out_is_no_failure(run, monkeypatch):

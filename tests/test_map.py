@@ -153,7 +153,7 @@ def test_the_values_of_every_condition_make_sense():
         (
             "vp",
             {"conditions": Conditions.of(vp=20.0)},
-            "vp = 20.0; expected it among values, which has all that are tried",
+            "vp = 20.0; expected 80.0: values has all that are tried",
         ),
         ("vp", {"controller": ReadsLegs(LDVS)}, "reads the legs; expected a controller that does not"),
     ],
@@ -179,7 +179,7 @@ def test_command(tmp_path, run):
     assert code == 0
     assert "landed in time" in out
     code, _, error = run(*words, "--vp", 20)
-    assert code == 2 and "vp = 20.0; expected it among values" in error
+    assert code == 2 and "vp = 20.0; expected 80.0: values" in error
     assert run(*words, "--feedback")[0] == 2
     assert run("map", "--over", "wind")[0] == 2
 

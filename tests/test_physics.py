@@ -2,6 +2,7 @@
 
 import re
 from contextlib import chdir
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -165,6 +166,21 @@ def test_an_insect_alone_walks_as_among_others():
         for name, values in vars(both).items():
             assert np.array_equal(getattr(alone, name), values[i : i + 1]), name
     assert np.isfinite(both.fall).any() and not np.isfinite(both.fall).all()
+
+
+def test_what_one_is_told_until_it_falls_does_not_depend_on_who_walks_beside_it():
+    starts = draw_starts(1000, 0)[[3, 1]]
+    how: Any = {"controller": ReadsLegs(LDVS), "velocity": 0.7, "duration": 34.5}
+    both = physical_walk(starts, **how)
+    fallen = both.ordered.time > both.outcomes.fall.min() + 1.0
+    for i, start in enumerate(starts):
+        alone = physical_walk(start[np.newaxis], **how)
+        for name in ("x", "y", "stance", "aep", "height"):
+            told = getattr(both.ordered, name)[:, i : i + 1]
+            assert np.array_equal(getattr(alone.ordered, name), told, equal_nan=name != "stance"), name
+    assert np.isnan(both.ordered.x[fallen][:, np.isfinite(both.outcomes.fall)]).all()
+    assert np.isfinite(both.ordered.x[:, np.isnan(both.outcomes.fall)]).all()
+    assert fallen.any() and not np.isfinite(both.outcomes.fall).all()
 
 
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():

@@ -236,8 +236,11 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
         ({"grasps": (-1.0,)}, "grasp = -1.0; expected 0 to 100"),
         ({"velocities": (0.0,)}, "velocities = .*; expected V > 0"),
         ({"n_starts": 0}, "starts = 0; expected a whole number"),
-        ({"conditions": Conditions.of(ground="step")}, "ground = step; expected it among grounds"),
-        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected it among grasps"),
+        (
+            {"conditions": Conditions.of(ground="step")},
+            "ground = step; expected flat: grounds has",
+        ),
+        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0.0: grasps has"),
         (
             {"grounds": ("gap",), "conditions": FARTHER.but(ground_length=7.0)},
             "ground_length = 7.0; only hurdle has it",

@@ -105,7 +105,9 @@ def threads() -> str:
 
 def rendering() -> str:
     """MuJoCo renders a frame, as films are rendered."""
-    done = subprocess.run([sys.executable, "-c", RENDERING], capture_output=True, text=True, timeout=120)
+    script = f"import sys\nsys.path.append({str(Path(__file__).parents[2])!r}){RENDERING}"
+    command = [sys.executable, "-P", "-c", script]  # without what lies in the current folder
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
         raise Unfit((done.stderr.strip().splitlines() or [f"the process ended with {done.returncode}"])[-1])
     return f"a frame of 64 x 48 by {done.stdout.strip()}"

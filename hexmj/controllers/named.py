@@ -55,7 +55,10 @@ def load_controller(name: str) -> Controller:
         where, _, what = name.rpartition(":")
         return _found(where, what, name)
     varied, ours = VARIED.fullmatch(name), PART.sub("", name) in {*PRESETS, *rivals}
-    for point in () if varied and ours else entry_points(group=ENTRY_POINTS, name=name):
+    points = {one.value: one for one in entry_points(group=ENTRY_POINTS, name=name)} if not (varied and ours) else {}
+    if len(points) > 1:
+        raise InputError(f"controller {name!r} is that of several packages; expected one of {', '.join(points)}")
+    for point in points.values():
         if not point.attr:
             raise InputError(f"entry point {name!r} = {point.value!r:.200}; expected module:object")
         return _found(point.module, point.attr, name)
@@ -88,9 +91,8 @@ def parameter_file(name: str) -> Path | None:
 
 def known_names() -> Iterator[str]:
     """Names of the presets, the rivals and the entry points."""
-    yield from PRESETS
-    yield from _rivals()
-    yield from (point.name for point in entry_points(group=ENTRY_POINTS))
+    ours = [*PRESETS, *_rivals()]
+    yield from dict.fromkeys([*ours, *(point.name for point in entry_points(group=ENTRY_POINTS))])
 
 
 def _object(name: str) -> bool:

@@ -20,7 +20,7 @@ from hexmj.physics.settling import Settled, settle
 from hexmj.process.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride, steps_within
-from hexmj.walks import PlannedWalk, Walk, extent, joined, part_of
+from hexmj.walks import PlannedWalk, Walk, copied, extent, joined, part_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,7 +30,7 @@ class PhysicalWalk:
     planned: PlannedWalk
     """What was planned; by a plan that reads the legs, what it plans on paper."""
     ordered: PlannedWalk
-    """What the legs were told; another walk than `planned` only if the plan reads them."""
+    """What the legs were told; another walk than `planned` only if the plan reads them, and then NaN after a fall."""
     measured: Walk
     """What the insect did: feet in contact, seen from its own centre of mass and heading."""
     outcomes: Outcomes
@@ -186,7 +186,16 @@ def physical_walk_of_plan(
         over = (columns[:, None] >= chunk.valid)[..., None]
         qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
     measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
-    ordered = joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]) if told else planned
-    return PhysicalWalk(
-        planned, ordered, measured, so_far.outcomes(), qpos, centre, height, load, conditions, stride
-    )  # fmt: skip
+    outcomes = so_far.outcomes()
+    ordered = _until(outcomes.fall, planned, told, stride) if told else planned
+    return PhysicalWalk(planned, ordered, measured, outcomes, qpos, centre, height, load, conditions, stride)
+
+
+def _until(fall: np.ndarray, planned: PlannedWalk, told: list[PlannedWalk], stride: Stride) -> PlannedWalk:
+    """What starts were told by a plan that reads the legs, up to the step in which each fell, (start,) [time units]."""
+    walk = copied(joined([*told, part_of(planned, slice(sum(len(one.time) for one in told), None))]))
+    over = walk.time[:, None] - stride.dt >= fall
+    for tips in (walk.x, walk.y, walk.aep, walk.height):
+        tips[over] = np.nan
+    walk.stance[over] = False
+    return walk

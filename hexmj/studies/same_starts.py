@@ -45,7 +45,7 @@ class SameStarts:
         given, usual = self.conditions.flat(), Conditions().flat()
         for name, several in self.lists.items():
             if given[name] != usual[name]:
-                raise InputError(f"{name} = {given[name]}; expected it among {several}, which has all that are tried")
+                raise InputError(f"{name} = {given[name]}; expected {usual[name]}: {several} has all that are tried")
 
     @property
     def lists(self) -> Mapping[str, str]:

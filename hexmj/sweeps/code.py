@@ -2,8 +2,9 @@
 
 Modules are followed from import to import without running them: through this package, the package that a function or a
 user's object comes from, and whatever else is not installed, with the packages that they lie in.  What a module imports
-for its types alone is left out.  Of this package, whose `__init__` loads names as they are used, a name is followed to
-the one module it comes from.  Its data files count that texts of its modules name.
+for its types alone is left out.  Of installed packages all files count, but only the versions of those that this one
+requires.  Of this package, whose `__init__` loads names as they are used, a name is followed to the one module it comes
+from.  Its data files count that texts of its modules name.
 """
 
 import os
@@ -123,6 +124,8 @@ def _follow(modules: frozenset[str]) -> _Needed:
         if CARRIERS & {name, top, name.rpartition(".")[0]}:
             continue
         inner = [(f"{name}.{attribute}", ALL)] if attribute.strip(ALL) and file_of(f"{name}.{attribute}") else []
+        if file and is_installed(file) and top != PACKAGE.name:
+            installed |= {top} - sys.stdlib_module_names
         if file and (top in followed or not is_installed(file)):
             module = read_module(name, file)
             sources[module_label(name)] = module.digest
@@ -143,6 +146,8 @@ def _follow(modules: frozenset[str]) -> _Needed:
     from hexmj.sweeps.packages import sources_to_edit, versions
 
     told = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"} | versions(sorted(names))
+    if anew := sources_as_run.installed_anew(name.replace("-", "_") for name in told):
+        raise InputError(f"{anew} was installed anew, or edited, while this program used it; start it again")
     theirs = [(file, module.texts) for _, file, module in read if not file.is_relative_to(PACKAGE)]
     return _Needed(sources, told, read, theirs, missing, sources_to_edit(names))
 

@@ -1,4 +1,5 @@
-"""Sources of a user's modules as this program ran them, whatever became of the files since.
+"""Sources of a user's modules as this program ran them, whatever became of the files since; of installed ones their
+sizes and times.
 
 They are noted as modules run, from the first import of this package on; those that ran before are read then.
 """
@@ -6,6 +7,7 @@ They are noted as modules run, from the first import of this package on; those t
 import os
 import sys
 import sysconfig
+from collections.abc import Iterable
 from contextlib import suppress
 from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import cache_from_source
@@ -34,6 +36,9 @@ COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
 RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
 
+_INSTALLED: dict[str, dict[str, tuple[int, ...]]] = {}
+"""Installed package, or module alone -> its files that ran, each with its size and time then."""
+
 _STALE: set[str] = set()
 """Files of which bytecode ran that is not of their source, which Python knows by its time and size alone."""
 
@@ -58,6 +63,12 @@ def as_run(file: Path, module: str) -> bytes | None:
     return meant[0]
 
 
+def installed_anew(packages: Iterable[str]) -> str:
+    """A file of some installed packages that is another than the one that ran; empty if there is none."""
+    ran = (one for name in packages for one in _INSTALLED.get(name, {}).items())
+    return next((file for file, then in ran if _size_and_time(file) != then), "")
+
+
 def is_users(file: str) -> bool:
     """Whether a file is a user's own: neither of Python, nor installed, nor of this package."""
     return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
@@ -65,7 +76,13 @@ def is_users(file: str) -> bool:
 
 def _note(file: Any, runs: CodeType | None = None) -> None:
     """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
-    if not isinstance(file, str) or file.endswith(COMPILED) or not is_users(file):
+    if not isinstance(file, str):
+        return
+    within = Path(file).parts
+    if not INSTALLED.isdisjoint(within):
+        name = next(inner for inner, outer in zip(within[:0:-1], within[-2::-1], strict=True) if outer in INSTALLED)
+        _INSTALLED.setdefault(name.partition(".")[0], {}).setdefault(file, _size_and_time(file))
+    if file.endswith(COMPILED) or not is_users(file):
         return
     file = str(Path(file))  # without ./ and //, which a path of modules may have
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
@@ -75,6 +92,14 @@ def _note(file: Any, runs: CodeType | None = None) -> None:
             kept = _what_runs(SourceFileLoader(file, file).get_code(file))
             if kept != _what_runs(compiled(source, file)) and (runs is None or kept == _what_runs(runs)):
                 _STALE.add(file)
+
+
+def _size_and_time(file: str) -> tuple[int, ...]:
+    """What tells whether a file is another one; nothing of one that is not there."""
+    with suppress(OSError, ValueError):
+        told = os.stat(file)
+        return told.st_size, told.st_mtime_ns
+    return ()
 
 
 def _what_runs(one: Any) -> Any:
@@ -91,6 +116,8 @@ def _what_runs(one: Any) -> Any:
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event == "exec" and getattr(arguments[0], "co_name", "") == "<module>":
         _note(arguments[0].co_filename, arguments[0])
+    elif event == "import":
+        _note(arguments[1])  # of what is compiled; of others nobody knows a file yet
 
 
 for _module in list(sys.modules.values()):
