@@ -21,7 +21,7 @@ import xarray as xr
 import hexmj
 from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
-from hexmj.storage.files import digest_of
+from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps import Cell, packages
 from hexmj.sweeps.code import code
 from hexmj.sweeps.packages import NAMES
@@ -271,7 +271,23 @@ def test_of_an_installed_controllers_package_all_files_count(tmp_path: Path) -> 
     assert len({*found}) == 4 and all(one.startswith("1.0@") for one in found)
     for edited in ("legs.py", "gains.py"):
         told = versions_told(edited)
-        assert told.endswith(f"{edited} was installed anew, or edited, while this program used it; start it again")
+        assert told.endswith(f"{edited} was made or installed anew while this program used it; start it again")
+
+
+def test_a_compiled_helper_that_was_made_anew_while_it_ran_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (helper := tmp_path / f"compiled_helper{EXTENSION_SUFFIXES[0]}").write_bytes(b"gain 1")
+    for name in ("before", "after"):
+        (tmp_path / f"uses_it_{name}.py").write_text("import compiled_helper")
+    sys.audit("import", "compiled_helper", str(helper), None, None, None)  # as Python does when it loads one
+    assert code(frozenset({"uses_it_before"})).sources["compiled_helper"] == digest(b"gain 1")
+    helper.write_bytes(b"gain 20")
+    with pytest.raises(
+        InputError, match=f"^{helper} was made or installed anew while this program used it; start it ag"
+    ):
+        code(frozenset({"uses_it_after"}))
 
 
 SWEEP = """

@@ -146,8 +146,9 @@ def _follow(modules: frozenset[str]) -> _Needed:
     from hexmj.sweeps.packages import sources_to_edit, versions
 
     told = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"} | versions(sorted(names))
-    if anew := sources_as_run.installed_anew(name.replace("-", "_") for name in told):
-        raise InputError(f"{anew} was installed anew, or edited, while this program used it; start it again")
+    files = (str(file) for _, file, _ in read)
+    if anew := sources_as_run.made_anew([*(name.replace("-", "_") for name in told), *files]):
+        raise InputError(f"{anew} was made or installed anew while this program used it; start it again")
     theirs = [(file, module.texts) for _, file, module in read if not file.is_relative_to(PACKAGE)]
     return _Needed(sources, told, read, theirs, missing, sources_to_edit(names))
 

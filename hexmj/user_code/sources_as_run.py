@@ -1,5 +1,5 @@
-"""Sources of a user's modules as this program ran them, whatever became of the files since; of installed ones their
-sizes and times.
+"""Sources of a user's modules as this program ran them, whatever became of the files since; of those that are
+installed, or compiled, their sizes and times.
 
 They are noted as modules run, from the first import of this package on; those that ran before are read then.
 """
@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import cache_from_source
+from itertools import pairwise
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -36,8 +37,8 @@ COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
 RUN: dict[str, list[bytes]] = {}
 """File -> what ran of it, each version once."""
 
-_INSTALLED: dict[str, dict[str, tuple[int, ...]]] = {}
-"""Installed package, or module alone -> its files that ran, each with its size and time then."""
+_RAN: dict[str, dict[str, tuple[int, ...]]] = {}
+"""Installed package or module, or compiled file of a user's own -> its files that ran, each with its size and time."""
 
 _STALE: set[str] = set()
 """Files of which bytecode ran that is not of their source, which Python knows by its time and size alone."""
@@ -63,9 +64,10 @@ def as_run(file: Path, module: str) -> bytes | None:
     return meant[0]
 
 
-def installed_anew(packages: Iterable[str]) -> str:
-    """A file of some installed packages that is another than the one that ran; empty if there is none."""
-    ran = (one for name in packages for one in _INSTALLED.get(name, {}).items())
+def made_anew(names: Iterable[str]) -> str:
+    """A file of some installed packages, or compiled ones, that is another than the one that ran; empty if there is
+    none."""
+    ran = (one for name in names for one in _RAN.get(name, {}).items())
     return next((file for file, then in ran if _size_and_time(file) != then), "")
 
 
@@ -78,13 +80,14 @@ def _note(file: Any, runs: CodeType | None = None) -> None:
     """Note the file of a module, and of what runs whether it is bytecode of another source; not known of what ran."""
     if not isinstance(file, str):
         return
+    file = str(Path(file))  # without ./ and //, which a path of modules may have
     within = Path(file).parts
-    if not INSTALLED.isdisjoint(within):
-        name = next(inner for inner, outer in zip(within[:0:-1], within[-2::-1], strict=True) if outer in INSTALLED)
-        _INSTALLED.setdefault(name.partition(".")[0], {}).setdefault(file, _size_and_time(file))
+    above = [inner for outer, inner in pairwise(within) if outer in INSTALLED]
+    if above or file.endswith(COMPILED):
+        name = above[-1].partition(".")[0] if above else file
+        _RAN.setdefault(name, {}).setdefault(file, _size_and_time(file))
     if file.endswith(COMPILED) or not is_users(file):
         return
-    file = str(Path(file))  # without ./ and //, which a path of modules may have
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
         if (source := Path(file).read_bytes()) not in (versions := RUN.setdefault(file, [])):
             versions.append(source)
