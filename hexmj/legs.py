@@ -102,6 +102,20 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     return np.take(np.asarray(values), places, axis=-1 - behind)
 
 
+def check_order(values: Any, name: str) -> None:
+    """Refuse values of which xarray or pandas labels an axis by legs, and in another order than `LEGS`.
+
+    Raises:
+        InputError: they are such.
+    """
+    axes = values.axes if hasattr(values, "iloc") else getattr(values, "indexes", {}).values()
+    for labels in ([*axis] for axis in axes):
+        if _name_legs(labels) and labels != [*LEGS]:
+            raise InputError(
+                f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}, in order"
+            )
+
+
 def _is_of_xarray(values: Any) -> bool:
     return hasattr(values, "dims") and hasattr(values, "sizes")
 

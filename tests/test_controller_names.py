@@ -308,6 +308,14 @@ def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):
     assert plain(odd)["mode"]["member"] == "SLOW"
 
 
+def test_a_file_tells_fields_of_the_controller_within_another(tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(f"controller = '{tmp_path / 'mine_reads.py'}:USUAL'\n[fields.controller]\norder = 'undelayed'\n")
+    (tmp_path / "mine_reads.py").write_text("import hexmj\nUSUAL = hexmj.ReadsLegs(hexmj.LDVS)\n")
+    found: Any = hexmj.load_controller(str(path))
+    assert found.controller == replace(LDVS, order="undelayed")
+
+
 @pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])
 def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
     path = tmp_path / "found.toml"

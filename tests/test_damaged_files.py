@@ -15,7 +15,7 @@ import xarray as xr
 
 from drawing import drawing
 from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.named import load_controller
 from hexmj.errors import InputError, SimulationError
@@ -26,6 +26,7 @@ from hexmj.physics.divergence import replay, save_state
 from hexmj.replay.film.film import Film
 from hexmj.replay.film.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
+from hexmj.replay.take import takes_of
 from hexmj.starts import draw_starts
 from hexmj.storage import netcdf
 from hexmj.storage.files import MARK, opened, read_sealed, sealed, unsealed
@@ -150,6 +151,9 @@ def test_a_fall_is_where_the_poses_end_and_has_its_part(tmp_path):
     }.items():
         with pytest.raises(InputError, match=values):
             save_recording(changed(walked, **said), tmp_path / "recording.nc")
+    fallen = record(physical_walk(draw_starts(1, 0), UNCOORDINATED, 0.7, 30.0))
+    with pytest.raises(InputError, match=r"^a recording has fall_part = 9; expected 0 to 4, or -1 for none$"):
+        takes_of([changed(fallen, fall_part=9)])
 
 
 def test_a_recording_that_was_edited_is_written_again(recording, tmp_path):

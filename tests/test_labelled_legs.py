@@ -1,5 +1,6 @@
 """Legs that xarray, pandas or another table labels are taken by their names, in whatever order they come."""
 
+from dataclasses import replace
 from typing import Any
 
 import h5py
@@ -72,6 +73,21 @@ def test_labelled_legs_may_come_in_any_order():
     assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
+
+
+def test_labelled_weights_stand_in_order():
+    """Of their two axes of legs labels would say which is the destination's only by their order."""
+    weights: Any = hexmj.LDVS.weights
+    plain = weights.expand()
+    labels, told = (
+        {"leg": [*LEGS], "of": [*LEGS]},
+        r"^p1 of the legs R3, .*; expected L1, L2, L3, R1, R2, R3, in order$",
+    )
+    tables: list[Any] = [pd.DataFrame(plain.p1, LEGS, LEGS), xr.DataArray(plain.p1, labels, ("leg", "of"))]
+    for table in tables:
+        assert np.array_equal(replace(plain, p1=table).p1, plain.p1)
+        with pytest.raises(hexmj.InputError, match=told):
+            replace(plain, p1=table[[*LEGS][::-1]] if table is tables[0] else table[:, ::-1])
 
 
 class Table:

@@ -53,11 +53,21 @@ GRID += '<config key="size" value="2 2"/><config key="fov" value="10 10"/><confi
         ({"mass": 0.0}, "mass = 0.0; expected a finite number above 0 g"),
         ({"standing_height": np.nan}, "standing_height = nan"),
         ({"longest_step": np.inf}, "longest_step = inf"),
+        ({"name": "a\nb"}, r"^a body's name = 'a\\nb'; expected 1 to 200 printable characters$"),
     ],
 )
 def test_descriptions_without_sense_are_refused(changes: dict[str, Any], message: str):
     with pytest.raises(InputError, match=message):
         replace(STICK_INSECT, **changes)
+
+
+def test_what_is_no_number_or_no_text_in_utf_8_gets_a_sentence(tmp_path: Path):
+    factor: Any = "2"
+    with pytest.raises(InputError, match=r"^factor = '2'; expected a number$"):
+        STICK_INSECT.lengths.scaled(factor)
+    (mjcf := tmp_path / "latin.xml").write_bytes(STICK_INSECT.text().encode() + b"<!-- \xe9 -->")
+    with pytest.raises(InputError, match=r"latin\.xml is no text in UTF-8"):
+        replace(STICK_INSECT, mjcf=mjcf).text()
 
 
 @pytest.mark.parametrize("changes", [{"standing_height": 12.0}, {"lines": replace(FIG1, origins=(29.0, 4.0, -20.0))}])

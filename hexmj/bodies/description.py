@@ -9,9 +9,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, printable, typed
 from hexmj.errors import InputError
 from hexmj.legs import LEGS, Geometry
+from hexmj.storage.files import read_text
 
 ROOT_QPOS = 7
 """Numbers of `qpos` before the joints: the free root's position (3) and unit quaternion (4)."""
@@ -116,7 +117,7 @@ class Lengths:
 
     def scaled(self, factor: float) -> "Lengths":
         """The lengths of a body so many times as large; speeds grow with them, the number of bins does not."""
-        values = {field.name: getattr(self, field.name) * factor for field in fields(self)}
+        values = {field.name: getattr(self, field.name) * typed("factor", factor, float) for field in fields(self)}
         return Lengths(**(values | {"tracking_bins": self.tracking_bins}))
 
 
@@ -181,6 +182,7 @@ class Body:
 
     def __post_init__(self) -> None:
         check_types(self)
+        printable("a body's name", self.name)
         _check_positive(
             f"body {self.name!r}",
             mass=(self.mass, "g"),
@@ -219,8 +221,12 @@ class Body:
         return tuple(leg.foot for leg in self.legs)
 
     def text(self) -> str:
-        """Its MJCF."""
-        return self.mjcf.read_text(encoding="utf-8")
+        """Its MJCF.
+
+        Raises:
+            InputError: it is gone, or is no text in UTF-8.
+        """
+        return read_text(self.mjcf)
 
 
 def _check_positive(what: str, **values: tuple[Any, str]) -> None:

@@ -88,7 +88,10 @@ def _is_record(kind: Any) -> bool:
 
 
 def _fitting(name: str, value: Any, kind: Any, usual: Any = None) -> Any:
-    """What a file tells, as its type has it; of what does not fit a class may make its own, but for plain ones."""
+    """What a file tells, as its type has it; of what does not fit a class may make its own, but for plain ones.  What a
+    protocol is may be told as the record that is usual."""
+    if getattr(kind, "_is_protocol", False) and _is_record(type(usual)):
+        kind = type(usual)
     try:
         return value if kind is None else typed(name, value, kind)
     except InputError:

@@ -63,6 +63,8 @@ class Take:
         physical = "measured_stance" in recording
         kind = "measured" if physical else "planned"
         few, conditions = recording.isel(step=shown), recorded_conditions(recording, body)
+        if physical and not -1 <= (part := int(recording["fall_part"])) < len(body.trunk):
+            raise InputError(f"a recording has fall_part = {part}; expected 0 to {len(body.trunk) - 1}, or -1 for none")
         centre, vp = few["centre_of_mass"].values, conditions.time.vp
         step = float(recording.attrs["dt"]) / vp
         ahead = few[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
@@ -101,7 +103,7 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> lis
         for recording in recordings:
             check_recording(recording)
         return [Take.of(recording, body) for recording in recordings]
-    except (IndexError, OSError, RuntimeError) as error:  # a part that the body has not; a file opened by xarray
+    except (OSError, RuntimeError) as error:  # of a file opened by xarray
         raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
 
 

@@ -53,7 +53,10 @@ class SameStarts:
         return {}
 
     def walks(self, velocity: float, duration: float, conditions: Conditions) -> WalkSettings:
-        """What a cell is told that walks all starts."""
+        """What a cell is told that walks all starts, if the controller can walk in these conditions."""
+        from hexmj.physics.orders import check_fits
+
+        check_fits(self.controller, velocity, conditions, self.stride, self.acceleration)
         same = self.n_starts, self.seed, conditions, self.stride, self.acceleration
         return WalkSettings(self.controller, velocity, duration, *same)
 

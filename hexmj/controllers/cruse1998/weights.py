@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.checks import check_types, numbers
 from hexmj.errors import InputError
-from hexmj.legs import N1, N2, N3, N4
+from hexmj.legs import N1, N2, N3, N4, check_order
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
@@ -56,6 +56,7 @@ class Weights:
 
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
+            check_order(getattr(self, kind), kind)
             matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6):
                 raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
