@@ -364,8 +364,9 @@ def test_our_own_sets_are_known_by_any_name(tmp_path):
         assert searched_on(name, hexmj.load_controller(name)) == seeds
 
 
-def test_toml_that_names_itself_is_refused(tmp_path):
-    path = tmp_path / "ring.toml"
+@pytest.mark.parametrize("name", ["ring.toml", "a:ring.toml"])
+def test_toml_that_names_itself_is_refused(tmp_path, name):
+    path = tmp_path / name
     path.write_text(f"controller = '{path}'\n[fields]\n")
     with pytest.raises(hexmj.InputError, match=r"expected module:object, file.py:object, a rival or an entry point"):
         hexmj.load_controller(str(path))

@@ -122,7 +122,7 @@ def _varied(name: str, how: str, which: int) -> Controller:
 def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     """The controller that a file names, with these fields; named like the file, unless it tells a name."""
     varied = VARIED.fullmatch(named)
-    if ":" not in named and {named, varied["name"] if varied else named}.isdisjoint(known_names()):
+    if not _object(PART.sub("", named)) and {named, varied["name"] if varied else named}.isdisjoint(known_names()):
         raise InputError(
             f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
         )
