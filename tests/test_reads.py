@@ -368,10 +368,10 @@ def test_data_of_an_installed_package_that_a_users_code_reads_counts(
     )
     monkeypatch.syspath_prepend("site-packages")
     gain = 'float(__import__("importlib.resources").resources.files("my_data").joinpath("gain").read_text())'
-    gain += " + __import__('my_' + 'data').gain()"
+    gain += " + __import__('my_' + 'data').gain() + float(np.loadtxt('site-packages/my_data/table'))"
     for calls, told in ((1, "1.0"), (2, "2.0")):
-        for name in ("gain", "other"):
+        for name in ("gain", "other", "table"):
             (folder / name).write_text(told)
-        assert [computed(gain), computed(gain)] == 2 * [(2 * float(told), calls)]
+        assert [computed(gain), computed(gain)] == 2 * [(3 * float(told), calls)]
         another_program(monkeypatch)
-    assert what_was_read() == {"site-packages/my_data/gain"}
+    assert what_was_read() == {"site-packages/my_data/gain", "site-packages/my_data/table"}

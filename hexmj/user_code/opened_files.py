@@ -18,7 +18,7 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from hexmj.user_code.sources_as_run import INSTALLED, is_users
+from hexmj.user_code.sources_as_run import INSTALLED, installed_package, is_users
 
 _OPENS = "open", "exec", "sqlite3.connect", "ctypes.dlopen"
 """Events of Python's audit hooks whose first argument tells a path."""
@@ -175,7 +175,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if writes and computes() and arguments[2] & os.O_APPEND:
             _LOGS.add(os.path.realpath(file))
         reads = not (writes or (opens and _reads_a_source(file, sys._getframe(1))))
-        if reads and (_is_data(file) or (_is_data(file, installed=True) and _by_a_user(sys._getframe(1)))):
+        if reads and (_is_data(file) or (_is_data(file, installed=True) and _by_a_user(sys._getframe(1), file))):
             may_make = not opens or arguments[2] & os.O_CREAT
             _note(file, sys._getframe(1), read=not may_make or os.path.exists(file))
 
@@ -252,17 +252,22 @@ def _is_data(file: str, installed: bool = False) -> bool:
     """Whether a path may be one of data of a user's own, or of a module; or of data of an installed package."""
     file = os.path.normpath(file)
     if installed:
-        of_them = not (file.startswith(_OURS) or file.endswith(".py") or INSTALLED.isdisjoint(Path(file).parts))
+        of_them = bool(installed_package(file)) and not (file.startswith(_OURS) or file.endswith(".py"))
     else:
         of_them = is_users(file)
     return of_them and not (file.startswith(_SYSTEMS) or _NO_DATA.search(file) or os.path.isdir(file))
 
 
-def _by_a_user(opener: FrameType) -> bool:
-    """Whether a user's own code opens a file, with nothing between them but Python."""
-    files = (one.f_code.co_filename for one, _ in walk_stack(opener))
-    by = next((one for one in files if not (one.startswith("<") or _is_of_python(one))), "")
-    return bool(by) and _is_code_of_users(by)
+def _by_a_user(opener: FrameType, file: str) -> bool:
+    """Whether a user's own code opens a file of an installed package, with none of that between them."""
+    package = installed_package(file)
+    for one, _ in walk_stack(opener):
+        by = one.f_code.co_filename
+        if installed_package(by) == package:
+            return False
+        if not by.startswith("<") and _is_code_of_users(by):
+            return True
+    return False
 
 
 def _reads_a_source(file: str, by: FrameType) -> bool:

@@ -71,6 +71,12 @@ def made_anew(names: Iterable[str]) -> str:
     return next((file for file, then in ran if _size_and_time(file) != then), "")
 
 
+def installed_package(file: str) -> str:
+    """The name of the installed package, or module, that a file belongs to; empty if it is none's."""
+    above = [inner for outer, inner in pairwise(Path(file).parts) if outer in INSTALLED]
+    return above[-1].partition(".")[0] if above else ""
+
+
 def is_users(file: str) -> bool:
     """Whether a file is a user's own: neither of Python, nor installed, nor of this package."""
     return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
@@ -81,11 +87,9 @@ def _note(file: Any, runs: CodeType | None = None) -> None:
     if not isinstance(file, str):
         return
     file = str(Path(file))  # without ./ and //, which a path of modules may have
-    within = Path(file).parts
-    above = [inner for outer, inner in pairwise(within) if outer in INSTALLED]
-    if above or file.endswith(COMPILED):
-        name = above[-1].partition(".")[0] if above else file
-        _RAN.setdefault(name, {}).setdefault(file, _size_and_time(file))
+    package = installed_package(file)
+    if package or file.endswith(COMPILED):
+        _RAN.setdefault(package or file, {}).setdefault(file, _size_and_time(file))
     if file.endswith(COMPILED) or not is_users(file):
         return
     with suppress(OSError, SyntaxError, ValueError, EOFError, TypeError):  # of what is no file, or none of Python
