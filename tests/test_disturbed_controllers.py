@@ -1,7 +1,6 @@
 """Controllers of a user's own that are disturbed: ones that lift feet themselves, and ones that hand on another's."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,9 @@ from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsL
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import is_steerable
 from hexmj.controllers.rivals.table import RIVALS
-from hexmj.measures.compare import Comparison
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
-from hexmj.studies.league.entrants_by_name import entrants
-from hexmj.studies.league.study import League
-from hexmj.studies.static_limit.study import StaticLimit
-from hexmj.sweeps import conduct
 
 STRIDE, V = Stride(), 0.5
 STABLE = find_stable_starts(LDVS, V, 6, 0, STRIDE, 20)
@@ -79,21 +73,6 @@ class MadeForHalf(Lifts):
 def test_what_a_plan_is_made_for_is_handed_on(around: Any):
     with pytest.raises(InputError, match=r"the plan is made for vp = 40\.0; expected that of the conditions, 80\.0"):
         physical_walk(STABLE.starts, around, V, 5.0)
-
-
-def test_what_a_plan_is_made_for_is_asked_before_the_work(tmp_path: Path):
-    both, few = {"ldvs": LDVS, "half": ReadsLegs(MadeForHalf())}, {"n_starts": 2, "window": 2.0}
-    studies: list[Any] = [
-        Comparison(both, (0.4, 0.2), **few),
-        StaticLimit(both["half"], 0.4, (40.0, 80.0), **few),
-        League(entrants((*both,), both.__getitem__), n_physical=2, n_tried=2, **few),
-    ]
-    for study in studies:
-        with pytest.raises(
-            InputError, match=r"the plan is made for vp = 40\.0; expected that of the conditions, 80\.0"
-        ):
-            conduct(study, tmp_path / "kept")
-    assert not (tmp_path / "kept").exists()
 
 
 @dataclass(frozen=True)

@@ -77,11 +77,9 @@ class Comparison:
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`; each is an `outcome_table`."""
         from hexmj.measures.outcome_table import outcome_table
-        from hexmj.physics.orders import check_fits
 
         for one in self.controllers.values():
             check_velocities(one, self.velocities, self.stride, self.acceleration)
-            check_fits(one, float(self.observed[0][0]), self.conditions, self.stride, self.acceleration)
         same = self.n_starts, self.seed, self.conditions, self.stride, self.acceleration
         return [
             Cell(f"{name}-V-{v:g}", outcome_table, {"walks": WalkSettings(one, v, t, *same)}, work=t)

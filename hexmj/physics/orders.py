@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import advanced, begin, check_plan, said
-from hexmj.controllers.protocol import Controller, Plan
+from hexmj.controllers.checked_plans import advanced, check_plan, said
+from hexmj.controllers.protocol import Plan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.settling import Settled
-from hexmj.starts import draw_starts
-from hexmj.timing import Acceleration, Stride, steps_within
+from hexmj.timing import steps_within
 from hexmj.walks import PlannedWalk, part_of
 
 CHUNK = 40
@@ -111,22 +110,6 @@ class OrdersFromPlan:
             planned = advanced(self._plan, steps)
             self._planned = [part_of(planned, slice(begin, begin + size)) for begin in range(0, steps, size)][::-1]
         return self._planned.pop()
-
-
-def check_fits(
-    controller: Controller,
-    velocity: float,
-    conditions: Conditions,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-) -> None:
-    """Refuse a controller before the work whose plans are made for other conditions, as that of one start shows.
-
-    Raises:
-        InputError: it is, or cannot plan.
-    """
-    starts = draw_starts(1, 0, stride)
-    check_made_for(begin(controller, starts, velocity, stride, acceleration, threads=1), conditions)
 
 
 def check_made_for(plan: Plan, conditions: Conditions) -> None:

@@ -53,10 +53,7 @@ class SameStarts:
         return {}
 
     def walks(self, velocity: float, duration: float, conditions: Conditions) -> WalkSettings:
-        """What a cell is told that walks all starts, if the controller can walk in these conditions."""
-        from hexmj.physics.orders import check_fits
-
-        check_fits(self.controller, velocity, conditions, self.stride, self.acceleration)
+        """What a cell is told that walks all starts."""
         same = self.n_starts, self.seed, conditions, self.stride, self.acceleration
         return WalkSettings(self.controller, velocity, duration, *same)
 

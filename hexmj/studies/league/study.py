@@ -108,13 +108,11 @@ class League:
 
     def cells(self) -> list[Cell]:
         """See `sweeps.Study`."""
-        from hexmj.physics.orders import check_fits
         from hexmj.physics.settling import check_adhesion
 
         for entrant in self.entrants.values():
             random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
             check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
-            check_fits(entrant.controller, float(self.observed[0][0]), self.conditions, self.stride)
         tried = any(not entrant.ideal for entrant in self.entrants.values())
         for load in (self.conditions.masses.load, *([LOAD] if tried else [])):
             check_adhesion(self.conditions.but(load=load), self.stride, self.seed)
