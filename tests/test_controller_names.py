@@ -225,6 +225,9 @@ class Odd:
     gains: np.ndarray = field(default_factory=lambda: np.ones(1))
     counts: NDArray[np.int64] | None = None
     phases: NDArray[np.floating] | None = None
+    levels: NDArray[np.uint8] | None = None
+    halves: NDArray[np.float32] | None = None
+    none_set: NDArray[np.bool_] | None = None
     level: Literal["a", 1] = 1
     fixed: ClassVar[int] = 3
     own: Own = Own.HERE
@@ -264,6 +267,8 @@ class Odd:
         ('[fields]\ngains = [1, "a"]', "gains = .*; expected an array"),
         ("[fields]\ngains = [true, 2]", "gains = .*; expected an array"),
         ("[fields]\ncounts = [1.5]", "counts = .*; expected an array"),
+        ("[fields]\nlevels = [300]", "levels = .*; expected an array"),
+        ("[fields]\nhalves = [1e300]", "halves = .*; expected an array"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -280,6 +285,18 @@ def test_what_a_file_tells_of_fields_is_of_their_types(rest, sentence, tmp_path,
     Path("odd.toml").write_text(f"controller = 'odd.py:Odd'\n{rest}\n")
     with pytest.raises(hexmj.InputError, match=sentence) if sentence else nullcontext():
         hexmj.load_controller("odd.toml")
+
+
+def test_arrays_of_a_file_are_as_they_are_annotated(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("odd.py").write_text(KINDS)
+    told = "levels = [1, 255]\nhalves = [0.1, 2]\nnone_set = []\ncounts = []"
+    Path("odd.toml").write_text(f"controller = 'odd.py:Odd'\n[fields]\n{told}\n")
+    odd: Any = hexmj.load_controller("odd.toml")
+    assert [str(one.dtype) for one in (odd.levels, odd.halves, odd.none_set, odd.counts)] == [
+        *("uint8", "float32", "bool", "int64")
+    ]
+    assert odd.levels.tolist() == [1, 255] and odd.none_set.shape == odd.counts.shape == (0,)
 
 
 def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):

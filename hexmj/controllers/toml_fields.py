@@ -20,6 +20,9 @@ from hexmj.errors import InputError
 _PLAIN = bool, int, float, str
 """Types of fields whose values are as a file tells them."""
 
+_TAKES = {"i": "iu", "u": "iu", "f": "iuf", "c": "iuf"}
+"""Kind of an array's numbers, as NumPy calls it -> the kinds that it takes."""
+
 _CHOICES, _ROWS = (Union, UnionType), (tuple, Sequence)
 
 
@@ -143,8 +146,14 @@ def _as_array(value: list[Any], kind: Any, usual: Any) -> np.ndarray | None:
             return None
         floats = isinstance(usual, np.ndarray) and usual.dtype.kind == "f"
         wanted = _annotated(kind) or (usual.dtype if floats else made.dtype)
-        alike = wanted.kind == made.dtype.kind or (wanted.kind in "fc" and made.dtype.kind in "iuf")
-        return made.astype(wanted) if alike else None
+        if made.size and made.dtype.kind not in {"i": "iu", "u": "iu", "f": "iuf", "c": "iuf"}.get(
+            wanted.kind, wanted.kind
+        ):
+            return None
+        with np.errstate(over="ignore"):
+            cast = made.astype(wanted)
+        held = np.isfinite(cast) == np.isfinite(made) if wanted.kind in "fc" else cast == made
+        return cast if held.all() else None
     return None
 
 
