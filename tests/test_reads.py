@@ -362,16 +362,16 @@ def test_data_of_an_installed_package_that_a_users_code_reads_counts(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But what installed code reads counts by its package."""
-    (folder := Path("site-packages", "my_data")).mkdir(parents=True)
+    (folder := Path(".venv", "site-packages", "my_data")).mkdir(parents=True)
     (folder / "__init__.py").write_text(
         "from pathlib import Path\ndef gain(): return float(Path(__file__).with_name('other').read_text())\n"
     )
-    monkeypatch.syspath_prepend("site-packages")
+    monkeypatch.syspath_prepend(".venv/site-packages")
     gain = 'float(__import__("importlib.resources").resources.files("my_data").joinpath("gain").read_text())'
-    gain += " + __import__('my_' + 'data').gain() + float(np.loadtxt('site-packages/my_data/table'))"
+    gain += " + __import__('my_' + 'data').gain() + float(np.loadtxt('.venv/site-packages/my_data/table'))"
     for calls, told in ((1, "1.0"), (2, "2.0")):
         for name in ("gain", "other", "table"):
             (folder / name).write_text(told)
         assert [computed(gain), computed(gain)] == 2 * [(3 * float(told), calls)]
         another_program(monkeypatch)
-    assert what_was_read() == {"site-packages/my_data/gain", "site-packages/my_data/table"}
+    assert what_was_read() == {f".venv/site-packages/my_data/{name}" for name in ("gain", "table")}

@@ -108,7 +108,7 @@ def opened_by(sources: set[str]) -> set[str]:
 def also_read(files: set[str], not_kept: str, by_a_cell: bool) -> None:
     """Note for whose code is being called what a cell that it has swept has read; and, if a cell has swept it, why it
     is not kept, unless it is."""
-    data = {file for file in files if _is_data(file) or _is_data(file, installed=True)}
+    data = {file for file in files if _is_data(file) or _is_installed_data(file)}
     new = {file for file in data if not _counts_by_itself(os.path.realpath(file))}
     whose = _whose(sys._getframe(1))
     for one in whose:
@@ -175,7 +175,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if writes and computes() and arguments[2] & os.O_APPEND:
             _LOGS.add(os.path.realpath(file))
         reads = not (writes or (opens and _reads_a_source(file, sys._getframe(1))))
-        if reads and (_is_data(file) or (_is_data(file, installed=True) and _by_a_user(sys._getframe(1), file))):
+        if reads and (_is_data(file) or (_is_installed_data(file) and _by_a_user(sys._getframe(1), file))):
             may_make = not opens or arguments[2] & os.O_CREAT
             _note(file, sys._getframe(1), read=not may_make or os.path.exists(file))
 
@@ -248,14 +248,18 @@ def _stamp(file: str) -> tuple[int, ...]:
     return ()
 
 
-def _is_data(file: str, installed: bool = False) -> bool:
-    """Whether a path may be one of data of a user's own, or of a module; or of data of an installed package."""
+def _is_data(file: str) -> bool:
+    """Whether a path may be one of data of a user's own, or of a module."""
     file = os.path.normpath(file)
-    if installed:
-        of_them = bool(installed_package(file)) and not (file.startswith(_OURS) or file.endswith(".py"))
-    else:
-        of_them = is_users(file)
-    return of_them and not (file.startswith(_SYSTEMS) or _NO_DATA.search(file) or os.path.isdir(file))
+    return is_users(file) and not (file.startswith(_SYSTEMS) or _NO_DATA.search(file) or os.path.isdir(file))
+
+
+def _is_installed_data(file: str) -> bool:
+    """Whether a path may be one of data of an installed package, wherever that lies."""
+    package, file = installed_package(file), os.path.normpath(file)
+    within = file[file.rfind(f"{os.sep}{package}") :]
+    is_code = file.startswith(_OURS) or file.endswith(".py") or _NO_DATA.search(within)
+    return bool(package) and not (is_code or os.path.isdir(file))
 
 
 def _by_a_user(opener: FrameType, file: str) -> bool:
