@@ -274,6 +274,13 @@ def test_of_an_installed_controllers_package_all_files_count(tmp_path: Path) -> 
         assert told.endswith(f"{edited} was made or installed anew while this program used it; start it again")
 
 
+def test_a_script_below_installed_packages_is_a_users(tmp_path: Path) -> None:
+    (script := tmp_path / "site-packages" / "go.py").parent.mkdir()
+    script.write_text("from hexmj.sweeps.code import code\nprint(sorted(code(frozenset({'__main__'})).versions))\n")
+    done = subprocess.run([sys.executable, script], env=WITHOUT_DASK, capture_output=True, text=True, cwd=tmp_path)
+    assert done.stdout == "['python']\n", done.stderr
+
+
 def test_a_compiled_helper_that_was_made_anew_while_it_ran_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -123,7 +123,7 @@ def _what_runs(one: Any) -> Any:
 def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if event == "exec" and getattr(arguments[0], "co_name", "") == "<module>":
         _note(arguments[0].co_filename, arguments[0])
-    elif event == "import":
+    elif event == "import" and len(arguments) > 1:
         _note(arguments[1])  # of what is compiled; of others nobody knows a file yet
 
 
