@@ -224,9 +224,9 @@ class Body:
         """Its MJCF.
 
         Raises:
-            InputError: it is gone, or is no text in UTF-8.
+            InputError: it is gone, longer than 100 MB, or no text in UTF-8.
         """
-        return read_text(self.mjcf)
+        return read_text(self.mjcf, most=100_000_000)
 
 
 def _check_positive(what: str, **values: tuple[Any, str]) -> None:

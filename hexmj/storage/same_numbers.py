@@ -160,7 +160,7 @@ def _leaves(value: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], Any]]:
 
 
 def _of_toml(path: Path) -> dict[str, np.ndarray]:
-    """What was found; on which starts stands in its title, too, and not at all in older files."""
+    """What was found, but not on which starts, of which older files tell nothing."""
     return _gathered({key: one for key, one in read_toml(path).items() if key != SEARCHED})
 
 

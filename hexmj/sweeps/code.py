@@ -54,9 +54,6 @@ class _Needed(NamedTuple):
     """Files of what installed packages require and is installed to be edited."""
 
 
-_SCRIPTS = {"__main__", "__mp_main__"}
-"""What a script is called, wherever it lies, and in the workers that it starts."""
-
 _KNOWN: dict[frozenset[str], _Needed] = {}
 
 
@@ -128,7 +125,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
             continue
         inner = [(f"{name}.{attribute}", ALL)] if attribute.strip(ALL) and file_of(f"{name}.{attribute}") else []
         if file and is_installed(file) and top != PACKAGE.name:
-            installed |= {top} - sys.stdlib_module_names - _SCRIPTS
+            installed |= {top} - sys.stdlib_module_names - sources_as_run.SCRIPTS
         if file and (top in followed or not is_installed(file)):
             module = read_module(name, file)
             sources[module_label(name)] = module.digest

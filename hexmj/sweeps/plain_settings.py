@@ -19,7 +19,7 @@ from hexmj.checks import short
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.storage.mjcf import content, parts
-from hexmj.user_code.sources_as_run import is_users
+from hexmj.user_code.sources_as_run import SCRIPTS, is_users
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
@@ -107,7 +107,7 @@ def stands_there(thing: Any) -> bool:
 def module_label(module: str) -> str:
     """A module's name; that of the file where it is a script or a loaded file, wherever that lies."""
     name, _, stamp = module.partition("@")
-    if name not in ("__main__", "__mp_main__") and not stamp:
+    if name not in SCRIPTS and not stamp:
         return module
     file = Path(getattr(sys.modules[module], "__file__", name))
     return f"{file.name}@{stamp}" if stamp else file.name

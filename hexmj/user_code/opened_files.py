@@ -18,7 +18,7 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from hexmj.user_code.sources_as_run import INSTALLED, installed_package, is_users
+from hexmj.user_code.sources_as_run import INSTALLED, SCRIPTS, installed_package, is_users
 
 _OPENS = "open", "exec", "sqlite3.connect", "ctypes.dlopen"
 """Events of Python's audit hooks whose first argument tells a path."""
@@ -47,9 +47,6 @@ _READS_SOURCES = "tokenize.py", "<frozen importlib._bootstrap_external>"
 
 _WALKERS = "os", "shutil"
 """Modules of Python that open folders by their names within another one."""
-
-_SCRIPTS = "__main__", "__mp_main__"
-"""Names of a script where it runs, and in the workers that it starts."""
 
 _OPENED: dict[str, set[str]] = {}
 """Source, or `_ANYBODY` -> what was opened or ran while a function or module of it was called, if no cell told it."""
@@ -226,7 +223,7 @@ def _callers(frame: FrameType, file: str = "") -> set[str]:
     for one, _ in walk_stack(frame):
         by = one.f_code.co_filename
         ours |= by.startswith(_OURS)
-        loads = ours and file.endswith(".py") and one.f_globals.get("__name__") in _SCRIPTS
+        loads = ours and file.endswith(".py") and one.f_globals.get("__name__") in SCRIPTS
         if not (loads or by.startswith((_OURS, "<")) or _is_of_python(by)):
             found.add(os.path.abspath(by))
     return found

@@ -23,6 +23,9 @@ from hexmj.user_code.parsing import compiled
 INSTALLED = {"site-packages", "dist-packages"}
 """Folders of installed packages, this Python's own or another's."""
 
+SCRIPTS = {"__main__", "__mp_main__"}
+"""What a script is called where it runs, and in the workers that it starts."""
+
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = *(sysconfig.get_path(one) for one in ("stdlib", "platstdlib", "purelib", "platlib")), _PACKAGE
 _NOT_ITS_USERS = (
