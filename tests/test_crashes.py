@@ -146,6 +146,39 @@ def test_processes_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     assert not left
 
 
+WRITES = """
+import os, signal, sys, time
+from pathlib import Path
+from hexmj.cli.sweepers import Sweepers
+from hexmj.storage.files import replacing
+
+def write(told):
+    with replacing(Path(told) / "whole") as part:
+        Path(told, "began").touch()
+        time.sleep(0.2)
+        part.write_text("all of it")
+    time.sleep(600)
+
+if __name__ == "__main__":
+    with Sweepers(processes=2).executor() as pool:
+        pool.submit(write, sys.argv[1])
+        while not Path(sys.argv[1], "began").exists():
+            time.sleep(0.001)
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_they_are_writing_then_is_written_whole(tmp_path: Path) -> None:
+    """Or else it may be made just after it was looked for, to be taken away."""
+    (script := tmp_path / "writes.py").write_text(WRITES)
+    (folder := tmp_path / "kept").mkdir()
+    subprocess.run([sys.executable, script, folder], env=ENVIRONMENT)
+    until = time.monotonic() + 10
+    while {one.name for one in folder.iterdir()} != {"began", "whole"} and time.monotonic() < until:
+        time.sleep(0.05)
+    assert {one.name for one in folder.iterdir()} == {"began", "whole"}
+
+
 def test_a_process_that_is_killed_is_a_sentence(nursery: Nursery) -> None:
     life = nursery.life("killed process")
     assert life.code == 2

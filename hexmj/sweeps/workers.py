@@ -12,7 +12,7 @@ from hexmj.process.signals import STOPS
 from hexmj.storage.files import WRITING
 
 GRACE = 0.5
-"""Time from a stop to the end [s]."""
+"""Time from a stop to the end, and from the parent's end as long as something is being written [s]."""
 
 
 def end_with_parent() -> None:
@@ -42,4 +42,7 @@ def _leave() -> None:
 def _watch() -> None:
     if parent := parent_process():
         parent.join()
-        _leave()  # a run that goes on meanwhile takes what is being written for no leftover
+        end = time.monotonic() + GRACE
+        while WRITING and time.monotonic() < end:  # to take a file away just before it is made would leave it
+            time.sleep(0.001)
+        _leave()
