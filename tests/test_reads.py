@@ -1,5 +1,6 @@
 """What a cell's code reads beyond what the cell's name tells is kept with it: with other files it is another cell."""
 
+import _ctypes
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -361,7 +362,8 @@ def test_what_an_installed_base_opens_counts(
 def test_data_of_an_installed_package_that_a_users_code_reads_counts(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """But what installed code reads counts by its package."""
+    """So do those that a thread reads in which nothing of theirs is called; what installed code reads counts by its
+    package, as libraries do that others load."""
     (folder := Path(".venv", "site-packages", "my_data")).mkdir(parents=True)
     (folder / "__init__.py").write_text(
         "from pathlib import Path\ndef gain(): return float(Path(__file__).with_name('other').read_text())\n"
@@ -369,9 +371,12 @@ def test_data_of_an_installed_package_that_a_users_code_reads_counts(
     monkeypatch.syspath_prepend(".venv/site-packages")
     gain = 'float(__import__("importlib.resources").resources.files("my_data").joinpath("gain").read_text())'
     gain += " + __import__('my_' + 'data').gain() + float(np.loadtxt('.venv/site-packages/my_data/table'))"
+    gain += " + float(ThreadPoolExecutor(1).submit(np.loadtxt, '.venv/site-packages/my_data/aside').result())"
+    gain += " + 0 * len(repr(__import__('ctypes').CDLL(str(Path('.venv/site-packages/my_data/with.so').absolute()))))"
+    (folder / "with.so").write_bytes(Path(_ctypes.__file__).read_bytes())
     for calls, told in ((1, "1.0"), (2, "2.0")):
-        for name in ("gain", "other", "table"):
+        for name in ("gain", "other", "table", "aside"):
             (folder / name).write_text(told)
-        assert [computed(gain), computed(gain)] == 2 * [(3 * float(told), calls)]
+        assert [computed(gain), computed(gain)] == 2 * [(4 * float(told), calls)]
         another_program(monkeypatch)
-    assert what_was_read() == {f".venv/site-packages/my_data/{name}" for name in ("gain", "table")}
+    assert what_was_read() == {f".venv/site-packages/my_data/{name}" for name in ("gain", "table", "aside")}

@@ -144,15 +144,16 @@ def _as_array(value: list[Any], kind: Any, usual: Any) -> np.ndarray | None:
         kinds = {float if type(one) is int else type(one) for one in np.array(value, dtype=object).flat}
         if len(kinds) > 1 or made.dtype.kind not in "biufU":
             return None
-        floats = isinstance(usual, np.ndarray) and usual.dtype.kind == "f"
-        wanted = _annotated(kind) or (usual.dtype if floats else made.dtype)
-        if made.size and made.dtype.kind not in {"i": "iu", "u": "iu", "f": "iuf", "c": "iuf"}.get(
-            wanted.kind, wanted.kind
-        ):
+        as_usual = isinstance(usual, np.ndarray) and (usual.dtype.kind == "f" or not made.size)
+        wanted = _annotated(kind) or (usual.dtype if as_usual else made.dtype)
+        if made.size and made.dtype.kind not in _TAKES.get(wanted.kind, wanted.kind):
             return None
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", under="ignore"):
             cast = made.astype(wanted)
-        held = np.isfinite(cast) == np.isfinite(made) if wanted.kind in "fc" else cast == made
+        if made.dtype.kind == "f":  # may be rounded, but not to zero or infinity
+            held = (np.isfinite(cast) == np.isfinite(made)) & ((cast == 0) == (made == 0))
+        else:
+            held = cast.astype(object) == made.astype(object)
         return cast if held.all() else None
     return None
 

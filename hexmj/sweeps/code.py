@@ -30,6 +30,8 @@ CARRIERS = {
 """What carries, keeps and shows this package's numbers, but computes none: another version makes no cell anew, unless
 a user's module imports it."""
 
+_NO_PACKAGES = sys.stdlib_module_names | sources_as_run.SCRIPTS
+
 
 @dataclass(frozen=True)
 class Code:
@@ -125,7 +127,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
             continue
         inner = [(f"{name}.{attribute}", ALL)] if attribute.strip(ALL) and file_of(f"{name}.{attribute}") else []
         if file and is_installed(file) and top != PACKAGE.name:
-            installed |= {top} - sys.stdlib_module_names - sources_as_run.SCRIPTS
+            installed |= {top} - _NO_PACKAGES
         if file and (top in followed or not is_installed(file)):
             module = read_module(name, file)
             sources[module_label(name)] = module.digest
@@ -139,7 +141,7 @@ def _follow(modules: frozenset[str]) -> _Needed:
         elif inner:  # of a folder without an `__init__`
             waiting += inner
         else:
-            installed |= {top} - sys.stdlib_module_names
+            installed |= {top} - _NO_PACKAGES
             if file is None and top in installed:
                 missing |= {name, f"{name}.{attribute}" if attribute.strip(ALL) else name}
     names = installed | ({"llvmlite"} if "numba" in installed else set())

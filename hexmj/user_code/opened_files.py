@@ -172,7 +172,7 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
         if writes and computes() and arguments[2] & os.O_APPEND:
             _LOGS.add(os.path.realpath(file))
         reads = not (writes or (opens and _reads_a_source(file, sys._getframe(1))))
-        if reads and (_is_data(file) or (_is_installed_data(file) and _by_a_user(sys._getframe(1), file))):
+        if reads and (_is_data(file) or (_is_installed_data(file) and _by_a_user(sys._getframe(1), event, file))):
             may_make = not opens or arguments[2] & os.O_CREAT
             _note(file, sys._getframe(1), read=not may_make or os.path.exists(file))
 
@@ -259,16 +259,21 @@ def _is_installed_data(file: str) -> bool:
     return bool(package) and not (is_code or os.path.isdir(file))
 
 
-def _by_a_user(opener: FrameType, file: str) -> bool:
-    """Whether a user's own code opens a file of an installed package, with none of that between them."""
+def _by_a_user(opener: FrameType, event: str, file: str) -> bool:
+    """Whether a user's own code opens a file of an installed package, with none of that between them; or may do so,
+    where a thread besides the main one does, and a cell is computed.  Libraries for one another are none of its data.
+    """
+    if event == "ctypes.dlopen":
+        return False
     package = installed_package(file)
     for one, _ in walk_stack(opener):
         by = one.f_code.co_filename
+        is_users = _is_code_of_users(by) and not by.startswith("<")
+        if is_users or one.f_globals.get("__name__") in SCRIPTS:
+            return True
         if installed_package(by) == package:
             return False
-        if not by.startswith("<") and _is_code_of_users(by):
-            return True
-    return False
+    return bool(_COMPUTING) and threading.current_thread() is not threading.main_thread()
 
 
 def _reads_a_source(file: str, by: FrameType) -> bool:
