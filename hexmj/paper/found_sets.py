@@ -14,7 +14,7 @@ from hexmj.timing import WINDOWS
 TABLE = Path(__file__).with_name("ideal.toml")
 PRINTED = READINGS["printed"]
 
-SEARCHED = 0, 1
+SEARCH_SEEDS = 0, 1
 """Seeds of the starts on which they were searched."""
 
 

@@ -41,7 +41,7 @@ ASIDE: dict[str, tuple[Any, ...]] = {
 }
 """Choices of which only acceleration or the measure knows: combined for the best."""
 
-REFINED, SEARCHED = 3.0, 3.0
+REFINED, WITH_IDEALS = 3.0, 3.0
 """Work of a score with refined constants, and of one of ideal sets; that of one as it is is 1."""
 
 CALIBRATED = frozenset(key for keys in INFERRED_FROM.values() for key in keys)
@@ -95,7 +95,7 @@ def compare_readings(
     """
     import xarray as xr
 
-    first, then = REFINED * len(readings), best * (math.prod(map(len, ASIDE.values())) - 1 + SEARCHED)
+    first, then = REFINED * len(readings), best * (math.prod(map(len, ASIDE.values())) - 1 + WITH_IDEALS)
     with shown(how.get("progress"), "reading") as told:
         cells = [Cell(title(one), score, {"protocol": one}) for one in readings]
         scored = run(cells, folder, **how | {"progress": part_of(told, first / (first + then))})
@@ -123,7 +123,7 @@ def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how:
     asides = [dict(zip(ASIDE, one, strict=True)) for one in product(*ASIDE.values())][1:]
     looked = [read(one, aside) for one in readings for aside in asides]
     cells = [Cell(title(one), score_as_is, {"protocol": one}) for one in looked]
-    cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, SEARCHED) for one in readings]
+    cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, WITH_IDEALS) for one in readings]
     found = run(cells, folder, **how)
     judged, searched = found[: len(looked)], found[len(looked) :]
     rows = [xr.concat(judged[i : i + len(asides)], "aside").agrees for i in range(0, len(judged), len(asides))]

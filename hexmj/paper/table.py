@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from hexmj.paper.claims import IN_PHYSICS, Claim
-from hexmj.paper.found_sets import SEARCHED
+from hexmj.paper.found_sets import SEARCH_SEEDS
 from hexmj.paper.protocol import FULL, QUICK
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
@@ -97,7 +97,7 @@ def summary(rows: Sequence[Row]) -> list[str]:
 def on_searched_starts(seed: int) -> list[str]:
     """That ideal sets look better than they are on starts on which they were searched, if those of a seed are."""
     told = f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"
-    return [told] if seed in SEARCHED else []
+    return [told] if seed in SEARCH_SEEDS else []
 
 
 def claims_markdown(rows: Sequence[Row], settings: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest, digest_of
-from hexmj.sweeps.module_files import file_of, is_installed, package_of
+from hexmj.sweeps.module_files import file_of, package_of
 from hexmj.sweeps.module_sources import ALL, AT_FIRST, Module, Wanted, read_module
 from hexmj.sweeps.plain_settings import PACKAGE, module_label
 from hexmj.user_code import sources_as_run
@@ -126,9 +126,9 @@ def _follow(modules: frozenset[str]) -> _Needed:
         if CARRIERS & {name, top, name.rpartition(".")[0]}:
             continue
         inner = [(f"{name}.{attribute}", ALL)] if attribute.strip(ALL) and file_of(f"{name}.{attribute}") else []
-        if file and is_installed(file) and top != PACKAGE.name:
+        if file and sources_as_run.is_installed(file) and top != PACKAGE.name:
             installed |= {top} - _NO_PACKAGES
-        if file and (top in followed or not is_installed(file)):
+        if file and (top in followed or not sources_as_run.is_installed(file)):
             module = read_module(name, file)
             sources[module_label(name)] = module.digest
             read.append((name, file, module))

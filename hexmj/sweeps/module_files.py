@@ -6,7 +6,7 @@ from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from pathlib import Path
 
-from hexmj.user_code.sources_as_run import INSTALLED
+from hexmj.user_code.sources_as_run import is_installed
 
 _STANDARD = sysconfig.get_path("stdlib")
 _FILES: dict[str, Path] = {}
@@ -34,11 +34,6 @@ def _found(module: str) -> Path | None:
             if file.is_file():
                 return file
     return None
-
-
-def is_installed(file: Path) -> bool:
-    """Whether it lies among installed packages, this Python's own or another's."""
-    return not INSTALLED.isdisjoint(file.parts)
 
 
 def package_of(name: str) -> str:

@@ -18,7 +18,7 @@ from packaging.utils import canonicalize_name
 
 from hexmj.storage.files import digest, digest_of
 from hexmj.sweeps.plain_settings import PACKAGE
-from hexmj.user_code.sources_as_run import INSTALLED
+from hexmj.user_code.sources_as_run import is_installed
 
 NAMES = {"PIL": "pillow"}
 """Module -> distribution, of those that this package imports, where the names differ: to look through all that is
@@ -123,7 +123,7 @@ def _sources(folder: Path) -> dict[str, str]:
     """Files of what can be imported from a folder, and their names in it."""
     found = [one for one in folder.rglob("*") if one.name.endswith(SOURCES) and one.is_file()]
     names = {str(one): one.relative_to(folder) for one in found if os.access(one, os.R_OK)}
-    return {file: name.as_posix() for file, name in names.items() if INSTALLED.isdisjoint(name.parts)}
+    return {file: name.as_posix() for file, name in names.items() if not is_installed(name)}
 
 
 def _of_no_distribution(module: str) -> str:

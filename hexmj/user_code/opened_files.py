@@ -18,7 +18,7 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from hexmj.user_code.sources_as_run import INSTALLED, SCRIPTS, installed_package, is_users
+from hexmj.user_code.sources_as_run import SCRIPTS, installed_package, is_installed, is_users
 
 _OPENS = "open", "exec", "sqlite3.connect", "ctypes.dlopen"
 """Events of Python's audit hooks whose first argument tells a path."""
@@ -234,7 +234,7 @@ _is_code_of_users = cache(is_users)
 
 @cache
 def _is_of_python(by: str) -> bool:
-    return by.startswith(_PYTHONS) and INSTALLED.isdisjoint(Path(by).parts)
+    return by.startswith(_PYTHONS) and not is_installed(by)
 
 
 def _stamp(file: str) -> tuple[int, ...]:

@@ -74,6 +74,11 @@ def made_anew(names: Iterable[str]) -> str:
     return next((file for file, then in ran if _size_and_time(file) != then), "")
 
 
+def is_installed(file: str | Path) -> bool:
+    """Whether it lies among installed packages, this Python's own or another's."""
+    return not INSTALLED.isdisjoint(Path(file).parts)
+
+
 def installed_package(file: str) -> str:
     """The name of the installed package, or module, that a file belongs to; empty if it is none's."""
     above = [inner for outer, inner in pairwise(Path(file).parts) if outer in INSTALLED]
@@ -82,7 +87,7 @@ def installed_package(file: str) -> str:
 
 def is_users(file: str) -> bool:
     """Whether a file is a user's own: neither of Python, nor installed, nor of this package."""
-    return not file.startswith(_NOT_ITS_USERS) and INSTALLED.isdisjoint(Path(file).parts)
+    return not file.startswith(_NOT_ITS_USERS) and not is_installed(file)
 
 
 def _note(file: Any, runs: CodeType | None = None) -> None:
