@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import hexmj
-from hexmj.cli.commands import COMMANDS
+from hexmj.cli.commands import COMMANDS, options_of
 from hexmj.controllers.cruse1998.presets import network_toml
 from tiers import few_of
 
@@ -32,6 +32,15 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
     assert code == 0
     assert "[mm/s]" in out
     assert "(default: 80.0)" in out
+
+
+WALK = "compare", "flss", "walk", "render", "search", "converge", "terrain", "map", "disturb", "biology", "ablate"
+
+
+@pytest.mark.parametrize("words", [*([one] for one in WALK), ["variants"], ["league"], ["league", "--quick"]])
+def test_every_command_that_walks_tells_its_usual_conditions(words):
+    """Of whoever walks unless others are asked for."""
+    assert options_of(words).conditions_line().startswith("window ")
 
 
 def test_version_is_one_line(run):

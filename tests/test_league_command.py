@@ -96,7 +96,7 @@ class Far:
 """
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_who_cannot_be_filmed_costs_neither_tables_nor_manifest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:

@@ -19,7 +19,7 @@ from hexmj.replay.film.film import Film
 from hexmj.storage.literal import literal
 from hexmj.storage.results import save_text
 from hexmj.studies.league import study
-from hexmj.studies.league.entrants_by_name import EVERYONE, FOUR, entrants
+from hexmj.studies.league.entrants_by_name import EVERYONE, FOUR, IDEAL, entrants
 from hexmj.studies.league.figure import league_figure, walks_figure
 from hexmj.studies.league.table import by_rank, league_markdown, tables
 
@@ -72,12 +72,16 @@ class League(StudyCommand):
     outputs = Outputs("walking the league", "league.nc", FIGURES, others=(TABLE, FILM))
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Who takes part."""
+    def participants(self) -> tuple[str, ...]:
+        """Who takes part, by name."""
         return (FOUR if self.quick else EVERYONE) if self.controllers is None else self.controllers
 
+    @property
+    def names(self) -> Sequence[str]:
+        return list(dict.fromkeys(name.removesuffix(IDEAL) for name in self.participants))
+
     def study(self) -> study.League:
-        check_distinct("controllers", self.names)
+        check_distinct("controllers", self.participants)
         asked = {
             "velocities": self.velocities,
             "n_starts": self.starts,
@@ -90,7 +94,7 @@ class League(StudyCommand):
             if asked[part] is None:
                 sizes[part] = min(sizes.get(part, getattr(study.League, part)), there)
         return study.League(
-            entrants(self.names, loaded),
+            entrants(self.participants, loaded),
             **sizes,
             tried_at=self.trial_velocity,
             window=self.walks.time,
@@ -126,7 +130,7 @@ class League(StudyCommand):
 
         if sentence := missing():
             raise RenderingError(sentence)
-        takes_part, v = entrants(self.names, loaded), result.attrs["tried_at"]
+        takes_part, v = entrants(self.participants, loaded), result.attrs["tried_at"]
         best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]
         shown = []
         for name in best:

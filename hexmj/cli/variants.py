@@ -69,7 +69,11 @@ class Variants(StudyCommand):
 
     def _network(self, name: str, velocity: float) -> Cruse1998:
         """A set, or that of this velocity."""
-        found = self.controlled.controller(_own(name, velocity))
+        try:
+            found = self.controlled.controller(_own(name, velocity))
+        except InputError as error:
+            at = f"{name} at V = {velocity:g}: " if name.endswith(OF_EACH) else ""
+            raise InputError(f"{at}{error}") from None
         if not isinstance(found, Cruse1998):
             raise InputError(f"{name}; expected sets of the 1998 network, whose constants and rules vary")
         return found

@@ -18,7 +18,13 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from hexmj.user_code.sources_as_run import SCRIPTS, installed_package, is_installed, is_users
+from hexmj.user_code.sources_as_run import (
+    SCRIPTS,
+    installed_package,
+    is_installed,
+    is_users,
+    within_installed,
+)
 
 _OPENS = "open", "exec", "sqlite3.connect", "ctypes.dlopen"
 """Events of Python's audit hooks whose first argument tells a path."""
@@ -253,15 +259,15 @@ def _is_data(file: str) -> bool:
 
 def _is_installed_data(file: str) -> bool:
     """Whether a path may be one of data of an installed package, wherever that lies."""
-    package, file = installed_package(file), os.path.normpath(file)
-    within = file[file.rfind(f"{os.sep}{package}") :]
-    is_code = file.startswith(_OURS) or file.endswith(".py") or _NO_DATA.search(within)
-    return bool(package) and not (is_code or os.path.isdir(file))
+    file = os.path.normpath(file)
+    within = within_installed(file)
+    is_code = file.startswith(_OURS) or file.endswith(".py") or _NO_DATA.search(f"{os.sep}{within}")
+    return bool(within) and not (is_code or os.path.isdir(file))
 
 
 def _by_a_user(opener: FrameType, event: str, file: str) -> bool:
-    """Whether a user's own code opens a file of an installed package, with none of that between them; or may do so,
-    where a thread besides the main one does, and a cell is computed.  Libraries for one another are none of its data.
+    """Whether a user's own code opens a file of an installed package, or has it opened, with none of that between them;
+    but for libraries, which packages load for one another.
     """
     if event == "ctypes.dlopen":
         return False
@@ -273,7 +279,7 @@ def _by_a_user(opener: FrameType, event: str, file: str) -> bool:
             return True
         if installed_package(by) == package:
             return False
-    return bool(_COMPUTING) and threading.current_thread() is not threading.main_thread()
+    return any(one == _ANYBODY or _is_code_of_users(one) for one in _whose(opener, file))
 
 
 def _reads_a_source(file: str, by: FrameType) -> bool:

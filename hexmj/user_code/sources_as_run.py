@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES, SourceFileLoader
 from importlib.util import cache_from_source
-from itertools import pairwise
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -76,13 +75,19 @@ def made_anew(names: Iterable[str]) -> str:
 
 def is_installed(file: str | Path) -> bool:
     """Whether it lies among installed packages, this Python's own or another's."""
-    return not INSTALLED.isdisjoint(Path(file).parts)
+    return bool(within_installed(file))
 
 
 def installed_package(file: str) -> str:
     """The name of the installed package, or module, that a file belongs to; empty if it is none's."""
-    above = [inner for outer, inner in pairwise(Path(file).parts) if outer in INSTALLED]
-    return above[-1].partition(".")[0] if above else ""
+    return within_installed(file).partition(os.sep)[0].partition(".")[0]
+
+
+def within_installed(file: str | Path) -> str:
+    """The path of a file from the folder of installed packages on; empty if it lies in none."""
+    parts = Path(file).parts
+    begin = max((i for i, one in enumerate(parts) if one in INSTALLED), default=len(parts))
+    return os.sep.join(parts[begin + 1 :])
 
 
 def is_users(file: str) -> bool:
