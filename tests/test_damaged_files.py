@@ -260,7 +260,7 @@ def test_a_file_that_nobody_may_read(tmp_path, monkeypatch):
         (b"\xff\xfe", "is no text in UTF-8"),
         (b"[" * 100_000, "cannot be read as TOML"),
         (b"a = " + b"9" * 10_000, "cannot be read as TOML"),
-        (b"#" * 2_000_000, "is longer than 1000000 bytes"),
+        (b"#" * 2_000_000, "is longer than 1 MB; expected a shorter text"),
     ],
     ids=["bytes", "deep", "long number", "long"],
 )

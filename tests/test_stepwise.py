@@ -87,7 +87,8 @@ def test_a_stepwise_plan_hears_what_it_is_told():
         (Step(0.0, True, height="high"), "height of a step is of type"),  # pyright: ignore[reportArgumentType]
         (Step([[0.0], [0.0, 1.0]], True), "x of a step is .* expected one array"),  # pyright: ignore[reportArgumentType]
         (Step(np.ma.masked_array(np.zeros(6), [True] + 5 * [False]), True), "x of a step is masked in part; expected"),
-        ((0.0, True), r"a step gave \(0.0, True\); expected a Step"),
+        ((0.0, True), r"a step gave \(0.0, True\); expected a Step, such as Step\(x, stance\)"),
+        ((np.zeros((40, 6)), True), r"a step gave \(array\(.[^\n]*; expected a Step, such as Step\(x, stance\)"),
     ],
 )
 def test_a_step_that_makes_no_sense(step, words):

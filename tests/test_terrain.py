@@ -243,9 +243,12 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
         ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0.0: grasps has"),
         (
             {"grounds": ("gap",), "conditions": FARTHER.but(ground_length=7.0)},
-            "ground_length = 7.0; only hurdle has it",
+            "ground_length = 7.0; expected hurdle among the grounds",
         ),
-        ({"grounds": ("step",), "conditions": FARTHER.but(ground_seed=7)}, "ground_seed = 7; only rough has it"),
+        (
+            {"grounds": ("step",), "conditions": FARTHER.but(ground_seed=7)},
+            "ground_seed = 7; expected rough among the grounds",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(wrong, said):

@@ -61,7 +61,8 @@ class StepwisePlan:
         for n, now in enumerate(v):
             step = self.step(now.copy())
             if not isinstance(step, Step):
-                raise InputError(f"a step gave {step!r:.80}; expected a Step")
+                given = " ".join(f"{step!r}".split())
+                raise InputError(f"a step gave {given:.60}; expected a Step, such as Step(x, stance)")
             for name, values in planned.items():
                 value = getattr(step, name)
                 if value is not None or name not in usual:

@@ -198,7 +198,7 @@ def read_text(path: Path, most: int = 1_000_000) -> str:
     with opened(path) as file:
         content = file.read(most + 1)
     if len(content) > most:
-        raise InputError(f"{path} is longer than {most} bytes; expected a text that a person would write")
+        raise InputError(f"{path} is longer than {most / 1e6:g} MB; expected a shorter text")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

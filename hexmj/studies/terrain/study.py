@@ -74,10 +74,11 @@ class Terrain(SameStarts):
             check_distinct(name, getattr(self, name))
         for name, grounds in SIZED.items():
             if not grounds & {*self.grounds} and [*getattr(self, name)] != [*getattr(Terrain, name)]:
-                raise InputError(f"{name} = {getattr(self, name)}; only {', '.join(sorted(grounds))} have them")
+                one = " or ".join(sorted(grounds))
+                raise InputError(f"{name} = {getattr(self, name)}; expected {one} among the grounds")
         for name, ground in TOLD.items():
             if ground not in self.grounds and (told := self.conditions.flat()[name]) != FARTHER.flat()[name]:
-                raise InputError(f"{name} = {told}; only {ground} has it")
+                raise InputError(f"{name} = {told}; expected {ground} among the grounds")
         for grasp in self.grasps:
             self.conditions.but(grasp=grasp)
         _ = self.obstacles
