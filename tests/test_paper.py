@@ -261,7 +261,9 @@ def test_the_numbers_do_not_depend_on_who_measures(tmp_path):
 def test_other_readings_stand_beside(tmp_path):
     keys = ("hws-late", "hws-regimes", "p2")
     alone, _ = reproduce(tmp_path / "alone", replace(TINY, reading=READINGS["lasting"]), only=keys[:2])
-    rows, _ = reproduce(tmp_path, TINY, only=keys, beside=("lasting",))
+    told = []
+    rows, _ = reproduce(tmp_path, TINY, only=keys, beside=("lasting",), progress=told.append)
+    assert sum(told) == pytest.approx(1.0)
     assert [row.beside["lasting"].answers for row in rows[1:]] == [row.answers for row in alone]
     head, line = (tmp_path / "claims.md").read_text().split("| section")[1].splitlines()[0:3:2]
     assert "ours, walk | ours, start | lasting, walk | lasting, start" in head

@@ -191,7 +191,7 @@ class Search(WalkingCommand):
         same = "algorithm", "population", "domain", "budget", "refine_budget"
         return Effort(
             **{name: getattr(self, name) for name in same},
-            begin=loaded(self.begin) if self.begin else None,
+            begin=self.controlled.controller(self.begin) if self.begin else None,
             starts=self._size(self.starts, 500, 50),
             refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
             seed=self.walks.seed,

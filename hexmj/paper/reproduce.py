@@ -14,6 +14,7 @@ from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
+from hexmj.process.progress import part_of, shown
 from hexmj.storage import results
 from hexmj.storage.results import json_text, results_folder, save_dataset, save_text
 from hexmj.sweeps import Execution, over_axes, run
@@ -59,11 +60,13 @@ def reproduce(
     readings = {name: named_reading(name) for name in beside}
     results_folder(out := path_of(out), TABLES)
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
-    measured = _measurements(_needed(claims, figures=not only), protocol, out / KEPT, how)
-    rows = [judge(claim, measured) for claim in claims]
-    for name, reading in readings.items():
-        other = _measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, how)
-        rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
+    with shown(how.get("progress"), "reproducing") as progress:
+        part = how | {"progress": part_of(progress, 1 / (1 + len(readings)))}
+        measured = _measurements(_needed(claims, figures=not only), protocol, out / KEPT, part)
+        rows = [judge(claim, measured) for claim in claims]
+        for name, reading in readings.items():
+            other = _measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, part)
+            rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
     texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
     files = [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
     if not only:

@@ -114,6 +114,11 @@ class NetworkForm:
         """See `forms.Form.vector`."""
         if type(controller) is not Cruse1998:
             raise InputError(f"{controller.name} is not made of weights alone; expected a set of the 1998 network")
+        for rule in ("order", "reading"):
+            own, wanted, printed = (getattr(one, rule) for one in (controller, self, NetworkForm()))
+            if own not in (wanted, printed):
+                told = f"{rule} = {own}; expected {wanted}, as of what is searched, or {printed}"
+                raise InputError(f"{controller.name} to begin with has {told}")
         vector = FORMS[self.name].vector(controller.weights)
         if np.isfinite(vector).all():
             kept, every = general(self.controller(vector).weights), general(controller.weights)

@@ -49,8 +49,8 @@ class Effort:
     domain: float = 10.0
     """Reach of the initial population [mm, or 1], see `Problem.domain`."""
     begin: Controller | None = None
-    """Where the population begins; without it at `forms.Form.begin`, and with none there either at the paper's
-    '0'-individual (evolution) or in the middle of the domain (cmaes)."""
+    """Where the population begins, by the rules of what is searched or as printed; without it at `forms.Form.begin`,
+    and with none there either at the paper's '0'-individual (evolution) or in the middle of the domain (cmaes)."""
     starts: int = 500
     """Starts of each candidate."""
     budget: int = 1000
