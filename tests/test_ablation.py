@@ -151,6 +151,7 @@ def test_sets_that_are_not_read_as_printed_are_told_once() -> None:
 def test_parts_of_a_set_are_known_to_be_searched_on_these_starts() -> None:
     from hexmj.cli.commands import options_of
 
-    for words, name in ((["ablate", "--models", "own-0.3"], "own-0.3"), (["flss", "--model"], "own-0.3-without-4")):
-        line = options_of([*words, *([name] if name not in words else []), "--seed", "0"]).conditions_line()
-        assert "a search found own-0.3 (" in line
+    for words in (["ablate", "--models", "own-0.3"], ["flss", "--model", "own-0.3-without-4"]):
+        here, elsewhere = (options_of([*words, "--seed", seed]) for seed in ("0", "1999"))
+        assert "a search found own-0.3 (" in here.conditions_line()
+        assert (here.searched, elsewhere.searched) == ({"own-0.3": [0]}, {})

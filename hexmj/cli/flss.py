@@ -96,7 +96,8 @@ class Flss(WalkingCommand):
         report = physical_report(result) if self.physical else {}
         if self.json:
             lists = {"velocity": result.velocity.values.tolist()} | {c: result[c].values.tolist() for c in columns}
-            print_json(lists | ({"report": report} if report else {}) | {"settings": settings(result), "files": files})
+            told = {"settings": settings(result), "searched": self.searched, "files": files}
+            print_json(lists | ({"report": report} if report else {}) | told)
             return
         columns = [name for name in columns if result[name].notnull().any()]  # no sample_sd of less than two samples
         at = {v: result.sel(velocity=v) for v in result.velocity.values}

@@ -78,7 +78,7 @@ class StudyCommand(WalkingCommand):
         ]
         files.append(save_manifest(self, settings(result), files, folder / outputs.manifest))
         if self.json:
-            print_json(self.summary(result) | {"files": files})
+            print_json(self.summary(result) | {"searched": self.searched, "files": files})
         else:
             show(*self.shown(result), *map(str, files))
 

@@ -59,7 +59,7 @@ class Walk(WalkingCommand):
         files.append(save_manifest(self, told, files, out / MANIFEST))
         summary = walk_summary(walked)
         if self.json:
-            print_json(summary | {"settings": told, "files": files})
+            print_json(summary | {"settings": told, "searched": self.searched, "files": files})
         else:
             lines = [f"{key}: {_told(key, value)}" for key, value in summary.items() if value is not None]
             beyond = () if self.physical else self.conditions.flat().keys() - {*SHOWN}  # what a puppet obeys

@@ -60,13 +60,22 @@ class WalkingCommand:
         own = vars(self)
         return own["velocities"] if own.get("velocities") is not None else own.get("velocity", [])
 
+    @property
+    def searched(self) -> dict[str, list[int]]:
+        """What walks on starts on which a search has found it, each with the seeds of its searches."""
+        return {what: seeds for what, seeds in self._searches.items() if self.walks.seed in seeds}
+
+    @property
+    def _searches(self) -> dict[str, list[int]]:
+        return {what: seeds for name in self.names for what, seeds in seeds_of_searches(name).items()}
+
     def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
-        found = [one for name in self.names for one in seeds_of_searches(name).items()]
-        known = dict.fromkeys(what for what, seeds in found if self.walks.seed in seeds)
-        other = next(seed for seed in count(1998) if not any(seed in seeds for _, seeds in found))
-        line += f", on whose starts a search found {', '.join(known)} (others: --seed {other})" if known else ""
+        if known := self.searched:
+            tried = {seed for seeds in self._searches.values() for seed in seeds}
+            other = next(seed for seed in count(1998) if seed not in tried)
+            line += f", on whose starts a search found {', '.join(known)} (others: --seed {other})"
         stride = self.walks.stride
         told = vars(stride) | {"geometry": {one: name for name, one in GEOMETRIES.items()}[stride.geometry]}
         line += "".join(f"; {name} {told[name]}" for name in changed(stride, Stride()))
