@@ -126,7 +126,7 @@ def test_ranks_over_all_velocities_are_not_drawn_of_a_part_of_them():
     [
         (lambda one: one.isel(trial=[0]), "the tables .* cannot be made of this part of a result, .*trial 1"),
         (lambda one: one.isel(measure=[0]), "the tables .* cannot be made of this part of a result, .*measure 1"),
-        (lambda one: one.isel(entrant=0), "a result without the axis entrant; expected all"),
+        (lambda one: one.isel(entrant=0), "the tables .*of one entrant without an axis.; expected the result as"),
         (lambda one: one.isel(entrant=[]), "a result without the axis entrant; expected all"),
         (lambda one: one.rename(entrant="e"), "the tables .* cannot be made of this part of a result, .*e 2"),
         (lambda one: one.drop_attrs(), "the tables .* cannot be made of this part of a result, "),

@@ -342,8 +342,9 @@ def test_what_has_lost_its_velocities_gets_a_sentence():
         with pytest.raises(InputError, match="without the axis velocity"):
             hexmj.plot(result.isel(velocity=wrong))
     both = hexmj.compare({"hws": hexmj.HWS, "ldvs": hexmj.LDVS}, [0.3], n_starts=1, window=5.0)
-    with pytest.raises(InputError, match=r"without the axis controller; expected all of them, as of isel\(controller="):
+    with pytest.raises(InputError, match=r"\(of one controller without an axis\); expected the result as it .*isel\("):
         hexmj.plot(both.sel(controller="hws"))
+    hexmj.plot(both.assign_coords(run=3))
     with pytest.raises(InputError, match="without the values of its axis velocity"):
         hexmj.plot(result.drop_vars("velocity"))
     with pytest.raises(InputError, match=r"cannot be drawn of this part of a result, V 2.* no attribute 'velocity'"):

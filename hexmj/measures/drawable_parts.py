@@ -24,7 +24,7 @@ def check_axes(result: "xr.Dataset") -> None:
     Raises:
         InputError: with the name of the first one.
     """
-    gone = [name for name, one in result.coords.items() if not (one.ndim and one.size)]
+    gone = [name for name, one in result.coords.items() if (name == "velocity" and not one.ndim) or not one.size]
     if gone:
         raise InputError(f"a result without the axis {gone[0]}; expected all of them, as of isel({gone[0]}=[0])")
     bare = [name for name in result.sizes if name not in (*COUNTED, *result.coords)]
@@ -68,8 +68,11 @@ def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
         raise
     except Exception as error:
         sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
+        single = ", ".join(str(name) for name, one in result.coords.items() if not one.ndim)
+        told = f"of one {single} without an axis" if single else f"{error!r:.200}"
+        wanted = ", or parts that keep all axes, as of isel(...=[0])" if single else ""
         raise InputError(
-            f"{cannot} of this part of a result, {sizes} ({error!r:.200}); expected the result as it was computed"
+            f"{cannot} of this part of a result, {sizes} ({told}); expected the result as it was computed{wanted}"
         ) from error
 
 
