@@ -20,6 +20,10 @@ class OutOfReach(InputError):
     """A plan whose tips a body cannot reach, so that it does not walk."""
 
 
+class Refused(InputError):
+    """A controller that does not walk with its values, at a velocity or with a time step."""
+
+
 class StillThrown(InputError):
     """A walk that a push still throws as it ends, so that nobody knows whether it falls."""
 

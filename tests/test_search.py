@@ -163,7 +163,9 @@ def test_a_set_walks_by_its_own_rules_where_a_search_begins_with_it():
     """One that walks as printed begins searches by other rules, too."""
     weights = hexmj.NetworkForm("mirrored").vector(hexmj.PRESETS["own-0.3"])
     assert np.array_equal(hexmj.NetworkForm("mirrored", order="sequential").vector(hexmj.PRESETS["own-0.3"]), weights)
-    with pytest.raises(InputError, match=r"^lasting-0.3 to begin with has reading = Reading\(ips.*; expected Read"):
+    with pytest.raises(
+        InputError, match=r"^lasting-0.3 to begin with has reading = lasting; expected printed, as of wh"
+    ):
         search(Problem(hexmj.NetworkForm("mirrored"), 0.4, 0.4), Effort(begin=hexmj.PRESETS["lasting-0.3"]))
     with pytest.raises(InputError, match=r"^ldvs to begin with has order = sequential; expected undelayed, as of what"):
         hexmj.NetworkForm("ldvs", order="undelayed").vector(replace(hexmj.LDVS, order="sequential"))

@@ -169,6 +169,14 @@ class Stretched(hexmj.Cruse1998):
 """
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("begin", ["ldvs", "lasting-0.3"])
+def test_a_search_begins_with_a_set_whose_candidates_read_the_legs(run, tmp_path, begin):
+    words = ["--begin", begin, "--form", "mirrored", "--physical", "--feedback", "--window", 5, "--starts", 2]
+    words += ["--budget", 2, "--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]
+    assert run("search", *words)[0] == 0
+
+
 @pytest.mark.thorough
 def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
     """It is no set of weights: neither what is found nor what a search of weights can begin with."""

@@ -86,15 +86,39 @@ def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
 
 @dataclass(frozen=True)
 class Late(Pace):
-    """Refuses as it begins."""
+    """Refuses as it begins, if it is not usual."""
+
+    least: int = 2
+
+    def __post_init__(self):
+        """Refuses nothing."""
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        raise InputError("too late")
+        if not self.least <= self.good < 2.01:
+            raise InputError(f"good = {self.good} is too late")
+        return super().begin(starts, velocity, stride, acceleration, threads)
 
 
-def test_a_candidate_that_begins_no_walk_is_named():
+def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_of_it_is_found():
     problem = Problem(FieldsForm(Late()), 0.4, 0.4, window=5.0)
-    with pytest.raises(InputError, match=r"with good = 1.5, idle = -0.5: .*too late"):
+    assert Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]])).tolist() == [1.0]
+    found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
+    assert 2 <= found.vector[0] < 2.01 and found.cost < 1
+    with pytest.raises(InputError, match=r"^good = .* is too late"):
+        search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
+
+
+@dataclass(frozen=True)
+class Odd(Pace):
+    """A step of it makes no sense."""
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        return stepwise(lambda v: Step(np.zeros(5), True), starts, velocity, stride, acceleration)
+
+
+def test_a_candidate_whose_steps_make_no_sense_is_named():
+    problem = Problem(FieldsForm(Odd()), 0.4, 0.4, window=5.0)
+    with pytest.raises(InputError, match=r"with good = 1.5, idle = -0.5: .*x of a step"):
         Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]]))
 
 

@@ -1,14 +1,16 @@
 """Fields of controllers as a TOML file tells them."""
 
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 
 import hexmj
+from hexmj.controllers.toml_fields import with_fields
 from hexmj.sweeps.plain_settings import plain
 
 KINDS = """
@@ -128,8 +130,6 @@ class Odd:
         ("[fields]\nlevels = [300]", "levels = .*; expected an array"),
         ("[fields]\nhalves = [1e300]", "halves = .*; expected an array"),
         ("[fields]\nhalves = [1e-300]", "halves = .*; expected an array"),
-        ("[fields]\nhalves = [16777217]", "halves = .*; expected an array"),
-        ("[fields]\nphases = [9007199254740993]", "phases = .*; expected an array"),
         ("[fields]\nfile = 3", "file = 3; expected a Path or None"),
         ('[fields]\npart = {deep = {a = "x"}}', "a = 'x'; expected a number"),
         ("[field]\nname = 'x'", "holds controller, field; expected controller and a table"),
@@ -158,6 +158,15 @@ def test_arrays_of_a_file_are_as_they_are_annotated(tmp_path, monkeypatch):
         *("uint8", "float32", "bool", "int64", "int64")
     ]
     assert odd.levels.tolist() == [1, 255] and odd.none_set.shape == odd.counts.shape == (0,)
+
+
+@dataclass(frozen=True)
+class Named:
+    words: np.ndarray = field(default_factory=lambda: np.array(["a"]))
+
+
+def test_texts_of_an_array_may_be_none():
+    assert with_fields(Named(), {"words": []}, "named").words.shape == (0,)
 
 
 def test_what_a_file_tells_is_as_the_class_has_it(tmp_path, monkeypatch):

@@ -191,11 +191,19 @@ class Search(WalkingCommand):
         same = "algorithm", "population", "domain", "budget", "refine_budget"
         return Effort(
             **{name: getattr(self, name) for name in same},
-            begin=self.controlled.controller(self.begin) if self.begin else None,
+            begin=self._begun,
             starts=self._size(self.starts, 500, 50),
             refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
             seed=self.walks.seed,
         )
+
+    @property
+    def _begun(self) -> "Controller | None":
+        """What the search begins with, by the rules that were given."""
+        from hexmj.controllers.cruse1998 import Cruse1998
+
+        found = loaded(self.begin) if self.begin else None
+        return replace(found, **self.controlled.rules) if isinstance(found, Cruse1998) else found
 
     def _size(self, given: int | None, planned: int, walked: int) -> int:
         """A number of starts: fewer of physical walks."""

@@ -23,7 +23,7 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     check_controller_type,
 )
-from hexmj.errors import InputError, is_of_numbas_cache
+from hexmj.errors import InputError, Refused, is_of_numbas_cache
 from hexmj.legs import LEGS
 from hexmj.process.threads import check_memory, thread_count
 from hexmj.starts import checked_starts, checked_velocities
@@ -48,7 +48,7 @@ def begin(
     """A plan of checked starts and velocities; one velocity stands for all starts.
 
     Raises:
-        InputError: a controller, start, velocity or plan that makes no sense.
+        InputError: a controller, start, velocity or plan that makes no sense; `Refused` what the controller refuses.
     """
     check_controller_type(controller)
     typed("stride", stride, Stride)
@@ -58,7 +58,10 @@ def begin(
     v = checked_velocities(velocity, len(x), acceleration)
     check_reached(v, stride, acceleration)
     with said(f"{controller.name}, begin"):
-        plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
+        try:
+            plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
+        except InputError as error:
+            raise Refused(*error.args) from error
     check_plan(plan, x, stride)
     return plan
 

@@ -150,7 +150,7 @@ def _as_array(value: list[Any], kind: Any, usual: Any) -> np.ndarray | None:
             return None
         with np.errstate(over="ignore", under="ignore"):
             cast = made.astype(wanted)
-        if made.dtype.kind == "f":  # may be rounded, but not to zero or infinity
+        if wanted.kind in "fc":  # may be rounded, but not to zero or infinity
             held = (np.isfinite(cast) == np.isfinite(made)) & ((cast == 0) == (made == 0))
         else:
             held = cast.astype(object) == made.astype(object)

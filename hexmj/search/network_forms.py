@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import Cruse1998, Order
-from hexmj.controllers.cruse1998.readings import Reading
+from hexmj.controllers.cruse1998.readings import Reading, in_words
 from hexmj.controllers.cruse1998.weights import BINARY, NEIGHBOURS, AnyWeights, Symmetric, Weights, general
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -114,10 +114,10 @@ class NetworkForm:
         """See `forms.Form.vector`."""
         if type(controller) is not Cruse1998:
             raise InputError(f"{controller.name} is not made of weights alone; expected a set of the 1998 network")
-        for rule in ("order", "reading"):
-            own, wanted, printed = (getattr(one, rule) for one in (controller, self, NetworkForm()))
-            if own not in (wanted, printed):
-                told = f"{rule} = {own}; expected {wanted}, as of what is searched, or {printed}"
+        rules = [(one.order, in_words(one.reading)) for one in (controller, self)]
+        for rule, own, wanted in zip(("order", "reading"), *rules, strict=True):
+            if own not in (wanted, "printed"):
+                told = f"{rule} = {own}; expected {wanted}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
         vector = FORMS[self.name].vector(controller.weights)
         if np.isfinite(vector).all():

@@ -11,7 +11,7 @@ import numpy as np
 from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError, OutOfReach
+from hexmj.errors import InputError, OutOfReach, Refused
 from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
 from hexmj.process.progress import Progress, part_of
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from hexmj.physics.settling import Settled
 
 REFUSED = 1.0
-"""Cost of a candidate that its controller refuses, or whose tips no leg reaches: as if every start lost stability."""
+"""Cost of a candidate that its controller refuses, at once or to walk, or whose tips no leg reaches: as if every start
+lost stability."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Sample:
                 ) from error
             try:
                 return self._cost(candidate, threads)
-            except OutOfReach:
+            except (OutOfReach, Refused):
                 return REFUSED
             except InputError as error:
                 pairs = zip(self.problem.form.names, vector, strict=True)
@@ -125,15 +126,15 @@ class Sample:
             return round(cost * self.n_starts)
         return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
 
-    def check_reach(self, vector: np.ndarray, threads: int | None = None) -> None:
-        """Refuse a candidate, (parameter,), whose tips no leg reaches in physics.
+    def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
+        """Refuse a candidate, (parameter,), that costs 1 since it does not walk.
 
         Raises:
-            OutOfReach: it is one.
+            Refused: its controller refuses to walk.
+            OutOfReach: its tips no leg reaches in physics.
         """
         for one in self.variants.values():
-            if one.problem.conditions:
-                one._times(one.problem.controller(vector), [one.problem.window], threads)
+            one._times(one.problem.controller(vector), [one.problem.window], threads)
 
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None

@@ -168,7 +168,7 @@ def _search(
         )
     last = [*samples.values()][-1]
     if cost >= REFUSED:
-        last.check_reach(best, threads)
+        last.check_walks(best, threads)
     told = course.assign_attrs(settings=settings, refused=len(refused))
     return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
 

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, sum_of_legs
-from hexmj.errors import InputError
+from hexmj.errors import Refused
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 
@@ -81,7 +81,7 @@ class Righetti(Lifted):
         Shorter walks are refused, too: their oscillators are on the way.
 
         Raises:
-            InputError: the oscillators diverge.
+            Refused: the oscillators diverge.
         """
         starts = draw_starts(N_TRIED, 0, stride)
         self.begin(starts, np.full(N_TRIED, velocity), stride).advance(TRIED)
@@ -95,13 +95,13 @@ class Righetti(Lifted):
         """See `LiftingRule`.
 
         Raises:
-            InputError: a time step at which the oscillators diverge.
+            Refused: a time step at which the oscillators diverge.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             after = self._step(state, legs)
         if not (known := np.isfinite(after.y).all(axis=1)).all():
             v = legs.v[np.argmin(known), 0]
-            raise InputError(
+            raise Refused(
                 f"{self.name}: its oscillators diverge at dt = {legs.stride.dt:g} and V_r = {v:.3g}; expected a shorter"
                 " time step"
             )
