@@ -37,7 +37,7 @@ NONSENSE = [
     (["league", "--velocities", "--starts", "2"], "velocities = (); expected a list of at least one"),
     (
         ["walk", "--window", "1000001"],
-        "duration = 1000001.0; expected at least one step, 0.1, and at most 1e+06 time units",
+        "duration = 1000001; expected at least one step, 0.1, and at most 1e+06 time units",
     ),
     (["walk", "--physical", "--ground", "hurdle", "--ground-length", "1e-300"], "cannot be built: "),
     (["walk", "--physical", "--ground", "rough", "--ground-seed", "9" * 30], "expected a whole number of at least 0"),
