@@ -203,7 +203,7 @@ class Search(WalkingCommand):
         from hexmj.controllers.cruse1998 import Cruse1998
 
         found = loaded(self.begin) if self.begin else None
-        return replace(found, **self.controlled.rules) if isinstance(found, Cruse1998) else found
+        return replace(found, **self.controlled.rules) if type(found) is Cruse1998 else found
 
     def _size(self, given: int | None, planned: int, walked: int) -> int:
         """A number of starts: fewer of physical walks."""
