@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import entry_points
 from operator import attrgetter
@@ -124,13 +125,20 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
     varied = VARIED.fullmatch(named)
     if not _object(PART.sub("", named)) and {named, varied["name"] if varied else named}.isdisjoint(known_names()):
         raise InputError(
-            f"{path}: controller = {named!r}; expected module:object, file.py:object, a rival or an entry point"
+            f"{path}: controller = {named!r}; expected module:object, file.py:object, a preset, a rival or an entry"
+            " point"
         )
     found = load_controller(named)
     try:
         return with_fields(found, values, literal(path.stem)) if values else found
     except Exception as error:  # whatever the user's class raises
-        raise InputError(f"{path} [fields]: {error}; expected fields of {named}") from None
+        of: Any = found
+        known = [one.name for one in fields(of) if one.init]
+        odd = [name for name in values if name not in known]
+        told = (
+            f"{odd[0]}; valid names of {named}: {', '.join(known)}" if odd else f"{error}; expected fields of {named}"
+        )
+        raise InputError(f"{path} [fields]: {told}") from None
 
 
 def _found(where: str, what: str, name: str) -> Controller:
