@@ -34,12 +34,14 @@ ROOM = 30_000
 @contextmanager
 def little_room(most: int = ROOM) -> Iterator[None]:
     """No file can be longer, which the system tells as it tells of a full disk: when it is written."""
-    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    usual, compiles = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
+    sys.dont_write_bytecode = True  # Python would keep half of a module, and read that ever after
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, usual[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+        sys.dont_write_bytecode = compiles
 
 
 def numbers(seed: int, size: int) -> xr.Dataset:

@@ -108,6 +108,28 @@ def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_o
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
 
+class TooFast(InputError):
+    """Of a user's own."""
+
+    def __init__(self, v):
+        super().__init__()
+        self.v = v
+
+    def __str__(self):
+        return f"too fast: {self.v}"
+
+
+@dataclass(frozen=True)
+class Fast(Pace):
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        raise TooFast(velocity.max())
+
+
+def test_an_error_of_ones_own_stays_what_it_is():
+    with pytest.raises(TooFast, match=r"^too fast: 0\.4$"):
+        hexmj.flss(Fast(), 0.4, n_starts=3, window=5.0)
+
+
 @dataclass(frozen=True)
 class Odd(Pace):
     """A step of it makes no sense."""

@@ -13,6 +13,8 @@ import xarray as xr
 import hexmj
 from drawing import drawing
 from film_reader import read_film
+from hexmj.cli.compare import SUMMARY
+from hexmj.controllers.cruse1998.presets import network_toml
 
 PNG = b"\x89PNG"
 
@@ -79,6 +81,14 @@ def test_without_rendering_compare_still_delivers(tmp_path):
     assert "libegl1" in done.stderr
     assert (tmp_path / "comparison.png").exists()
     assert not (tmp_path / "gait.mp4").exists()
+
+
+@pytest.mark.parametrize("name", SUMMARY)
+def test_controllers_that_are_called_as_what_stands_beside_them_are_refused(run, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / f"{name}.toml").write_text(network_toml(hexmj.LDVS))
+    code, _, error = run("compare", "--models", "hws", f"{name}.toml", "--starts", 2)
+    assert (code, error) == (2, f"hexmj: a controller has the name {name!r}, which the results need; rename it\n")
 
 
 def test_physical_flss(run, tmp_path):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-SUMMARY = ("velocity", "report", "settings", "files")
+SUMMARY = ("velocity", "report", "settings", "searched", "files")
 """What stands beside the controllers in the JSON."""
 
 RECORDING, FILM = "recording.nc", "gait.mp4"

@@ -61,6 +61,8 @@ def begin(
         try:
             plan = controller.begin(x.copy(), v, replace(stride), acceleration and replace(acceleration), threads)
         except InputError as error:
+            if type(error) is not InputError:
+                raise
             raise Refused(*error.args) from error
     check_plan(plan, x, stride)
     return plan

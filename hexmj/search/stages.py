@@ -94,7 +94,8 @@ class Found:
     replayed: int
     """Different candidates whose cost an earlier run had kept."""
     refused: list[str]
-    """Why the controller refused candidates, which cost 1 each."""
+    """Why the controller refused candidates as they were made, which cost 1 each; so do those that refuse to walk or
+    reach too far, of which nothing is told."""
 
 
 def search(
