@@ -342,7 +342,7 @@ def test_what_has_lost_its_velocities_gets_a_sentence():
         with pytest.raises(InputError, match="without the axis velocity"):
             hexmj.plot(result.isel(velocity=wrong))
     both = hexmj.compare({"hws": hexmj.HWS, "ldvs": hexmj.LDVS}, [0.3], n_starts=1, window=5.0)
-    with pytest.raises(InputError, match=r"\(of one controller without an axis\); expected the result as it .*isel\("):
+    with pytest.raises(InputError, match=r"; of one controller without an axis\); expected the result as it .*isel\("):
         hexmj.plot(both.sel(controller="hws"))
     hexmj.plot(both.assign_coords(run=3))
     with pytest.raises(InputError, match="without the values of its axis velocity"):

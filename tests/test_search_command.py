@@ -169,6 +169,43 @@ class Stretched(hexmj.Cruse1998):
 """
 
 
+LEAVES = """
+from dataclasses import dataclass
+import hexmj
+import numpy as np
+from hexmj.controllers import Step, stepwise
+
+@dataclass(frozen=True)
+class Leaves:
+    gain: float = 1.0
+    name: str = "leaves"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        if len(starts) > 5:
+            raise hexmj.InputError("too many walk")
+        return stepwise(lambda v: Step(starts, True), starts, velocity, stride, acceleration)
+"""
+
+
+def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path):
+    (tmp_path / "leaves.py").write_text(LEAVES)
+    words = [
+        "--form",
+        f"{tmp_path / 'leaves.py'}:Leaves",
+        "--window",
+        2,
+        "--starts",
+        5,
+        "--budget",
+        3,
+        "--population",
+        2,
+    ]
+    code, _, error = run("search", *words, "--refine-budget", 0, "--verdict-starts", 6, "--out", tmp_path)
+    assert code == 2 and error.endswith("hexmj: the verdict on found: too many walk\n")
+    assert vars(hexmj.load_controller(str(tmp_path / "found.toml")))["name"] == "found"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", ["ldvs", "lasting-0.3"])
 def test_a_search_begins_with_a_set_whose_candidates_read_the_legs(run, tmp_path, begin):

@@ -102,16 +102,16 @@ class Search(WalkingCommand):
         fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts", "verdict_seed"))
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
         found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
-        with progress_bar("judging") as progress:
-            judged = {"found": problem.controller(found.vector)} | beside
-            verdict = fresh.verdict(judged, self.workers.threads, progress)
         settings = {
             "problem": problem.settings(),
             "effort": plain(effort),
             "verdict_starts": fresh.n_starts,
             "verdict_seed": self.verdict_seed,
         }
-        files = self._write(problem, found, settings)
+        files = self._write(problem, found, settings)  # whatever the verdict is
+        with progress_bar("judging") as progress:
+            judged = {"found": problem.controller(found.vector)} | beside
+            verdict = fresh.verdict(judged, self.workers.threads, progress)
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}

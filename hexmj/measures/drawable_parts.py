@@ -69,7 +69,7 @@ def what_parts_may_lack(result: "xr.Dataset", cannot: str) -> Iterator[None]:
     except Exception as error:
         sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
         single = ", ".join(str(name) for name, one in result.coords.items() if not one.ndim)
-        told = f"of one {single} without an axis" if single else f"{error!r:.200}"
+        told = f"{error!r:.200}" + (f"; of one {single} without an axis" if single else "")
         wanted = ", or parts that keep all axes, as of isel(...=[0])" if single else ""
         raise InputError(
             f"{cannot} of this part of a result, {sizes} ({told}); expected the result as it was computed{wanted}"

@@ -148,14 +148,17 @@ class Sample:
 
         windows, told = self.problem.windows, part_of(progress, 1.0 / len(controllers) / len(self.variants))
 
-        def losses(variant: str, controller: Controller) -> np.ndarray:
+        def losses(variant: str, name: str, controller: Controller) -> np.ndarray:
             """Number of starts that lose stability, or fall, within each window, (window,)."""
-            times, ends = self.variants[variant]._times(varied(controller, variant), windows, threads)
+            try:
+                times, ends = self.variants[variant]._times(varied(controller, variant), windows, threads)
+            except InputError as error:
+                raise InputError(f"the verdict on {name}: {error}") from None
             if told:
                 told(1.0)
             return (times <= ends).sum(axis=1)
 
-        lost = self._together([[losses(name, one) for one in controllers.values()] for name in self.variants])
+        lost = self._together([[losses(one, *which) for which in controllers.items()] for one in self.variants])
         low, high = wilson_intervals(np.rint(lost), self.n_starts)
         over, unit = ("controller", "window"), {"units": "1"}
         return xr.Dataset(
