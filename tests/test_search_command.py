@@ -172,7 +172,6 @@ class Stretched(hexmj.Cruse1998):
 LEAVES = """
 from dataclasses import dataclass
 import hexmj
-import numpy as np
 from hexmj.controllers import Step, stepwise
 
 @dataclass(frozen=True)

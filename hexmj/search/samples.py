@@ -143,6 +143,9 @@ class Sample:
 
         The interval of a mean over variants is that of the mean count, rounded, and too wide rather than too narrow: as
         if all lost stability together.
+
+        Raises:
+            InputError: one of them does not walk, and which.
         """
         import xarray as xr
 

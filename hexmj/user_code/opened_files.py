@@ -274,8 +274,8 @@ def _by_a_user(opener: FrameType, event: str, file: str) -> bool:
     package = installed_package(file)
     for one, _ in walk_stack(opener):
         by = one.f_code.co_filename
-        is_users = _is_code_of_users(by) and not by.startswith("<")
-        if is_users or one.f_globals.get("__name__") in SCRIPTS:
+        theirs = _is_code_of_users(by) and not by.startswith("<")
+        if theirs or one.f_globals.get("__name__") in SCRIPTS:
             return True
         if installed_package(by) == package:
             return False

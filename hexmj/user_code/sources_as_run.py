@@ -19,7 +19,7 @@ from hexmj.errors import InputError
 from hexmj.storage.files import digest
 from hexmj.user_code.parsing import compiled
 
-INSTALLED = {"site-packages", "dist-packages"}
+_INSTALLED = {"site-packages", "dist-packages"}
 """Folders of installed packages, this Python's own or another's."""
 
 SCRIPTS = {"__main__", "__mp_main__"}
@@ -86,7 +86,7 @@ def installed_package(file: str) -> str:
 def within_installed(file: str | Path) -> str:
     """The path of a file from the folder of installed packages on; empty if it lies in none."""
     parts = Path(file).parts
-    begin = max((i for i, one in enumerate(parts) if one in INSTALLED), default=len(parts))
+    begin = max((i for i, one in enumerate(parts) if one in _INSTALLED), default=len(parts))
     return os.sep.join(parts[begin + 1 :])
 
 
