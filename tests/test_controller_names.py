@@ -149,6 +149,15 @@ def test_a_file_may_name_a_controller_and_its_fields(mine, tmp_path):
         hexmj.load_controller("tall.toml")
 
 
+def test_what_a_class_takes_beside_its_fields_may_stand_among_them(mine, tmp_path):
+    raised = "\n    def __post_init__(self, scale):\n        assert self.height < 5, 'too tall'\n"
+    mine.write_text(f"{MINE}\n@dataclass(frozen=True)\nclass Scaled(Still):\n    scale: InitVar[float] = 1.0\n{raised}")
+    mine.write_text(mine.read_text().replace("import dataclass", "import InitVar, dataclass"))
+    (tmp_path / "tall.toml").write_text('controller = "mine_of_a_user.py:Scaled"\n[fields]\nscale = 2.0\nheight = 6\n')
+    with pytest.raises(hexmj.InputError, match=r"\[fields\]: too tall; expected fields of mine_of_a_user.py:Scaled"):
+        hexmj.load_controller("tall.toml")
+
+
 @pytest.mark.parametrize("name", ["evolved", "walknet-reacog-without-2"])
 def test_a_file_may_name_a_rival_by_its_name(name, tmp_path):
     path = tmp_path / "found.toml"

@@ -104,7 +104,9 @@ def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_o
     assert Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]])).tolist() == [1.0]
     found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
     assert 2 <= found.vector[0] < 2.01 and found.cost < 1
-    with pytest.raises(InputError, match=r"^good = .* is too late"):
+    with pytest.raises(
+        InputError, match=r"best candidate of the population, with good = .* 5 starts: good = .* is too late"
+    ):
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
 

@@ -100,9 +100,7 @@ class Sample:
             except (OutOfReach, Refused):
                 return REFUSED
             except InputError as error:
-                pairs = zip(self.problem.form.names, vector, strict=True)
-                at = ", ".join(f"{name} = {value:g}" for name, value in pairs)
-                raise InputError(f"with {at}: {error}") from None
+                raise InputError(f"with {self._told(vector)}: {error}") from None
 
         # A user's plans may share a module's arrays, and hold the interpreter's lock anyway.
         if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
@@ -126,15 +124,24 @@ class Sample:
             return round(cost * self.n_starts)
         return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
 
-    def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
-        """Refuse a candidate, (parameter,), that costs 1 since it does not walk.
+    def _told(self, vector: np.ndarray) -> str:
+        """The parameters of a candidate, (parameter,), as a sentence names them."""
+        return ", ".join(f"{name} = {value:g}" for name, value in zip(self.problem.form.names, vector, strict=True))
+
+    def check_walks(self, best: np.ndarray, stage: str, threads: int | None = None) -> None:
+        """Refuse the best candidate of a stage, (parameter,), that costs 1 since it does not walk.
 
         Raises:
-            Refused: its controller refuses to walk.
-            OutOfReach: its tips no leg reaches in physics.
+            InputError: its controller refuses to walk, or its tips no leg reaches in physics.
         """
         for one in self.variants.values():
-            one._times(one.problem.controller(vector), [one.problem.window], threads)
+            try:
+                one._times(one.problem.controller(best), [one.problem.window], threads)
+            except InputError as error:
+                raise InputError(
+                    f"the best candidate of the {stage}, with {self._told(best)}, does not walk from its"
+                    f" {self.n_starts} starts: {error}"
+                ) from None
 
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None

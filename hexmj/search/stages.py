@@ -167,9 +167,9 @@ def _search(
         raise InputError(
             f"{len(refused)} of {course.sizes['evaluation']} candidates were refused, the best one by: {why}"
         )
-    last = [*samples.values()][-1]
+    stage, last = [*samples.items()][-1]
     if cost >= REFUSED:
-        last.check_walks(best, threads)
+        last.check_walks(best, stage, threads)
     told = course.assign_attrs(settings=settings, refused=len(refused))
     return Found(best, cost, last.lost(cost), last.n_starts, told, replayed, refused)
 
