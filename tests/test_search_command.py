@@ -171,6 +171,7 @@ class Stretched(hexmj.Cruse1998):
 
 LEAVES = """
 from dataclasses import dataclass
+from pathlib import Path
 import hexmj
 from hexmj.controllers import Step, stepwise
 
@@ -183,25 +184,31 @@ class Leaves:
         if len(starts) > 5:
             raise hexmj.InputError("too many walk")
         return stepwise(lambda v: Step(starts, True), starts, velocity, stride, acceleration)
+
+@dataclass(frozen=True)
+class Edits:
+    gain: float = 1.0
+    table: str = str(Path(__file__).with_name("table.txt"))
+    name: str = "edits"
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+        if len(starts) > 5:
+            Path(self.table).write_text("others")
+        return stepwise(lambda v: Step(starts, True), starts, velocity, stride, acceleration)
 """
 
 
-def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("Leaves", "the verdict on found: too many walk"), ("Edits", "while the command was at work; start")],
+)
+def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path, name, why):
     (tmp_path / "leaves.py").write_text(LEAVES)
-    words = [
-        "--form",
-        f"{tmp_path / 'leaves.py'}:Leaves",
-        "--window",
-        2,
-        "--starts",
-        5,
-        "--budget",
-        3,
-        "--population",
-        2,
-    ]
-    code, _, error = run("search", *words, "--refine-budget", 0, "--verdict-starts", 6, "--out", tmp_path)
-    assert code == 2 and error.endswith("hexmj: the verdict on found: too many walk\n")
+    (tmp_path / "table.txt").write_text("some")
+    words = ["--form", f"{tmp_path / 'leaves.py'}:{name}", "--window", 2, "--starts", 5, "--budget", 3]
+    words += ["--population", 2, "--refine-budget", 0, "--verdict-starts", 6, "--out", tmp_path]
+    code, printed, error = run("search", *words)
+    assert code == 2 and not printed and why in error
     assert vars(hexmj.load_controller(str(tmp_path / "found.toml")))["name"] == "found"
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.loaded import loaded, seeds_of_searches
+from hexmj.cli.loaded import check_loaded, loaded, seeds_of_searches
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, print_json, save_figure, show, table
@@ -112,6 +112,7 @@ class Search(WalkingCommand):
         with progress_bar("judging") as progress:
             judged = {"found": problem.controller(found.vector)} | beside
             verdict = fresh.verdict(judged, self.workers.threads, progress)
+        check_loaded()  # it is on what was written
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
