@@ -192,14 +192,14 @@ class Search(WalkingCommand):
         same = "algorithm", "population", "domain", "budget", "refine_budget"
         return Effort(
             **{name: getattr(self, name) for name in same},
-            begin=self._begun,
+            begin=self._begins_with,
             starts=self._size(self.starts, 500, 50),
             refine_starts=self._size(self.refine_starts, 7 * SAMPLE, 100),
             seed=self.walks.seed,
         )
 
     @property
-    def _begun(self) -> "Controller | None":
+    def _begins_with(self) -> "Controller | None":
         """What the search begins with, by the rules that were given."""
         from hexmj.controllers.cruse1998 import Cruse1998
 

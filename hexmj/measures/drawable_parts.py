@@ -19,7 +19,7 @@ COUNTED = "start", "case", "row", "evaluation"
 
 
 def check_axes(result: "xr.Dataset") -> None:
-    """Refuse a result without one of its axes, or with one that has lost its values.
+    """Refuse a result of one velocity without its axis, along which all is drawn, or one whose axis lost its values.
 
     Raises:
         InputError: with the name of the first one.
