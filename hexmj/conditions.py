@@ -92,8 +92,8 @@ class Masses:
     load: float = 0.0
     """Weight carried at O, in multiples of the insect's own."""
     centre_of_mass: float = 0.0
-    """How far ahead of O the centre of mass lies when all legs are at home [mm]; the animal's is at -9.4, 1.4 mm
-    behind the hind coxae.  The trunk's masses are moved, none is added."""
+    """How far ahead of O the centre of mass, that of a load included, lies when all legs are at home [mm]; the
+    animal's is at -9.4, 1.4 mm behind the hind coxae.  The trunk's masses are moved, none is added."""
     leg_mass: float = 1.0
     """Mass of the legs as a fraction of the insect's own; the trunk makes up for it.  The paper's legs have none."""
 

@@ -84,6 +84,8 @@ TOLD = ("1-2", "2-3", "1-4")
 def gait(walk: Walk) -> Gait:
     """The gait of every start of a walk that ends with a constant velocity.
 
+    A leg that is raised in the walk's first step has no onset there: what stood before is not known.
+
     Raises:
         InputError: a walk of fewer than two steps.
     """

@@ -38,7 +38,7 @@ CONDITIONS: dict[Over, Condition] = {
     "step_height": Condition((4.0, 6.0, 8.0, 10.0, 12.0), "mm", "step height"),
     "standing_height": Condition((6.0, 8.0, 10.0, 12.0, 14.0), "mm", "standing height"),
     "friction": Condition((0.05, 0.2, 0.5, 1.0, 2.0), "1", "friction"),
-    "load": Condition((0.0, 0.5, 1.0, 1.5, 2.0), "insect's weight", "load"),
+    "load": Condition((0.0, 0.5, 1.0, 1.5, 2.0), "own weight", "load"),
     "centre_of_mass": Condition((-9.4, -5.0, 0.0, 5.0, 10.0), "mm", "centre of mass ahead of O"),
 }
 """Name of a condition -> its values, unit and name; the animal's own centre of mass lies at -9.4 mm."""

@@ -73,6 +73,8 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
         if panel in ("flss", "agreement"):
             one.set(ylim=(-0.02, 1.02))
         else:
+            one.update_datalim([(0.0, 0.0)], updatex=False)  # so that the margin above is of the whole height
+            one.autoscale_view(scalex=False)
             one.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
         _v_axis(one, result)
     masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
