@@ -54,6 +54,24 @@ def test_no_offsets_plan_what_the_controller_plans(example):
     np.testing.assert_array_equal(planned.stance, own.stance)
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """Every tip further ahead, by a part of the largest offset."""
+
+    part: float
+
+    def __call__(self, felt):
+        return np.tile([self.part, 0.0, 0.0], (len(felt), 6))
+
+
+@pytest.mark.parametrize("part", [0.3, -1.0])
+def test_offsets_beyond_the_range_of_steps_are_obeyed(part):
+    """As in the environment, where every tip may be offset alike."""
+    starts = hexmj.draw_starts(5, 0)
+    planned, own = (hexmj.walk(starts, one, 0.5, 60.0) for one in (WithOffsets(Ahead(part)), hexmj.LDVS))
+    np.testing.assert_allclose(planned.x, own.x + 5.0 * part, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("values", [{}, {"step_height": 8.0, "lift_time": 40.0, "standing_height": 12.0}, {"vp": 40.0}])
 def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
     """Heights come in evenly over a step, so not to the last bit."""

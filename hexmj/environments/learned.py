@@ -133,8 +133,7 @@ class OffsetPlan:
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
         self.done = self._plan.done
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
-        rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
-        x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)  # where legs step, or the plan itself goes
+        x = x - np.array(self.stride.geometry.origin)
         height = up + self.made_for.path.standing_height
         return replace(step, x=x[None], y=y[None], height=height[None])
 
