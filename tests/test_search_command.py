@@ -200,7 +200,10 @@ class Edits:
 
 @pytest.mark.parametrize(
     ("name", "why"),
-    [("Leaves", "the verdict on found: too many walk"), ("Edits", "while the command was at work; start")],
+    [
+        ("Leaves", "the verdict on found: too many walk; what was found is in "),
+        ("Edits", "while the command was at work; start"),
+    ],
 )
 def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path, name, why):
     (tmp_path / "leaves.py").write_text(LEAVES)

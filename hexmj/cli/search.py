@@ -101,6 +101,7 @@ class Search(WalkingCommand):
         size = self._size(self.verdict_starts, 7 * SAMPLE, 200)
         fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts", "verdict_seed"))
         out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
+        fresh.settle(self.workers.threads)  # what refuses to stand is told before the work
         found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
         settings = {
             "problem": problem.settings(),
@@ -109,9 +110,12 @@ class Search(WalkingCommand):
             "verdict_seed": self.verdict_seed,
         }
         files = self._write(problem, found, settings)  # whatever the verdict is
-        with progress_bar("judging") as progress:
-            judged = {"found": problem.controller(found.vector)} | beside
-            verdict = fresh.verdict(judged, self.workers.threads, progress)
+        judged = {"found": problem.controller(found.vector)} | beside
+        try:
+            with progress_bar("judging") as progress:
+                verdict = fresh.verdict(judged, self.workers.threads, progress)
+        except InputError as error:
+            raise InputError(f"{error}; what was found is in {out / FOUND}") from None
         check_loaded()  # it is on what was written
         if self.json:
             evaluations = found.history.sizes["evaluation"]

@@ -68,6 +68,23 @@ class Sample:
         """The starts at rest in MuJoCo, once they have settled."""
         return []
 
+    def settle(self, threads: int | None = None) -> None:
+        """Let the starts of all variants come to rest, once for all walks, if candidates walk in physics.
+
+        Raises:
+            InputError, SimulationError: a start that does not, see `physics.settling.settle`.
+        """
+        for one in self.variants.values():
+            if one.problem.conditions:
+                one._settled(one.problem.conditions, threads)
+
+    def _settled(self, conditions: Conditions, threads: int | None) -> "Settled":
+        from hexmj.physics.settling import settle
+
+        if not self._at_rest:
+            self._at_rest.append(settle(self.starts, conditions, self.problem.stride, threads))
+        return self._at_rest[0]
+
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """G of each candidate, (candidate,), from (candidate, parameter): a function of vectors, nothing else.
 
@@ -199,14 +216,10 @@ class Sample:
         return lost, ends + 1e-6 * dt
 
     def _falls(self, controller: Controller, time: float, conditions: Conditions, threads: int | None) -> np.ndarray:
-        """When each start falls in a physical walk, (start,) [time units]; the starts settle once for all walks."""
+        """When each start falls in a physical walk, (start,) [time units]."""
         from hexmj.measures.physical import physical_outcomes
-        from hexmj.physics.settling import settle
 
-        p = self.problem
-        if not self._at_rest:
-            self._at_rest.append(settle(self.starts, conditions, p.stride, threads))
-        walked = physical_outcomes(
-            self._at_rest[0], controller, self.velocity, time, acceleration=p.acceleration, threads=threads
-        )
-        return walked.fall
+        settled, acceleration = self._settled(conditions, threads), self.problem.acceleration
+        return physical_outcomes(
+            settled, controller, self.velocity, time, acceleration=acceleration, threads=threads
+        ).fall

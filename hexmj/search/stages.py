@@ -141,6 +141,8 @@ def _search(
     work = effort.budget * effort.starts + refine_budget * effort.refine_starts
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if refine_budget else {})
     samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
+    for sample in samples.values():
+        sample.settle(threads)  # a start that cannot stand is no candidate's fault
     searcher = _searcher(effort, domain)
     kept = {
         stage: KeptValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
