@@ -65,11 +65,13 @@ class Ahead:
 
 
 @pytest.mark.parametrize("part", [0.3, -1.0])
-def test_offsets_beyond_the_range_of_steps_are_obeyed(part):
-    """As in the environment, where every tip may be offset alike."""
+def test_offsets_keep_to_where_legs_step(part):
+    """Plans do; in the environment nothing is cut off."""
     starts = hexmj.draw_starts(5, 0)
-    planned, own = (hexmj.walk(starts, one, 0.5, 60.0) for one in (WithOffsets(Ahead(part)), hexmj.LDVS))
-    np.testing.assert_allclose(planned.x, own.x + 5.0 * part, rtol=0, atol=1e-9)
+    planned, own = (hexmj.walk(starts, one, 0.5, 60.0).x for one in (WithOffsets(Ahead(part)), hexmj.LDVS))
+    expected = np.clip(own + 5.0 * part, np.minimum(own, -20.0), np.maximum(own, 10.0))
+    np.testing.assert_allclose(planned, expected, rtol=0, atol=1e-9)
+    assert (expected != own + 5.0 * part).any()
 
 
 @pytest.mark.parametrize("values", [{}, {"step_height": 8.0, "lift_time": 40.0, "standing_height": 12.0}, {"vp": 40.0}])
@@ -135,6 +137,12 @@ def test_a_policy_that_answers_something_else_is_refused(odd):
 @pytest.mark.thorough
 def test_it_obeys_the_laws_of_controllers(example):
     check_controller(some_reflexes(example("train_cma")))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "learned"), [("train_cma", "REFLEXES"), ("train_ppo", "RIGHTING")])
+def test_what_was_learned_obeys_them_too(example, name, learned):
+    check_controller(vars(example(name))[learned])
 
 
 def test_a_policy_feels_the_same_in_a_walk_as_in_the_environment(example, monkeypatch):

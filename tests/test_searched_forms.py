@@ -164,7 +164,7 @@ def test_what_no_leg_reaches_is_never_found():
 def test_starts_that_cannot_stand_are_refused_before_a_candidate_walks():
     stride = hexmj.Stride(aep0=11.0)
     problem = Problem(FieldsForm(Fast()), 0.4, 0.4, window=5.0, conditions=hexmj.Conditions(), stride=stride)
-    with pytest.raises(InputError, match=r"^start 4, leg 3: the tip at 10.9 mm is out of reach"):
+    with pytest.raises(InputError, match=r"^of the 8 starts of seed 0, start 4, leg 3: the tip at 10.9 mm is out of"):
         search(problem, Effort(starts=4, budget=10, refine_starts=8))
 
 

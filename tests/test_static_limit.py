@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, physical_walk
+from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, load_controller, physical_walk
 from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.stability import walk_margin
 from hexmj.studies.static_limit.distances import distances
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.sweeps import Cell, conduct
@@ -54,6 +55,12 @@ def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
     off = slower[1].margin_pressure.mean("start")
     assert (off.diff("vp") < 0).all()  # from fast to slow
     assert (off.sel(vp=25.0) < 0.5 * off.sel(vp=400.0)).all()
+
+
+def test_steps_on_no_foot_at_all_count_nowhere_and_warn_of_nothing():
+    walk = physical_walk(draw_starts(25, 0)[24:], load_controller("uncoordinated"), 0.9, 21.0)
+    assert (np.isinf(walk_margin(walk.planned)) & np.isinf(walk_margin(walk.measured))).any()
+    assert np.isfinite(distances(walk)["margin"]).all()
 
 
 @pytest.mark.slow

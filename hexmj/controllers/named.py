@@ -3,9 +3,9 @@
 import os
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import entry_points
-from inspect import signature
 from operator import attrgetter
 from os.path import isfile
 from pathlib import Path
@@ -133,8 +133,8 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         return with_fields(found, values, literal(path.stem)) if values else found
     except Exception as error:  # whatever the user's class raises
         of: Any = found
-        known = signature(type(of)).parameters  # its fields, and what its class takes beside them
-        odd = [name for name in values if name not in known]
+        known = [one.name for one in fields(of) if one.init]
+        odd = [name for name in values if name not in of.__dataclass_fields__]  # which knows `InitVar`s, too
         told = (
             f"{odd[0]}; valid names of {named}: {', '.join(known)}" if odd else f"{error}; expected fields of {named}"
         )

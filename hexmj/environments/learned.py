@@ -39,7 +39,11 @@ class Policy(Protocol):
     """A frozen dataclass of plain data that answers what is felt, (n, `FELT`), with actions, (n, leg * axis)."""
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`; cut off at -1 and 1."""
+        """Offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`; cut off at -1 and 1.
+
+        Walks cut off, too, what leads a tip ahead of AEP_0 or behind PEP_min where the plan does not go there itself:
+        plans keep to where legs step (`check-controller`).  The environment does not.
+        """
         ...
 
 
@@ -133,7 +137,8 @@ class OffsetPlan:
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
         self.done = self._plan.done
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
-        x = x - np.array(self.stride.geometry.origin)
+        rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
+        x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)  # where legs step, or the plan itself goes
         height = up + self.made_for.path.standing_height
         return replace(step, x=x[None], y=y[None], height=height[None])
 

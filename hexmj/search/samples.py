@@ -75,8 +75,11 @@ class Sample:
             InputError, SimulationError: a start that does not, see `physics.settling.settle`.
         """
         for one in self.variants.values():
-            if one.problem.conditions:
-                one._settled(one.problem.conditions, threads)
+            try:
+                if one.problem.conditions:
+                    one._settled(one.problem.conditions, threads)
+            except OutOfReach as error:
+                raise InputError(f"of the {self.n_starts} starts of seed {self.seed}, {error}") from None
 
     def _settled(self, conditions: Conditions, threads: int | None) -> "Settled":
         from hexmj.physics.settling import settle

@@ -51,13 +51,14 @@ def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
     planned, measured, near, outcomes = walk.planned, walk.measured, grounded(walk), walk.outcomes
     compared = planned.time[:, None] < np.minimum(outcomes.planned_loss, outcomes.fall)
     wanted, pressure = walk_margin(planned), pressure_margin(walk)
-    off = np.abs(walk_margin(measured) - wanted)
+    with np.errstate(invalid="ignore"):  # where no foot stands in either, which does not count
+        off, off_grounded = (np.abs(walk_margin(one) - wanted) for one in (measured, near))
     same, same_near = ((one.stance == planned.stance).all(axis=-1) for one in (measured, near))
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
     touching = compared & measured.stance.any(axis=-1)  # without any foot there is no margin
     return {
         "margin": _mean(off, touching),
-        "margin_grounded": _mean(np.abs(walk_margin(near) - wanted), touching),
+        "margin_grounded": _mean(off_grounded, touching),
         "margin_pressure": _mean(np.abs(pressure - wanted), compared & np.isfinite(pressure)),
         "margin_same_feet": _mean(off, touching & same),
         "same_feet": _mean(same, compared),
