@@ -87,10 +87,12 @@ def gait(walk: Walk) -> Gait:
     A leg that is raised in the walk's first step has no onset there: what stood before is not known.
 
     Raises:
-        InputError: a walk of fewer than two steps.
+        InputError: a walk of fewer than two steps, or whose time does not grow.
     """
     if len(typed("walk", walk, Walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
+    if not (np.diff(walk.time) > 0).all():
+        raise InputError("a walk whose time does not grow with each step; expected that of one walk")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
     longest = int(_steps(regimes["looked_at"], walk.time).max())
     return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)

@@ -37,14 +37,16 @@ class Walk:
     def __post_init__(self) -> None:
         typed("geometry", self.geometry, Geometry)
         shape = typed("a walk's stance", self.stance, np.ndarray).shape
-        if len(shape) == 3 and shape[2] != len(LEGS):
+        if len(shape) != 3:
+            raise InputError(f"a walk's stance is of the shape {shape}; expected (step, start, leg)")
+        if shape[2] != len(LEGS):
             raise InputError(f"a walk's stance is of {shape[2]} legs; expected {len(LEGS)}")
         expected_of = {"time": shape[:1], "velocity": shape[:2]}
         for name in _arrays(type(self)):
             values, kind = getattr(self, name), bool if name == "stance" else float
             expected = expected_of.get(name, shape)
             odd = type(values) is not np.ndarray and np.ma.is_masked(typed(f"a walk's {name}", values, np.ndarray))
-            if len(shape) != 3 or values.shape != expected or values.dtype != kind or odd:
+            if values.shape != expected or values.dtype != kind or odd:
                 raise InputError(
                     f"a walk's {name} is {values.dtype} of the shape {values.shape}; expected {np.dtype(kind)} of the"
                     f" shape {expected}: its steps, starts and legs"

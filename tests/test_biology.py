@@ -128,6 +128,20 @@ def test_quantities_agree_with_each_other_and_with_the_plan(walking):
         assert heights == sorted(heights, reverse=True)
 
 
+def test_a_leg_that_never_carries_counts_nowhere(walking):
+    """As an amputee's."""
+    strides, told = walking
+    whole, others = strides[0], np.arange(1, 6)
+    lost = replace(whole, ground=whole.ground.copy(), standing=whole.standing.copy())
+    lost.ground[:, 0], lost.standing[:, 0] = 0.0, False
+    lame = quantities(lost, settle(draw_starts(1, 0)).compiled)
+    assert_allclose(lame["duty factor"], (whole.ground[:, others, 2] > 0).mean(), rtol=1e-12)
+    front = [name for name in lame if name.endswith(", front") and not name.startswith("height")]
+    assert len(front) > 5 and np.isnan([lame[name] for name in front]).all()
+    middle = [name for name in lame if name.endswith(", middle")]
+    assert [lame[name] for name in middle] == [told[0][name] for name in middle]
+
+
 def test_heights_do_not_hang_on_the_order_in_which_a_legs_parts_are_named(walking):
     strides, told = walking
     legs = tuple(replace(leg, parts=leg.parts[::-1]) for leg in STICK_INSECT.legs)
@@ -246,7 +260,7 @@ def test_every_row_is_a_quantity_with_a_source_and_a_range_or_none():
     row = Animal("speed", 1.0, 2.0)
     assert [row.verdict(value) for value in (0.5, 1.0, 2.0, 2.5)] == ["below", "within", "within", "above"]
     assert replace(row, low=math.nan).verdict(1.0) == "no figure found"
-    assert row.verdict(math.nan) == "none walked"
+    assert row.verdict(math.nan) == "none measured"
 
 
 @pytest.fixture(scope="module")

@@ -156,5 +156,7 @@ def test_a_name_that_the_results_need_is_refused(run, tmp_path, monkeypatch):
 
 
 def test_arguments_that_nobody_knows_are_refused():
-    with pytest.raises(InputError, match="argument 'condition'; valid names: executor"):
+    with pytest.raises(
+        InputError, match="argument 'condition'; valid names: those that the call's help shows, and executor"
+    ):
         compare(LDVS, [0.3], n_starts=2, window=5.0, condition=1)  # pyright: ignore[reportCallIssue]

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -330,6 +331,9 @@ def test_what_makes_no_sense():
         limit_gait(HWS, 0.4, periods=3)
     with pytest.raises(InputError, match="a walk of 1 steps"):
         gait(walk(np.zeros((1, 6)), HWS, 0.4, 0.1))
+    back = walk(np.zeros((1, 6)), HWS, 0.4, 20.0)
+    with pytest.raises(InputError, match="a walk whose time does not grow"):
+        gait(replace(back, time=back.time[::-1].copy()))
 
 
 def test_never_imports_mujoco():

@@ -247,6 +247,10 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.loss_time(replace(walk(), geometry=3)), "geometry = 3; expected a Geometry"),
     (lambda: hexmj.loss_time(part_of(walk(), slice(0))), "a walk of 0 steps; expected at least 1"),
     (
+        lambda: replace(walk(), stance=np.ones((2, 6), bool)),
+        "a walk's stance is of the shape (2, 6); expected (step, start, leg)",
+    ),
+    (
         lambda: replace(walk(), stance=np.ones((2, 1, 5), bool)),
         "a walk's stance is of 5 legs; expected 6",
     ),

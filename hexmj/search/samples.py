@@ -11,7 +11,7 @@ import numpy as np
 from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError, OutOfReach, Refused
+from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
 from hexmj.intervals import wilson_intervals
 from hexmj.measures.kinematic import first_loss
 from hexmj.process.progress import Progress, part_of
@@ -74,12 +74,15 @@ class Sample:
         Raises:
             InputError, SimulationError: a start that does not, see `physics.settling.settle`.
         """
+        whose = f"of the {self.n_starts} starts of seed {self.seed}"
         for one in self.variants.values():
             try:
                 if one.problem.conditions:
                     one._settled(one.problem.conditions, threads)
             except OutOfReach as error:
-                raise InputError(f"of the {self.n_starts} starts of seed {self.seed}, {error}") from None
+                raise InputError(f"{whose}, {error}") from None
+            except SimulationError as error:
+                raise SimulationError(f"{whose}, {error}", error.state, error.file_name) from None
 
     def _settled(self, conditions: Conditions, threads: int | None) -> "Settled":
         from hexmj.physics.settling import settle

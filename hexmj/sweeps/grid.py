@@ -105,7 +105,8 @@ def finish(
             has swept others that are not kept; or one has read a file that has changed since another one did.
     """
     if unknown := set(how) - set(Execution.__annotations__):
-        raise InputError(f"argument {min(unknown)!r}; valid names: {', '.join(Execution.__annotations__)}")
+        also = ", ".join(Execution.__annotations__)
+        raise InputError(f"argument {min(unknown)!r}; valid names: those that the call's help shows, and {also}")
     folder = None if folder is None else path_of(folder).absolute()
     executor = typed("executor", how.get("executor"), Executor | None)
     progress = typed("progress", how.get("progress"), Progress | None)

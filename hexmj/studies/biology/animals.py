@@ -9,7 +9,7 @@ from typing import Literal
 
 from hexmj.studies.biology.names import JOINTS, SEGMENTS
 
-Verdict = Literal["within", "below", "above", "no figure found", "none walked"]
+Verdict = Literal["within", "below", "above", "no figure found", "none measured"]
 
 SOURCES = {
     "motion capture": "one adult female Carausius morosus, public data of Theunissen and Duerr: phases, way of a step,"
@@ -67,9 +67,9 @@ class Animal:
     """The body or V_p was chosen by it, so agreement says nothing."""
 
     def verdict(self, value: float) -> Verdict:
-        """Of a value of ours, NaN where no start walked."""
+        """Of a value of ours, NaN where it was measured in no start."""
         if math.isnan(self.low) or math.isnan(value):
-            return "no figure found" if math.isnan(self.low) else "none walked"
+            return "no figure found" if math.isnan(self.low) else "none measured"
         return "below" if value < self.low else "above" if value > self.high else "within"
 
 

@@ -52,7 +52,7 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
 
 
 def quantities(strides: Strides, compiled: CompiledBody) -> dict[str, float]:
-    """Every quantity by its name; NaN where legs have not the joints for it."""
+    """Every quantity by its name; NaN where legs have not the joints for it, or one of them never carries."""
     parts = (_gait, _forces, _torques, _posture, _work)
     told = {name: value for part in parts for name, value in part(strides, compiled).items()}
     for name in EACH.keys() & told.keys():
@@ -62,7 +62,8 @@ def quantities(strides: Strides, compiled: CompiledBody) -> dict[str, float]:
 
 
 def _gait(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
-    ahead, duty = _ahead(strides), (strides.ground[..., 2] > 0).mean()
+    carries = strides.ground[..., 2] > 0
+    ahead, duty = _ahead(strides), carries[:, carries.any(axis=0)].mean()
     speed, period = ahead.mean(), len(ahead) * strides.step / strides.count
     begun = [np.append(strides.lifted(leg), np.nan)[0] for leg in range(6)]
     lags = [(begun[k] - begun[j]) * strides.step / period % 1.0 for j, k in PAIRS.values()]
@@ -80,6 +81,7 @@ def _gait(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
 def _forces(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     """Of the ground on the feet, seen along the body's heading."""
     share = strides.ground / compiled.weight
+    share = np.where(share[..., 2:].any(axis=0), share, np.nan)
     level = turned(share[..., :2], -heading(strides.qpos[:: strides.every, 3:7]))
     ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
     peaks = np.array([_seen(leg, PLATE / strides.step / strides.every).max() for leg in up.T])
@@ -97,7 +99,8 @@ def _torques(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     if torque.shape[2] != len(JOINTS):
         return {}
     stands = strides.standing[..., None]
-    mean = np.abs(torque).mean(axis=0, where=stands)
+    with np.errstate(invalid="ignore"):  # of a leg that never stands
+        mean = np.abs(torque).sum(axis=0, where=stands) / stands.sum(axis=0)
     against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()
     work = (np.maximum(power, 0.0) * stands).sum(axis=(0, 1))
     course = [_course(torque[:, leg, 1], strides, leg) for leg in range(6)]
