@@ -131,8 +131,8 @@ def observation_time(
         return np.full(v.shape, float(window))
     if window not in WINDOWS:
         raise InputError(f"window = {window!r}; valid names: {', '.join(WINDOWS)}, or a number of time units")
-    if window == "walk" and not (v > 0).all():
-        raise InputError("velocity = 0 has no period; expected V > 0 with the window 'walk'")
+    if window == "walk" and (odd := v[~(v > 0)]).size:
+        raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the window 'walk'")
     time = stride.periods(v, 3.0) if window == "walk" else np.full(v.shape, 2.0 * (stride.aep0 - stride.pep0))
     return time + acceleration.duration(v) if acceleration else time
 

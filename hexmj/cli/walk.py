@@ -67,7 +67,7 @@ class Walk(WalkingCommand):
 
 
 def _told(key: str, value: Any) -> str:
-    """A number of a walk; a time in words."""
+    """A number of a walk, or that there is none; a time in words."""
     if key in TIMES:
         return f"at {value:.4g} time units" if math.isfinite(value) else "none within the walk"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else f"{value:.4g}"

@@ -87,5 +87,5 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
     axes.set_xlim(20.0, 40.0)
     if name.startswith("ripple"):
-        axes.set_ylim(0.0, 1.0)
+        axes.set_ylim(min(0.0, float(values.min())), 1.0)
     tidy(axes)
