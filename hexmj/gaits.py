@@ -87,10 +87,12 @@ def gait(walk: Walk) -> Gait:
     A leg that is raised in the walk's first step has no onset there: what stood before is not known.
 
     Raises:
-        InputError: a walk of fewer than two steps, or whose time does not grow.
+        InputError: a walk of fewer than two steps, of no starts, or whose time does not grow.
     """
     if len(typed("walk", walk, Walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
+    if not walk.stance.shape[1]:
+        raise InputError("a walk of 0 starts; expected at least 1")
     if not (np.diff(walk.time) > 0).all():
         raise InputError("a walk whose time does not grow with each step; expected that of one walk")
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])

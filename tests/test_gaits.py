@@ -20,7 +20,7 @@ from hexmj.measures.kinematic import walk
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, classify, unrolled, wilson_phase
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
-from hexmj.walks import Walk
+from hexmj.walks import Walk, of_starts
 from tiers import few_of
 
 TRIPOD = np.array([0.0, 0.5, 0.0, 0.5, 0.0, 0.5])
@@ -334,6 +334,8 @@ def test_what_makes_no_sense():
     back = walk(np.zeros((1, 6)), HWS, 0.4, 20.0)
     with pytest.raises(InputError, match="a walk whose time does not grow"):
         gait(replace(back, time=back.time[::-1].copy()))
+    with pytest.raises(InputError, match="a walk of 0 starts"):
+        gait(of_starts(back, slice(0)))
 
 
 def test_never_imports_mujoco():
