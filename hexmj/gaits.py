@@ -53,7 +53,7 @@ class Gait:
     """(start,) True if from some onset on all legs keep one period and their lags, over `CYCLES` cycles or more."""
     stable: np.ndarray
     """(start,) True if static stability is kept throughout the last period of the walk; where there is no periodic
-    regime, for `CYCLES` times the longest of the legs' last cycles, or the whole walk if a leg has none."""
+    regime, for `CYCLES` times the longest of the legs' last cycles, or all that is kept if a leg has none."""
 
     def __repr__(self) -> str:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
