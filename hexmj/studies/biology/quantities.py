@@ -52,7 +52,8 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
 
 
 def quantities(strides: Strides, compiled: CompiledBody) -> dict[str, float]:
-    """Every quantity by its name; NaN where legs have not the joints for it, or one of them never carries."""
+    """Every quantity by its name; NaN where legs have not the joints for it, as are torques and peaks of a leg that
+    never carries."""
     parts = (_gait, _forces, _torques, _posture, _work)
     told = {name: value for part in parts for name, value in part(strides, compiled).items()}
     for name in EACH.keys() & told.keys():
@@ -81,10 +82,10 @@ def _gait(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
 def _forces(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     """Of the ground on the feet, seen along the body's heading."""
     share = strides.ground / compiled.weight
-    share = np.where(share[..., 2:].any(axis=0), share, np.nan)
     level = turned(share[..., :2], -heading(strides.qpos[:: strides.every, 3:7]))
     ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
     peaks = np.array([_seen(leg, PLATE / strides.step / strides.every).max() for leg in up.T])
+    peaks = np.where((up > 0).any(axis=0), peaks, np.nan)
     pairs = peaks.reshape(2, 3).mean(axis=0)
     impulses = {"vertical": up, "fore-aft": ahead, "inward": inward}
     return {f"{name} impulse": 200.0 * force.mean(axis=0) for name, force in impulses.items()} | {
