@@ -67,6 +67,7 @@ def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
         axes.bar(places, one.mean("start"), 0.25, yerr=one.std("start", ddof=1), color=colour, capsize=2, label=label)
     axes.set_xticks(range(len(SEGMENTS)), [f"{segment} legs" for segment in SEGMENTS])
     axes.axhline(0.0, color="0.4", linewidth=0.8)
+    axes.set_xlim(-0.55, len(SEGMENTS) - 0.45)  # also where a pair has no bars
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + 1.35 * (high - low))  # room for the legend above the bars
     axes.legend(frameon=False, fontsize=9, loc="upper left")
