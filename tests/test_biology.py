@@ -282,6 +282,17 @@ def test_starts_that_fall_count_nowhere(falling):
     assert ("with standard deviations" in title) == (some.size > 1)
 
 
+def test_a_ripple_below_nothing_is_drawn_whole(falling):
+    """Of a walk that goes back for a while, with its deviation."""
+    back = falling.copy(deep=True)
+    ripples = np.array([-1.2, -1.2, -1.2, -0.2, -0.2])
+    back.value.loc[{"quantity": "ripple: least over mean speed"}] = ripples
+    panel = biology_figure(back).axes[5]
+    drawn = np.concatenate(panel.containers[0].lines[2][0].get_segments())
+    assert drawn[:, 1].min() == pytest.approx(ripples.mean() - ripples.std(ddof=1))
+    assert panel.get_ylim()[0] < drawn[:, 1].min()
+
+
 def test_a_row_without_walks_has_no_number(falling):
     nothing = falling.copy(deep=True)
     for name in ("mean", "low", "high"):
@@ -325,7 +336,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     code, text, _ = run(*words)
     assert code == 0
     table = (tmp_path / "biology.md").read_text()
-    assert "starts that walked: 2 of 2 at" in text and "Starts that walked: 2 of 2 at" in table
+    assert "starts with whole strides: 2 of 2 at" in text and "Starts with whole strides: 2 of 2 at" in table
     assert answer["walked"][0] == 2
     assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
     assert table.count("\n| ") >= len(ANIMALS)

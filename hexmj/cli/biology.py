@@ -50,10 +50,10 @@ class Biology(StudyCommand):
         return lists_of(result.drop_dims(("start", "speed", "quantity")))
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
-        """The table, how many walked, and the conditions."""
+        """The table, how many walked whole strides, and the conditions."""
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
         yield table(HEADS, rows(result))
-        yield f"starts that walked: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
+        yield f"starts with whole strides: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
 

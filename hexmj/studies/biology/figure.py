@@ -51,8 +51,8 @@ def biology_figure(result: "xr.Dataset") -> "Picture":
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
     axes[2].legend(frameon=False, fontsize=9)
-    fewer = [f"{n} walked at {speed:g} mm/s" for speed, n in walked(result).items() if n < result.sizes["start"]]
-    told = "; ".join([caption(result), *fewer])
+    fewer = [f"{n} at {speed:g}" for speed, n in walked(result).items() if n < result.sizes["start"]]
+    told = "; ".join([caption(result), *([f"whole strides of {', '.join(fewer)} mm/s"] if fewer else [])])
     spread = ", with standard deviations" if walked(result)[24.0] > 1 else ""
     head(figure, f"The walking insect beside measured ones; bars at 24 mm/s{spread}", told)
     return figure
@@ -90,5 +90,5 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
     axes.set_xlim(20.0, 40.0)
     if name.startswith("ripple"):
-        axes.set_ylim(min(0.0, float(values.min())), 1.0)
+        axes.set_ylim(min(0.0, axes.get_ylim()[0]), 1.0)
     tidy(axes)

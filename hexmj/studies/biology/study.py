@@ -64,7 +64,7 @@ class Biology(SameStarts):
             Over (speed, quantity, start): `value`, NaN where a start fell or made no whole stride.  Over row, one for
             each of `ANIMALS`: its `name`, `unit`, `at` which speed and whether the animals' figure `depends` on it; our
             `mean` over the starts with its 95 % interval `low`, `high`; the animals' `animal_low`, `animal_high` and
-            their `source`; the `verdict`, and whether it was `built_in`; and how many starts `walked`.
+            their `source`; the `verdict`, and whether it was `built_in`; and how many starts it is of (`walked`).
         """
         import xarray as xr
 
@@ -103,7 +103,7 @@ def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
 
 
 def walked(result: "xr.Dataset") -> dict[float, int]:
-    """Number of starts that walked at each speed [mm/s], of a result of `Biology`."""
+    """Number of starts that walked whole strides at each speed [mm/s], of a result of `Biology`."""
     count = result.value.sel(quantity="speed").notnull().sum("start")
     return dict(zip(result.speed.values.tolist(), count.values.tolist(), strict=True))
 

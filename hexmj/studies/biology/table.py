@@ -36,7 +36,7 @@ def biology_markdown(result: "xr.Dataset") -> str:
     """
     check_axes(result)
     with what_parts_may_lack(result, "the table of insects cannot be made"):
-        lines = [*markdown_table(HEADS, rows(result)), "", f"Starts that walked: {walked_in_words(result)}.", ""]
+        lines = [*markdown_table(HEADS, rows(result)), "", f"Starts with whole strides: {walked_in_words(result)}.", ""]
         named = {*result.source.values}
     return (
         "\n".join([*lines, *(f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text)]) + "\n"
