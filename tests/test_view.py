@@ -21,6 +21,7 @@ from hexmj.measures.physical import physical_walk
 from hexmj.process import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
+from hexmj.view import live
 from hexmj.view.browser import BrowserView
 from hexmj.view.charts import footfall
 from hexmj.view.live import LiveWalk
@@ -114,6 +115,8 @@ def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(progress, "EVERY", 600.0)
+    settle, settled = live.LiveWalk, list[str]()
+    monkeypatch.setattr(live, "LiveWalk", lambda *of: settled.append("an insect") or settle(*of))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         code, _, error = run("view", "--browser", "--port", taken.getsockname()[1])
         assert (code, error.count("\n")) == (2, 1)
@@ -125,9 +128,10 @@ def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     ):
         code, _, error = run("view", "--browser", *words)
         assert (code, error.count("\n")) == (2, 1) and error.startswith(f"hexmj: {said}")
+    assert not settled
     monkeypatch.setitem(sys.modules, "viser", None)
     code, _, error = run("view", "--browser", "--port", 0)
-    assert code == 2
+    assert code == 2 and settled
     assert 'pip install ".[view]"' in error
     code, _, error = run("view", "recording.nc", "--velocity", 0.5)
     assert code == 2

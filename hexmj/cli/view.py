@@ -53,12 +53,15 @@ class View:
         from hexmj.starts import draw_start
         from hexmj.timing import Stride
         from hexmj.view.live import LiveWalk
+        from hexmj.view.port import check_port
         from hexmj.view.session import LiveSession
 
         def starts(number: int):
             return draw_start(number, self.seed, Stride())[0]
 
         controller = self.controlled.controller(self.model)
+        if not on_screen:
+            check_port(self.host, self.port)  # before the insect settles
         with progress_bar("settling"):
             walk = LiveWalk(controller, self.velocity, starts(self.start), self.conditions)
         session = LiveSession(walk, self.start, starts)
