@@ -19,7 +19,10 @@ NONSENSE = [
     (["walk", "--velocity", "-0.1"], "velocity = -0.1 has no period"),
     (["search", "--velocity", "0.1", "--velocities", "0.1", "0.5"], "expected one velocity or one range"),
     (["search", "--begin", "ldvs", "--form", "hws"], "ldvs has weights that the form hws lacks; expected a set of it"),
-    (["search", "--begin", "own-0.1", "--form", "ldvs"], "own-0.1 has weights that the form ldvs lacks"),
+    (
+        ["search", "--begin", "own-0.1", "--form", "ldvs"],
+        "own-0.1 has weights that the form ldvs lacks; expected a set of it; forms that have them: general",
+    ),
     (["flss", "--physical", "--ground-height", "5"], "--ground-height with --ground flat; expected it with a ground"),
     (
         ["flss", "--physical", "--ground", "gap", "--ground-height", "5"],

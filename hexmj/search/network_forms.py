@@ -72,6 +72,14 @@ FORMS: dict[FormName, Parameters] = {
 """Forms by their names."""
 
 
+def _holds(form: FormName, weights: AnyWeights) -> bool:
+    """Whether a form's parameters are all that weights are made of."""
+    vector = FORMS[form].vector(weights)
+    if not np.isfinite(vector).all():
+        return False
+    return np.array_equal(general(FORMS[form].weights(vector)).to_vector(), general(weights).to_vector())
+
+
 @dataclass(frozen=True)
 class NetworkForm:
     """Weights of the 1998 network, with its order of updates."""
@@ -119,9 +127,8 @@ class NetworkForm:
             if own not in (wanted, "printed"):
                 told = f"{rule} = {own}; expected {wanted}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
-        vector = FORMS[self.name].vector(controller.weights)
-        if np.isfinite(vector).all():
-            kept, every = general(self.controller(vector).weights), general(controller.weights)
-            if np.array_equal(kept.to_vector(), every.to_vector()):
-                return vector
-        raise InputError(f"{controller.name} has weights that the form {self.name} lacks; expected a set of it")
+        if not _holds(self.name, controller.weights):
+            others = ", ".join(name for name in FORMS if _holds(name, controller.weights))
+            told = f"the form {self.name} lacks; expected a set of it; forms that have them: {others}"
+            raise InputError(f"{controller.name} has weights that {told}")
+        return FORMS[self.name].vector(controller.weights)
