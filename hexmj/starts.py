@@ -93,5 +93,5 @@ def checked_list(velocities: Sequence[float], acceleration: Acceleration | None 
     v = numbers("velocities", velocities)
     if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
         given = " ".join(f"{velocities}".split())
-        raise InputError(f"velocities = {given:.80}; expected a list of at least one, and none of them twice")
+        raise InputError(f"velocities = {given:.80}; expected a list of numbers, at least one, and none of them twice")
     return checked_velocities(v, len(v), acceleration)

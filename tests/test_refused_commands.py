@@ -38,7 +38,7 @@ NONSENSE = [
     (["terrain", "--processes", "1" + 23 * "0"], "expected at least 1 and at most 1000"),
     (["reproduce", "--only"], "--only without keys; expected at least one"),
     (["league", "--controllers", "--starts", "2"], "controllers = []; expected at least one, and none of them twice"),
-    (["league", "--velocities", "--starts", "2"], "velocities = (); expected a list of at least one"),
+    (["league", "--velocities", "--starts", "2"], "velocities = (); expected a list of numbers, at least one"),
     (
         ["walk", "--window", "1000001"],
         "duration = 1000001; expected at least one step, 0.1, and at most 1e+06 time units",

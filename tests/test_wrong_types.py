@@ -307,7 +307,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.physical_flss({"u": LDVS}, 0.5), "controller = {'u': "),  # pyright: ignore
     (lambda: replace(FULL, looks="step"), "looks = 'step'; valid names: steps, periods"),
     (lambda: replace(FULL, stride=0.1), "stride = 0.1; expected a Stride"),
-    (lambda: replace(FULL, velocities=()), "velocities = (); expected a list of at least one"),
+    (lambda: replace(FULL, velocities=()), "velocities = (); expected a list of numbers, at least one"),
     (lambda: replace(FULL, samples=0), "samples = 0; expected a whole number of at least 1"),
     (lambda: measure("typo", FULL), "measurement 'typo'; valid names: "),
 ]
