@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import hexmj
+from coarse_steps import COARSE
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import general
@@ -96,6 +97,16 @@ def test_a_contact_gap_is_refused_where_nobody_reads_it() -> None:
     with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
         options_of(["ablate", "--contact-gap", "5"]).study()
     options_of(["ablate", "--contact-gap", "5", "--models", "ldvs", "walknet-load"]).study()
+
+
+def test_whether_a_contact_gap_is_read_is_asked_at_a_velocity_that_is_walked() -> None:
+    from hexmj.cli.commands import options_of
+
+    for words in (["flss", "--physical"], ["terrain"], ["search", "--physical", "--velocity", "0.2"]):
+        at = [] if "search" in words else ["--velocities", "0.2"]
+        command = options_of([*words, *at, "--dt", "0.2", "--contact-gap", "5"])
+        with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
+            command.refuse_contact_gap(COARSE)
 
 
 @pytest.mark.thorough

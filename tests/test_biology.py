@@ -288,7 +288,8 @@ def test_a_ripple_below_nothing_is_drawn_whole(falling):
     ripples = np.array([-1.2, -1.2, -1.2, -0.2, -0.2])
     back.value.loc[{"quantity": "ripple: least over mean speed"}] = ripples
     panel = biology_figure(back).axes[5]
-    drawn = np.concatenate(panel.containers[0].lines[2][0].get_segments())
+    bars: Any = panel.containers[0]
+    drawn = np.concatenate(bars.lines[2][0].get_segments())
     assert drawn[:, 1].min() == pytest.approx(ripples.mean() - ripples.std(ddof=1))
     assert panel.get_ylim()[0] < drawn[:, 1].min()
 

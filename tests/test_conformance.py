@@ -9,8 +9,10 @@ import pytest
 
 import hexmj
 from broken_controllers import BROKEN, BegunOtherwise, Melting, steps_changed
+from coarse_steps import COARSE
 from hexmj.controllers import conformance
 from hexmj.controllers.conformance import FIRST, check_controller, findings
+from hexmj.errors import InputError
 from stepwise_ldvs import Own
 from tiers import few_of
 from waiting_legs import OWN
@@ -35,9 +37,24 @@ def test_other_controllers_conform():
     check_controller(BegunOtherwise())
 
 
+def test_who_refuses_some_walks_is_held_to_the_laws_in_the_others():
+    stride = hexmj.Stride(dt=0.2)
+    with pytest.raises(AssertionError, match=r"begin: .*; if it cannot plan there, ask for other"):
+        check_controller(COARSE, stride)
+    for velocities in ([0.4], [0.3, 0.1], [0.05], [0.0]):
+        check_controller(COARSE, stride, velocities)
+    for velocities, said in (
+        ([], "expected a list"),
+        ([1.0], "0 <= V < 1"),
+        ([n / 40 for n in range(17)], "at most 16"),
+    ):
+        with pytest.raises(InputError, match=said):
+            check_controller(COARSE, stride, velocities)
+
+
 @pytest.mark.parametrize(("law", "controller", "words"), BROKEN)
 def test_what_breaks_a_law_is_found_in_one_sentence(law, controller, words):
-    trials = conformance._trials(controller, hexmj.Stride())
+    trials = conformance._trials(controller, np.array(conformance.VELOCITIES), hexmj.Stride())
     found = next(filter(None, (conformance._wrong(conformance.LAWS[law][0], trial) for trial in trials)))
     assert re.search(words, found), found
     assert "\n" not in found

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import hexmj
+from coarse_steps import COARSE
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
@@ -26,7 +27,7 @@ LARGER = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standin
 def test_trials_are_what_they_say() -> None:
     entrant, usual = Entrant(hexmj.LDVS), Conditions()
     walked = [name for name in TRIALS if name not in DISTURBED]
-    found = {name: one for name in walked if (one := walking(name, entrant, usual, Stride()))}
+    found = {name: one for name in walked if (one := walking(name, entrant, usual, 0.3, Stride()))}
     assert list(found) == walked
     assert found["load"].conditions.masses.load == 1.0
     assert found["step"].conditions.ground.ground_height == 3.0
@@ -34,11 +35,19 @@ def test_trials_are_what_they_say() -> None:
     assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
 
 
+def test_whether_it_reads_is_asked_of_walks_that_are_asked_for() -> None:
+    """Of one that plans at no other velocity, and with no other time step."""
+    coarse = Entrant(COARSE)
+    league = League({"coarse": coarse}, [0.2], 4, 2, 1, 0.4, accelerating=False, stride=Stride(dt=0.2))
+    tried = {name for name, *_ in league._tried(coarse)}
+    assert {"load", "lost 1"} <= tried and "reads" not in tried
+
+
 def test_grounds_lie_as_the_body_is_large() -> None:
     for body, sizes in ((STICK_INSECT, (3.0, 45.0, 75.0)), (LARGER, (4.5, 67.5, 112.5))):
         usual = Conditions(body=body)
         for name in GROUNDS:
-            met = walking(name, Entrant(hexmj.LDVS), usual, Stride())
+            met = walking(name, Entrant(hexmj.LDVS), usual, 0.3, Stride())
             assert met and met.conditions.ground.ground == name
             ground = met.conditions.ground
             assert (ground.ground_height, ground.ground_at, crossed(usual)) == pytest.approx(sizes, rel=1e-12)
@@ -72,7 +81,7 @@ def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() 
     short = Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)
     tall = Conditions.of(standing_height=14.0)
     for conditions, stride in ((Conditions(), short), (Conditions(body=LARGER), Stride()), (tall, Stride())):
-        trial = walking("lost 1", Entrant(hexmj.LDVS), conditions, stride)
+        trial = walking("lost 1", Entrant(hexmj.LDVS), conditions, 0.3, stride)
         assert trial is not None
         plan = trial.controller.begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
         high.append(np.nanmax(plan.advance(300).height[..., 0]))
@@ -109,5 +118,5 @@ def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
     late = PoorSenses(ReadsLegs(hexmj.LDVS), delay=0.04)
     with pytest.raises(InputError, match=r"delay = 0.04 with steps of 0.1 time units; expected at least one step"):
         late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
-    assert walking("late", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride()) is None
-    assert walking("noise", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), Stride())
+    assert walking("late", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), 0.3, Stride()) is None
+    assert walking("noise", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), 0.3, Stride())

@@ -1,11 +1,14 @@
 """`hexmj check-controller`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tyro.conf import Positional
 
 from hexmj.cli.findings import report
 from hexmj.cli.options import ControllerName
+from hexmj.controllers.conformance import VELOCITIES
+from hexmj.timing import Stride
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,10 @@ class CheckController:
     """Options of `hexmj check-controller`, which `commands.COMMANDS` describes."""
 
     name: Positional[ControllerName]
+    velocities: Sequence[float] = VELOCITIES
+    """V_r at which it is asked for plans, each 0 <= V < 1; those at which it can plan."""
+    dt: float = Stride.dt
+    """Time step of the plans [time units]."""
     json: bool = False
     """Print one JSON object on standard output, nothing else."""
 
@@ -21,4 +28,5 @@ class CheckController:
         from hexmj.controllers.conformance import findings
         from hexmj.controllers.named import load_controller
 
-        report(findings(load_controller(self.name)), self.json, controller=self.name)
+        found = findings(load_controller(self.name), Stride(dt=self.dt), self.velocities)
+        report(found, self.json, controller=self.name)

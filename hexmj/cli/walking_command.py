@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
+import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import numbers
@@ -131,12 +132,13 @@ class WalkingCommand:
             InputError: it is not the usual one.
         """
         from hexmj.controllers.checked_plans import begin
-        from hexmj.starts import draw_starts
+        from hexmj.starts import checked_list, draw_starts
 
         gap, stride = self.conditions.numerics.contact_gap, self.walks.stride
         if gap != Numerics.contact_gap:
             starts = draw_starts(1, self.walks.seed, stride)
-            if not any(isinstance(begin(one, starts, 0.5, stride, threads=1), ReadingPlan) for one in controllers):
+            v = checked_list(np.unique(numbers("velocities", self.commanded)).tolist())[:1]
+            if not any(isinstance(begin(one, starts, v, stride, threads=1), ReadingPlan) for one in controllers):
                 raise InputError(
                     f"--contact-gap = {gap:g} with falls only; expected it where a polygon is measured (compare, map,"
                     " converge, walk --physical) or the controller reads the legs"

@@ -5,7 +5,7 @@ first thing that is wrong, as `checked_plans` does for all who walk.  On paper n
 of the stride: tips within `REACH` of its range.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.checks import given
-from hexmj.controllers.checked_plans import advanced, check_velocities, place, said
+from hexmj.controllers.checked_plans import Refused, advanced, check_velocities, place, said
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, claims_mirrored, is_steerable, settings_of
 from hexmj.controllers.reading_law import told
@@ -21,12 +21,12 @@ from hexmj.controllers.steering_laws import restarted, seen, slowed
 from hexmj.controllers.trial import DIVIDED, N_STARTS, STEPS, Trial, same
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
-from hexmj.starts import draw_starts
+from hexmj.starts import checked_list, draw_starts
 from hexmj.timing import Acceleration, Stride, commanded_velocities
 from hexmj.walks import PLANNED, joined, of_starts
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
-"""V_r of the starts of a trial, in turn."""
+"""V_r of the starts of a trial, in turn, unless others are asked for."""
 
 ACCELERATION = Acceleration(rate=0.005, start=0.1)
 """Of a trial that accelerates: V = 0.3 is reached after 40 time units."""
@@ -52,28 +52,38 @@ class Finding:
     """Whether it is only told, and no law."""
 
 
-def check_controller(controller: object, stride: Stride | None = None) -> None:
+def check_controller(
+    controller: object, stride: Stride | None = None, velocities: Sequence[float] = VELOCITIES
+) -> None:
     """Hold a controller to the laws of its protocol; takes a second or a few.
 
+    It has to plan with the stride, and at each of the velocities V_r, 0 <= V < 1, fractions of V_p.
+
     Raises:
-        InputError: no controller.
+        InputError: no controller, or velocities that make no sense.
         AssertionError: a law that is not kept, in one sentence.
     """
-    for finding in findings(controller, stride):
+    for finding in findings(controller, stride, velocities):
         if not finding.well:
             raise AssertionError(f"{finding.name}: {finding.found}")
 
 
-def findings(controller: object, stride: Stride | None = None) -> Iterator[Finding]:
-    """What each law finds, in order, and at last how far standing feet slide, which no law forbids.
+def findings(
+    controller: object, stride: Stride | None = None, velocities: Sequence[float] = VELOCITIES
+) -> Iterator[Finding]:
+    """What each law finds of walks with a stride and of each V_r, in order, and at last how far standing feet slide,
+    which no law forbids.
 
     Where a law of `FIRST` is broken, those after it are not tried: they would find the same again.
 
     Raises:
-        InputError: no controller.
+        InputError: no controller, or velocities that make no sense.
     """
     check_controller_type(controller)
-    trials = [*_trials(controller, given("stride", stride, Stride))]  # pyright: ignore[reportArgumentType]
+    asked = checked_list(velocities), given("stride", stride, Stride)
+    if len(asked[0]) > N_STARTS:
+        raise InputError(f"{len(asked[0])} velocities; expected at most {N_STARTS}, one for each start")
+    trials = [*_trials(controller, *asked)]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
         if wrong and name in FIRST:
@@ -83,12 +93,13 @@ def findings(controller: object, stride: Stride | None = None) -> Iterator[Findi
     yield Finding("sliding", True, _sliding(trials), note=True)
 
 
-def _trials(controller: Controller, stride: Stride) -> Iterator[Trial]:
+def _trials(controller: Controller, velocities: np.ndarray, stride: Stride) -> Iterator[Trial]:
     """Starts that are drawn and extreme, at several velocities at once, constant and accelerating."""
-    starts, velocity = draw_starts(N_STARTS, 0, stride), np.resize(VELOCITIES, N_STARTS)
+    starts, velocity = draw_starts(N_STARTS, 0, stride), np.resize(velocities, N_STARTS)
     starts[-1], starts[N_STARTS // 2 - 1] = stride.pep0, stride.aep0
     yield Trial(controller, starts, velocity, stride, None)
-    yield Trial(controller, starts, np.maximum(velocity, ACCELERATION.start), stride, ACCELERATION)
+    slowly = replace(ACCELERATION, start=min(ACCELERATION.start, velocities.max()))
+    yield Trial(controller, starts, np.maximum(velocity, slowly.start), stride, slowly)
 
 
 def _wrong(law: Callable[[Trial], None], trial: Trial) -> str | None:
@@ -110,7 +121,10 @@ def _settings(trial: Trial) -> None:
 
 def _begin(trial: Trial) -> None:
     check_velocities(trial.controller, sorted({*trial.velocity.tolist()}), trial.stride, trial.acceleration)
-    trial.begin()
+    try:
+        trial.begin()
+    except Refused as error:
+        raise InputError(f"{error}; if it cannot plan there, ask for other velocities or time steps") from None
 
 
 def _steps(trial: Trial) -> None:

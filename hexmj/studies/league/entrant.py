@@ -57,10 +57,10 @@ class Entrant:
             )
         return start
 
-    @property
-    def reading(self) -> Controller | None:
-        """The same controller reading the legs, if it can: by itself, or because its plans can be steered."""
-        if isinstance(begin(self.controller, draw_starts(1, 0), 0.5, Stride()), ReadingPlan):
+    def reading(self, velocity: float, stride: Stride) -> Controller | None:
+        """The same controller reading the legs, if it can: by itself, or because its plans, which are asked for at V_r
+        and with the stride that it is to walk with, can be steered."""
+        if isinstance(begin(self.controller, draw_starts(1, 0, stride), velocity, stride), ReadingPlan):
             return self.controller
         return ReadsLegs(self.controller) if self.steerable else None
 

@@ -175,5 +175,5 @@ class League:
                 yield trial, in_physics.disturbed, 300, how
             elif case or (trial in GROUNDS and self.tried_at * window < crossed(self.conditions)):
                 continue
-            elif one := walking(trial, entrant, self.conditions, self.stride):
+            elif one := walking(trial, entrant, self.conditions, self.tried_at, self.stride):
                 yield trial, in_physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}

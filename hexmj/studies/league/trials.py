@@ -73,11 +73,10 @@ def crossed(conditions: Conditions) -> float:
     return conditions.body.lengths.nearest_obstacle * 5.0 / 3.0
 
 
-def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride) -> Walking | None:
-    """Who walks in a trial that is no disturbance, and where; None where the entrant cannot read its legs, or not so
-    late, since its steps are longer."""
-    controller, reading = entrant.controller, entrant.reading if name in READING else None
-    body = conditions.body
+def walking(name: str, entrant: Entrant, conditions: Conditions, velocity: float, stride: Stride) -> Walking | None:
+    """Who walks at V_r in a trial that is no disturbance, and where; None where the entrant cannot read its legs, or
+    not so late, since its steps are longer."""
+    controller, body = entrant.controller, conditions.body
     if name in GROUNDS:
         near, high = body.lengths.nearest_obstacle, HEIGHT * body.standing_height
         return Walking(controller, conditions.but(ground=name, ground_height=high, ground_at=near))
@@ -86,7 +85,7 @@ def walking(name: str, entrant: Entrant, conditions: Conditions, stride: Stride)
     if name in LEGS_LOST:
         held = HELD * max(conditions.path.standing_height, body.standing_height)
         return Walking(LegLost(controller, LEGS_LOST[name], held), conditions)
-    late = DELAY * conditions.time.vp
+    late, reading = DELAY * conditions.time.vp, entrant.reading(velocity, stride)
     if reading is None or (name == "late" and not round(late / stride.dt)):
         return None
     senses = (reading, PoorSenses(reading, noise=NOISE), PoorSenses(reading, delay=late))
