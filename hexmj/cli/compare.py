@@ -110,7 +110,7 @@ def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
         for v in result.velocity.values:
             one = result.sel(controller=name, velocity=v)
             intervals = (interval(one, measure) for measure in MEASURES)
-            frequencies.append((name, f"{v:g}", f"{one.duration.item():.0f}", *intervals))
+            frequencies.append((name, f"{v:g}", f"{one.duration.item():.4g}", *intervals))
             counts = [str(one[case].item()) for case in AGREEMENT]
             toppled = f"{one.toppled.item():.3f}"
             answers.append((name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, toppled, _speeds(one)))

@@ -82,7 +82,7 @@ class Render(WalkingCommand):
             summary = {"frames": frames, "film": asdict(self.film), "files": files}
             print_json(summary | {"recordings": [walk_summary(one) for one in shown]})
         else:
-            show(f"{frames} frames at {self.film.fps:g} per second", *map(str, files))
+            show(f"{frames} frame{'' if frames == 1 else 's'} at {self.film.fps:g} per second", *map(str, files))
 
     def _check(self) -> None:
         """Refuse options that would not be obeyed."""

@@ -53,7 +53,7 @@ class Walk(WalkingCommand):
         how: Any = {"physical": self.physical, "threads": self.workers.threads}
         walked = recorded(self, controller, self.velocity, self.start, title=title, **how)
         told = {"velocity": self.velocity, "start": self.start, "physical": self.physical}
-        told |= settings({self.model: controller}, n_starts=self.start + 1, **self.walked)
+        told |= settings({self.model: controller}, n_starts=1, **self.walked)
         told |= {"conditions": self.conditions.settings()}
         files = [save_recording(walked, out / "recording.nc"), save_figure(walk_figure, walked, out / figure)]
         files.append(save_manifest(self, told, files, out / MANIFEST))

@@ -18,7 +18,7 @@ STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 def convergence_figure(history: "xr.Dataset") -> "Picture":
     """Every candidate's cost and the least so far against the number of evaluations, from `history.history`."""
-    from hexmj.pictures import picture
+    from hexmj.pictures import head, picture
 
     figure = picture(6.8, 4.2)
     axes = figure.subplots()
@@ -35,7 +35,7 @@ def convergence_figure(history: "xr.Dataset") -> "Picture":
     cost = history.cost.attrs["long_name"]
     of = "cost" if cost != FREQUENCY else cost
     axes.set(xlabel="evaluations of the cost function", ylabel=f"{of} on the starts of the stage", ylim=(-0.02, 1.02))
-    axes.set_title(in_figure(history.attrs["title"]), fontsize=9)
+    head(figure, in_figure(history.attrs["title"]))
     tidy(axes)
     title = "lines: least so far, dots: candidates" + (f"\ncost: {cost}" if cost != FREQUENCY else "")
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=title, title_fontsize=8)

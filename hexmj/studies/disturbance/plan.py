@@ -13,7 +13,8 @@ from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 PAUSE = 4.0
-"""Time for which a halted body stands before anything else happens [time units], longer than a foot is lowered."""
+"""Time for which a halted body stands before anything else happens [time units]; up to V_p = 200 mm/s feet that take
+20 ms are lowered meanwhile."""
 
 
 @dataclass(frozen=True, eq=False)
