@@ -16,12 +16,12 @@ import xarray as xr
 import hexmj
 from hexmj.bodies.description import Servo
 from hexmj.controllers import Controller, Plan, ReadingPlan
-from hexmj.legs import LEGS, SIDE
+from hexmj.legs import LEGS, SIDE, Geometry
 
 HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # ahead of the middle, beside it [mm]
 COXA, FEMUR, TIBIA, FOOT = 54.0, 66.1, 160.0, 8.0  # lengths, and the foot's radius [mm]
 TRUNK, LINK = 975.6, 24.36  # masses [g]; a leg has four links
-LINES = hexmj.Geometry(origins=(190.0, 0.0, -190.0), lateral=(215.0, 265.0, 215.0))  # where the feet stand [mm]
+LINES = Geometry(origins=(190.0, 0.0, -190.0), lateral=(215.0, 265.0, 215.0))  # where the feet stand [mm]
 HIGH = 90.0  # of the hips above the feet [mm]
 LARGER = 4.0  # steps and swings, beside the insect's
 STRIDE = hexmj.Stride(aep0=10 * LARGER, pep0=-10 * LARGER, pep_min=-20 * LARGER, dt=0.1 * LARGER, geometry=LINES)
@@ -129,6 +129,8 @@ class Larger:
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
         """See `hexmj.controllers.Controller`; nothing is handed on of what a plan would read."""
         small = {name: getattr(stride, name) / self.times for name in ("aep0", "pep0", "pep_min", "dt")}
+        lines = {name: tuple(np.divide(ends, self.times).tolist()) for name, ends in vars(stride.geometry).items()}
+        small["geometry"] = Geometry(**lines)
         plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), acceleration, threads)
         if isinstance(plan, ReadingPlan):
             raise hexmj.InputError(f"{self.of.name} reads the legs; expected a controller that goes on by itself")
@@ -152,8 +154,8 @@ class LargerPlan:
     def advance(self, steps):
         """The next steps."""
         walk = self.plan.advance(steps)
-        lengths: dict[str, Any] = {name: self.times * getattr(walk, name) for name in ("time", "x", "aep", "height")}
-        return replace(walk, **lengths)
+        larger = {name: self.times * getattr(walk, name) for name in ("time", "x", "y", "aep", "height")}
+        return replace(walk, geometry=self.stride.geometry, **larger)
 
 
 def fallen(walks: dict[float, dict[str, Any]], n_starts: int, velocity: float = 0.5) -> xr.Dataset:

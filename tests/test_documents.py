@@ -5,6 +5,7 @@ A command stands on a line of its own, indented by four blanks.  Behind `# long`
 of `LONGER`, are run by `make thorough` alone.
 """
 
+import importlib
 import os
 import re
 import shutil
@@ -13,6 +14,7 @@ import sys
 from importlib.metadata import metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hexmj
@@ -150,6 +152,17 @@ def test_the_servo_hexapod_from_fewer_starts(tmp_path):
     small = "import servo_hexapod; servo_hexapod.main(n_starts=4)"
     paths = os.pathsep.join([str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")])
     subprocess.run([sys.executable, "-c", small], cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, check=True)
+
+
+def test_the_servo_hexapods_controller_walks_as_the_insect_walks_four_times_as_large(monkeypatch):
+    """Lines, that is where its rivals' tips lie, among what it plans for."""
+    monkeypatch.syspath_prepend(ROOT / "examples")
+    larger = importlib.import_module("servo_hexapod").Larger()
+    small, starts = hexmj.Stride(), hexmj.draw_starts(40, 5)
+    wide = hexmj.Geometry(*(tuple(4 * end for end in ends) for ends in vars(small.geometry).values()))
+    large = hexmj.Stride(aep0=40.0, pep0=-40.0, pep_min=-80.0, dt=0.4, geometry=wide)
+    ours = hexmj.loss_time(hexmj.walk(4 * starts, larger, 0.5, 720.0, stride=large))
+    assert np.array_equal(ours, 4 * hexmj.loss_time(hexmj.walk(starts, hexmj.LDVS, 0.5, 180.0, stride=small)))
 
 
 def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):
