@@ -104,6 +104,7 @@ NONSENSE = [
     (["flss", "--format", "pdf"], "--format pdf without --out; expected it where a figure is written"),
     (["render", "--width", "321"], "even number"),
     (["render", "nowhere.nc"], "nowhere.nc"),
+    (["render", "--beside", "ldvs"], "--beside = ldvs is the --model, too; expected another controller"),
     (["render", "--beside", "nobody"], "hws, ldvs, uncoordinated"),
     (["render", "a.nc", "--seed", "1"], "--seed was given with recordings"),
     (["flss", "--friction", "0.5"], "--friction without --physical; expected it only where"),

@@ -89,6 +89,8 @@ class Render(WalkingCommand):
         self.film.check_camera(STICK_INSECT)
         if len(self.recordings) > MOST_PANELS:
             raise InputError(f"{len(self.recordings)} recordings were given; expected 1 to {MOST_PANELS}")
+        if self.beside == self.model:
+            raise InputError(f"--beside = {self.beside} is the --model, too; expected another controller, or 'planned'")
         self.film.check_format(self.format)
         kept = {name: getattr(self, name) for name in ("recordings", "format", "out", "json", "film")}
         obeyed = Render(**kept)
@@ -109,7 +111,7 @@ class Render(WalkingCommand):
         """Settings of the walks that are recorded first."""
         from hexmj.measures.kinematic import settings
 
-        walks = settings(controllers, n_starts=self.start + 1, **self.walked)
+        walks = settings(controllers, n_starts=1, **self.walked)
         told = {"velocity": self.velocity, "start": self.start, "beside": self.beside}
         return told | walks | {"conditions": self.conditions.settings()}
 
