@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from broken_controllers import BROKEN, BegunOtherwise, Melting, steps_changed
 from coarse_steps import COARSE
 from hexmj.controllers import conformance
 from hexmj.controllers.conformance import FIRST, check_controller, findings
+from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
 from stepwise_ldvs import Own
 from tiers import few_of
@@ -41,15 +42,26 @@ def test_who_refuses_some_walks_is_held_to_the_laws_in_the_others():
     stride = hexmj.Stride(dt=0.2)
     with pytest.raises(AssertionError, match=r"begin: .*; if it cannot plan there, ask for other"):
         check_controller(COARSE, stride)
-    for velocities in ([0.4], [0.3, 0.1], [0.05], [0.0]):
+    for velocities in ([0.3, 0.4], [0.05, 0.02], [0.0, 0.1]):
         check_controller(COARSE, stride, velocities)
-    for velocities, said in (
-        ([], "expected a list"),
-        ([1.0], "0 <= V < 1"),
-        ([n / 40 for n in range(17)], "at most 16"),
-    ):
+    many = [n / 40 for n in range(17)]
+    for velocities, said in (([], "a list"), ([1.0], "V < 1"), ([0.4], "2 to 16"), (many, "2 to 16")):
         with pytest.raises(InputError, match=said):
             check_controller(COARSE, stride, velocities)
+
+
+@pytest.mark.parametrize("velocities", [(0.2, 0.4), (0.1, 0.05), (0.02, 0.0), (0.05, 0.5)])
+def test_who_does_not_accelerate_is_found_at_any_velocities(velocities):
+    """And is asked to begin at none that is below the least."""
+
+    @dataclass(frozen=True)
+    class Constant(Cruse1998):
+        def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+            assert acceleration is None or acceleration.start >= min(velocities)
+            return super().begin(starts, velocity, stride, None, threads)
+
+    wrong = {one.name for one in findings(Constant(LDVS.weights), velocities=velocities) if not one.well}
+    assert "times" in wrong
 
 
 @pytest.mark.parametrize(("law", "controller", "words"), BROKEN)

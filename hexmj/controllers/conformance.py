@@ -29,7 +29,8 @@ VELOCITIES = (0.0, 0.02, 0.5, 0.95)
 """V_r of the starts of a trial, in turn, unless others are asked for."""
 
 ACCELERATION = Acceleration(rate=0.005, start=0.1)
-"""Of a trial that accelerates: V = 0.3 is reached after 40 time units."""
+"""Of a trial that accelerates: V = 0.3 is reached after 40 time units.  It begins with the least V_r that is asked for
+where all are above this start, or none is."""
 
 REACH = 1.0
 """How far a tip may be beyond PEP_min or AEP_0 on its own axis [mm]; legs overshoot both by a step."""
@@ -57,7 +58,8 @@ def check_controller(
 ) -> None:
     """Hold a controller to the laws of its protocol; takes a second or a few.
 
-    It has to plan with the stride, and at each of the velocities V_r, 0 <= V < 1, fractions of V_p.
+    It has to plan with the stride, and at each of the velocities V_r, 0 <= V < 1, fractions of V_p, and to accelerate
+    to them from 0.1, or from the least of them where all are above that, or none is.
 
     Raises:
         InputError: no controller, or velocities that make no sense.
@@ -81,8 +83,8 @@ def findings(
     """
     check_controller_type(controller)
     asked = checked_list(velocities), given("stride", stride, Stride)
-    if len(asked[0]) > N_STARTS:
-        raise InputError(f"{len(asked[0])} velocities; expected at most {N_STARTS}, one for each start")
+    if not 2 <= len(asked[0]) <= N_STARTS:
+        raise InputError(f"{len(asked[0])} velocities; expected 2 to {N_STARTS}, so that walks accelerate between them")
     trials = [*_trials(controller, *asked)]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
@@ -98,7 +100,8 @@ def _trials(controller: Controller, velocities: np.ndarray, stride: Stride) -> I
     starts, velocity = draw_starts(N_STARTS, 0, stride), np.resize(velocities, N_STARTS)
     starts[-1], starts[N_STARTS // 2 - 1] = stride.pep0, stride.aep0
     yield Trial(controller, starts, velocity, stride, None)
-    slowly = replace(ACCELERATION, start=min(ACCELERATION.start, velocities.max()))
+    least, between = velocities.min(), velocities.min() <= ACCELERATION.start < velocities.max()
+    slowly = ACCELERATION if between else replace(ACCELERATION, start=least)
     yield Trial(controller, starts, np.maximum(velocity, slowly.start), stride, slowly)
 
 
