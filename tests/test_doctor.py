@@ -13,6 +13,7 @@ from hexmj.cli.machine_checks import CHECKS, Unfit, examine
 from hexmj.errors import SimulationError
 from hexmj.measures import physical
 from hexmj.process import threads
+from hexmj.rendering import gl
 
 
 def only(monkeypatch, name: str) -> None:
@@ -66,6 +67,10 @@ def no_cache(monkeypatch, tmp_path):
     monkeypatch.setattr(machine_checks.tempfile, "TemporaryFile", refuse)
 
 
+def a_vain_wish(monkeypatch, tmp_path):
+    monkeypatch.setattr(gl, "_VAIN", ["nonsense"])
+
+
 def no_walk(monkeypatch, tmp_path):
     def diverge(*arguments: object, **options: object) -> None:
         raise SimulationError("start 0 diverged")
@@ -80,7 +85,8 @@ def no_walk(monkeypatch, tmp_path):
         ("versions", a_missing_package, "no-such-package is not installed"),
         ("versions", an_old_python, "Python 3.10.4, expected >=3.11"),
         ("threads", a_small_quota, "would share 0.5 cores"),
-        ("rendering", no_driver, "GLContext"),
+        ("rendering", no_driver, "MUJOCO_GL asks for nothing"),
+        ("rendering", a_vain_wish, "MUJOCO_GL = nonsense is not there; expected one of egl, glfw and osmesa that is"),
         ("films", no_ffmpeg, "ffmpeg"),
         ("compiled code", no_cache, "Permission denied"),
         ("walking", no_walk, "start 0 diverged"),

@@ -105,6 +105,10 @@ def threads() -> str:
 
 def rendering() -> str:
     """MuJoCo renders a frame, as films are rendered."""
+    from hexmj.rendering.gl import vain_wish
+
+    if told := vain_wish():
+        raise Unfit(told)
     script = f"import sys\nsys.path.append({str(Path(__file__).parents[2])!r}){RENDERING}"
     command = [sys.executable, "-P", "-c", script]  # without what lies in the current folder
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
