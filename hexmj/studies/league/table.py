@@ -125,7 +125,7 @@ def _regimes(at: "xr.Dataset") -> Table:
         shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
         phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
         regime = *shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"
-        rows.append(tuple(_known(text) for text in (name, *regime)))
+        rows.append((name, *map(_known, regime)))
     head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
     return Table(f"Limit regimes at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows)
 
