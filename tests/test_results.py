@@ -212,6 +212,14 @@ def test_the_title_tells_what_was_chosen():
     assert "lasting (reading lasting)" in hexmj.plot(lasting).get_suptitle()
 
 
+def test_all_measures_are_seen_of_the_slowest_and_the_fastest_walks():
+    """Beside each other, half of them at a lower V than was walked."""
+    ends = hexmj.compare(hexmj.LDVS, [0.0, 0.999], n_starts=2, window=1.0)
+    (axes,) = hexmj.plot(ends).axes
+    drawn = np.concatenate([line.get_xdata() for line in axes.get_lines()])
+    assert len(drawn) and axes.get_xlim()[0] < drawn.min() < 0.0 and 1.0 < drawn.max() < axes.get_xlim()[1]
+
+
 def test_a_title_fits_into_its_figure():
     """However small that is."""
     figure = hexmj.plot(compared())

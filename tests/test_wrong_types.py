@@ -97,6 +97,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: anything.Stride(dt=np.timedelta64(1)), "dt = np.timedelta64(1); expected a number"),
     (lambda: circular_range([0.95, 0.05]), "phase has the shape (2,); expected (row, n), rows of at least one"),
     (lambda: sweeps.conduct(ANY), "study = None; expected one that has cells and a result"),
+    (lambda: sweeps.conduct(Comparison), "study = <class 'hexmj.measures.compare.Comparison'>; "),  # pyright: ignore
     (lambda: sweeps.over_axes({"a": 0}, []), "size of a = 0; expected a whole number of at least 1"),
     (lambda: sweeps.KeptValues(ANY), "cell = None; expected a Cell"),
     (lambda: circular_range(0.5), "phase has the shape (); expected (row, n)"),

@@ -90,8 +90,8 @@ def velocity_ticks(axes: "Axes", velocities: np.ndarray) -> None:
 
 def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
     """Axes of FLSS against velocity."""
-    axes.set(xlabel="velocity $V_r / V_p$", xlim=(max(0.0, velocities.min() - 0.1), min(1.0, velocities.max() + 0.1)))
-    axes.set(ylabel="FLSS", ylim=(-0.02, 1.02))
+    low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
+    axes.set(xlabel="velocity $V_r / V_p$", xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
     velocity_ticks(axes, velocities)
     tidy(axes)
 

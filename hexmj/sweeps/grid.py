@@ -66,7 +66,7 @@ class Execution(TypedDict, total=False):
 
 def conduct(study: Study, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """The result of a study; arguments and errors as of `finish`."""
-    if not (hasattr(study, "cells") and hasattr(study, "result")):
+    if isinstance(study, type) or not (hasattr(study, "cells") and hasattr(study, "result")):
         raise InputError(f"study = {short(study)}; expected one that has cells and a result")
     cells = [typed("a cell", cell, Cell) for cell in typed("cells", study.cells(), Sequence)]
     before = [cell.settings_now() for cell in cells]
