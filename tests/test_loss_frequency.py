@@ -198,6 +198,7 @@ def test_nonsense_gets_a_clear_sentence(change, words):
         ({"low": -0.5}, "velocity range -0.5 to 0.5; expected 0 <= low <= high < 1"),
         ({"high": 0.05}, "velocity range 0.1 to 0.05"),
         ({"high": 1.0}, "velocity range 0.1 to 1.0"),
+        ({"low": 0.0}, "velocity = 0 has no period; expected V > 0 with the window 'walk'"),
     ],
 )
 def test_nonsense_for_a_range_gets_a_clear_sentence(change, words):

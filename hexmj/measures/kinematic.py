@@ -244,7 +244,7 @@ def flss_over_range(
 
     Args:
         controller: plans the walks.
-        low: least velocity of the range W, uniform, 0 <= V < 1.
+        low: least velocity of the range W, uniform, 0 <= V < 1, and above 0 with the window 'walk'.
         high: greatest velocity of the range W.
         n_starts: N.
         window: 'walk', 'start' or the observation time itself [time units]; the named ones follow each velocity.
@@ -263,6 +263,7 @@ def flss_over_range(
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
     n_starts, seed = check_draw(n_starts, seed)
+    observation_time(window, low, stride)  # refuses a range that begins where there is no period, whatever is drawn
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in draw_slabs(n_starts, seed, stride):
         v = rng.uniform(low, high, len(x))
