@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.checks import given
+from hexmj.checks import given, short
 from hexmj.controllers.checked_plans import Refused, advanced, check_velocities, place, said
 from hexmj.controllers.losses import first_losses, planned_losses, tells_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, claims_mirrored, is_steerable, settings_of
@@ -84,7 +84,8 @@ def findings(
     check_controller_type(controller)
     asked = checked_list(velocities), given("stride", stride, Stride)
     if not 2 <= len(asked[0]) <= N_STARTS:
-        raise InputError(f"{len(asked[0])} velocities; expected 2 to {N_STARTS}, so that walks accelerate between them")
+        told = f"velocities = {short(asked[0].tolist())}; expected 2 to {N_STARTS} of them"
+        raise InputError(f"{told}, so that walks accelerate from the least")
     trials = [*_trials(controller, *asked)]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
