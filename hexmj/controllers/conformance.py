@@ -85,7 +85,7 @@ def findings(
     asked = checked_list(velocities), given("stride", stride, Stride)
     if not 2 <= len(asked[0]) <= N_STARTS:
         told = f"velocities = {short(asked[0].tolist())}; expected 2 to {N_STARTS} of them"
-        raise InputError(f"{told}, so that walks accelerate from the least")
+        raise InputError(f"{told}, so that walks accelerate between them")
     trials = [*_trials(controller, *asked)]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
