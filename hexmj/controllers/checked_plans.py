@@ -122,7 +122,11 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
     if plan.stride != stride:
         raise InputError(f"the plan's stride is {plan.stride}; expected {stride}")
     if not np.array_equal(plan.starts, starts):
-        raise InputError(f"the plan is of other starts, {np.shape(plan.starts)}; expected the {len(starts)} asked for")
+        told = f", {np.shape(plan.starts)}; expected the {len(starts)} asked for"
+        if np.shape(plan.starts) == starts.shape:
+            (start, leg), *_ = np.argwhere((begun := np.asarray(plan.starts)) != starts)
+            told = f": leg {LEGS[leg]} of start {start} at {begun[start, leg]} mm; expected {starts[start, leg]} mm"
+        raise InputError(f"the plan is of other starts{told}")
 
 
 def advanced(plan: Plan, steps: int) -> PlannedWalk:
