@@ -52,8 +52,12 @@ def a_small_quota(monkeypatch, tmp_path):
     monkeypatch.setattr(machine_checks, "QUOTA", tmp_path / "cpu.max")
 
 
-def no_driver(monkeypatch, tmp_path):
+def no_gl(monkeypatch, tmp_path):
     monkeypatch.setenv("MUJOCO_GL", "disable")
+
+
+def no_driver(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine_checks, "RENDERING", "\nraise SystemExit('no driver')")
 
 
 def no_ffmpeg(monkeypatch, tmp_path):
@@ -85,7 +89,8 @@ def no_walk(monkeypatch, tmp_path):
         ("versions", a_missing_package, "no-such-package is not installed"),
         ("versions", an_old_python, "Python 3.10.4, expected >=3.11"),
         ("threads", a_small_quota, "would share 0.5 cores"),
-        ("rendering", no_driver, "MUJOCO_GL asks for nothing"),
+        ("rendering", no_gl, "MUJOCO_GL asks for nothing"),
+        ("rendering", no_driver, "no driver"),
         ("rendering", a_vain_wish, "MUJOCO_GL = nonsense is not there; expected one of egl, glfw and osmesa that is"),
         ("films", no_ffmpeg, "ffmpeg"),
         ("compiled code", no_cache, "Permission denied"),

@@ -89,8 +89,6 @@ class Render(WalkingCommand):
         self.film.check_camera(STICK_INSECT)
         if len(self.recordings) > MOST_PANELS:
             raise InputError(f"{len(self.recordings)} recordings were given; expected 1 to {MOST_PANELS}")
-        if self.beside == self.model:
-            raise InputError(f"--beside = {self.beside} is the --model, too; expected another controller, or 'planned'")
         self.film.check_format(self.format)
         kept = {name: getattr(self, name) for name in ("recordings", "format", "out", "json", "film")}
         obeyed = Render(**kept)
@@ -99,6 +97,8 @@ class Render(WalkingCommand):
                 f"--{names[0].replace('_', '-')} was given with recordings; expected more recordings for side by"
                 " side, and options of walks only where one is recorded first"
             )
+        if self.beside == self.model:
+            raise InputError(f"--beside = {self.beside} is the --model, too; expected another controller, or 'planned'")
 
     def _name(self, shown: "Sequence[xr.Dataset]") -> str:
         """What the film shows, as its file is called."""
