@@ -7,7 +7,7 @@ from tyro.conf import Positional
 
 from hexmj.cli.findings import report
 from hexmj.cli.options import ControllerName
-from hexmj.controllers.conformance import VELOCITIES
+from hexmj.controllers.conformance import VELOCITIES, findings
 from hexmj.timing import Stride
 
 
@@ -26,7 +26,6 @@ class CheckController:
 
     def run(self) -> None:
         """One line for each check."""
-        from hexmj.controllers.conformance import findings
         from hexmj.controllers.named import load_controller
 
         found = findings(load_controller(self.name), Stride(dt=self.dt), self.velocities)
