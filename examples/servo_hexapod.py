@@ -131,7 +131,8 @@ class Larger:
         small = {name: getattr(stride, name) / self.times for name in ("aep0", "pep0", "pep_min", "dt")}
         lines = {name: tuple(np.divide(ends, self.times).tolist()) for name, ends in vars(stride.geometry).items()}
         small["geometry"] = Geometry(**lines)
-        plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), acceleration, threads)
+        faster = acceleration and replace(acceleration, rate=acceleration.rate * self.times)
+        plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), faster, threads)
         if isinstance(plan, ReadingPlan):
             raise hexmj.InputError(f"{self.of.name} reads the legs; expected a controller that goes on by itself")
         return LargerPlan(plan, starts, stride, self.times)

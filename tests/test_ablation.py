@@ -1,5 +1,6 @@
 """Ablation: controllers without one of their parts."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 import hexmj
 from coarse_steps import COARSE
 from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
@@ -107,6 +109,21 @@ def test_whether_a_contact_gap_is_read_is_asked_at_a_velocity_that_is_walked() -
         command = options_of([*words, *at, "--dt", "0.2", "--contact-gap", "5"])
         with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
             command.refuse_contact_gap(COARSE)
+
+
+def test_whether_a_contact_gap_is_read_is_asked_of_walks_that_accelerate_where_they_do() -> None:
+    from hexmj.cli.commands import options_of
+
+    @dataclass(frozen=True)
+    class Accelerating(Cruse1998):
+        def begin(self, starts, velocity, stride, acceleration=None, threads=None):
+            if acceleration is None:
+                raise InputError("too fast at once")
+            return super().begin(starts, velocity, stride, acceleration, threads)
+
+    words = ["flss", "--physical", "--velocities", "0.7", "--acceleration", "0.01", "--contact-gap", "5"]
+    with pytest.raises(InputError, match="--contact-gap = 5 with falls only"):
+        options_of(words).refuse_contact_gap(Accelerating(hexmj.LDVS.weights, name="accelerating"))
 
 
 @pytest.mark.thorough

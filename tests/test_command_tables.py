@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from hexmj import LDVS, load
-from hexmj.cli.tables import difference, interval
+from hexmj.cli.tables import difference, four_digits, interval
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
 from hexmj.studies.stability_map.study import StabilityMap
@@ -23,6 +23,13 @@ def test_what_nobody_reached_has_no_frequency() -> None:
 
 def test_a_difference_has_its_signs() -> None:
     assert difference(xr.Dataset({"lost": -0.5, "lost_low": -0.79, "lost_high": 0.04}), "lost") == "-.50 (-.79 to +.04)"
+
+
+@pytest.mark.parametrize(
+    ("number", "shown"), [(0.25, "0.25"), (60.02666, "60.03"), (10127.3, "10127"), (9999.7, "10000")]
+)
+def test_a_number_of_four_digits_is_never_rounded_before_its_point(number: float, shown: str) -> None:
+    assert four_digits(number) == shown
 
 
 @pytest.mark.thorough

@@ -20,6 +20,7 @@ import pytest
 import hexmj
 from hexmj.cli.command_words import checked
 from hexmj.cli.commands import options_of
+from hexmj.controllers import conformance
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998
 from hexmj.controllers.named import load_controller
 from tiers import few_of
@@ -163,6 +164,7 @@ def test_the_servo_hexapods_controller_walks_as_the_insect_walks_four_times_as_l
     large = hexmj.Stride(aep0=40.0, pep0=-40.0, pep_min=-80.0, dt=0.4, geometry=wide)
     ours = hexmj.loss_time(hexmj.walk(4 * starts, larger, 0.5, 720.0, stride=large))
     assert np.array_equal(ours, 4 * hexmj.loss_time(hexmj.walk(starts, hexmj.LDVS, 0.5, 180.0, stride=small)))
+    conformance.check_controller(larger, large)
 
 
 def test_the_site_is_whole_and_loads_nothing_from_elsewhere(tmp_path):

@@ -68,6 +68,7 @@ NONSENSE = [
     (["search", "--window", "long"], "valid names: walk, start"),
     (["search", "--over", "mean", "--pep0", "-16"], "pep_min = -15.0, pep0 = -16.0"),
     (["variants", "--models", "own-V", "--velocities", "0.15"], "own-V at V = 0.15: controller 'own-0.15' is neither"),
+    (["variants", "--velocities"], "velocities = []; expected a list of numbers, at least one"),
     (["variants", "--friction", "0.5"], "--friction without --physical"),
     (["variants", "--physical", "--contact-gap", "0.01"], "--contact-gap = 0.01 with falls only"),
     (["flss", "--model", "lvds"], "hws, ldvs, uncoordinated"),

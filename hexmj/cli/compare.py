@@ -12,7 +12,7 @@ from tyro.conf import arg
 from hexmj.cli.options import CONTROLLER
 from hexmj.cli.recorded import recorded
 from hexmj.cli.study_command import Outputs, StudyCommand
-from hexmj.cli.tables import interval, physical_report, report_line, table
+from hexmj.cli.tables import four_digits, interval, physical_report, report_line, table
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
 from hexmj.measures.figures import comparison_figure
@@ -110,7 +110,7 @@ def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
         for v in result.velocity.values:
             one = result.sel(controller=name, velocity=v)
             intervals = (interval(one, measure) for measure in MEASURES)
-            frequencies.append((name, f"{v:g}", f"{one.duration.item():.4g}", *intervals))
+            frequencies.append((name, f"{v:g}", four_digits(one.duration.item()), *intervals))
             counts = [str(one[case].item()) for case in AGREEMENT]
             toppled = f"{one.toppled.item():.3f}"
             answers.append((name, f"{v:g}", f"{one.agreement.item():.2f}", *counts, toppled, _speeds(one)))

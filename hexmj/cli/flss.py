@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures
 from hexmj.cli.sweepers import Sweepers
-from hexmj.cli.tables import physical_report, print_json, report_line, save_figure, show, table
+from hexmj.cli.tables import four_digits, physical_report, print_json, report_line, save_figure, show, table
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -101,7 +101,7 @@ class Flss(WalkingCommand):
             return
         columns = [name for name in columns if result[name].notnull().any()]  # no sample_sd of less than two samples
         at = {v: result.sel(velocity=v) for v in result.velocity.values}
-        rows = [(f"{v:g}", *(f"{one[c].item():.4g}" for c in columns)) for v, one in at.items()]
+        rows = [(f"{v:g}", *(four_digits(one[c].item()) for c in columns)) for v, one in at.items()]
         lines = [self.conditions_line(self.physical), *([report_line(report)] if report else [])]
         show(
             f"{self.kind} FLSS of {self.model}, {starts_in_words(self.n_starts)}",

@@ -41,6 +41,11 @@ def interval(one: "xr.Dataset", measure: str) -> str:
     return "-" if flss != flss else f"{flss:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
 
 
+def four_digits(value: float) -> str:
+    """A number to four digits, or to a whole one where it has more."""
+    return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
+
+
 def difference(one: "xr.Dataset", measure: str) -> str:
     """The same of a difference of two frequencies, with its signs."""
     middle, low, high = (one[measure + end].item() for end in ("", "_low", "_high"))

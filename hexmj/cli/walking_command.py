@@ -136,9 +136,10 @@ class WalkingCommand:
 
         gap, stride = self.conditions.numerics.contact_gap, self.walks.stride
         if gap != Numerics.contact_gap:
-            starts = draw_starts(1, self.walks.seed, stride)
+            starts, acceleration = draw_starts(1, self.walks.seed, stride), self.accelerating.procedure
             v = checked_list(np.unique(numbers("velocities", self.commanded)).tolist())[:1]
-            if not any(isinstance(begin(one, starts, v, stride, threads=1), ReadingPlan) for one in controllers):
+            plans = (begin(one, starts, v, stride, acceleration, threads=1) for one in controllers)
+            if not any(isinstance(plan, ReadingPlan) for plan in plans):
                 raise InputError(
                     f"--contact-gap = {gap:g} with falls only; expected it where a polygon is measured (compare, map,"
                     " converge, walk --physical) or the controller reads the legs"

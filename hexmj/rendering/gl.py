@@ -117,18 +117,18 @@ def drop_vain_wish() -> None:
 
 
 def vain_wish() -> str | None:
-    """What is asked for that draws nothing, in one sentence; None if something is, or anything will do."""
+    """What is asked for that draws nothing; None if something is, or anything will do."""
     if _VAIN:
-        return _sentence(f"MUJOCO_GL = {_VAIN[0]:.80} is not there; expected one of egl, glfw and osmesa that is")
+        return f"MUJOCO_GL = {_VAIN[0]:.80} is not there; expected one of egl, glfw and osmesa that is"
     if os.environ.get("MUJOCO_GL", "").lower().strip() in NONE:
-        return _sentence("MUJOCO_GL asks for nothing")
+        return "MUJOCO_GL asks for nothing"
     return None
 
 
 def missing() -> str | None:
     """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
     if told := vain_wish():
-        return told
+        return _sentence(told)
     try:
         check_not_forked()
         import mujoco
