@@ -50,7 +50,8 @@ class Gait:
     reached: np.ndarray
     """(start,) onset of leg 1 from which on the regime lasts [time units]; inf where it does not within the walk."""
     periodic: np.ndarray
-    """(start,) True if from some onset on all legs keep one period and their lags, over `CYCLES` cycles or more."""
+    """(start,) True if from some onset to the end all legs keep one period and their lags, over `CYCLES` cycles or
+    more."""
     stable: np.ndarray
     """(start,) True if static stability is kept throughout the last period of the walk; where there is no periodic
     regime, for `CYCLES` times the longest of the legs' last cycles, or all that is kept if a leg has none."""
@@ -176,7 +177,7 @@ def _regimes(
         if len(begin):
             looked_at[n] = CYCLES * (end - begin)[-1].max()
         settled = _settled(begin, end, _resolution(time))
-        if len(begin) - settled < CYCLES:
+        if len(begin) - settled < CYCLES or _has_ended(end, raised[legs], time):
             continue
         begin, touch, end = begin[settled:], touch[settled:], end[settled:]
         span = end[-1] - begin[0]
@@ -226,6 +227,14 @@ def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
     drift = (lag - lag[-1]) / period
     change = np.maximum(np.abs(length / period - 1.0), np.abs(drift - np.round(drift)))
     return _like_the_last(change, resolution / period)
+
+
+def _has_ended(end: np.ndarray, raised: list[np.ndarray], time: np.ndarray) -> bool:
+    """Whether a leg is not raised again where it is due within the walk, by the ends of its cycles, (cycle, leg)
+    [time units], and the rows of its onsets."""
+    last = time[[rows[-1] for rows in raised]]
+    due = last + (1.0 + TOLERANCE) * (end[-1, 0] - end[-2, 0]) + STEPS * _resolution(time)
+    return bool((due < time[-1]).any())
 
 
 def _like_the_last(change: np.ndarray, resolution: float) -> int:

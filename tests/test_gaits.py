@@ -170,6 +170,20 @@ def test_the_regime_begins_where_the_legs_fall_into_step():
     assert circle(found.phase, lags(TRIPOD[None])).max() < 0.001
 
 
+@pytest.mark.parametrize("legs", [[0], [4], [0, 1, 2, 3, 4, 5]])
+def test_legs_that_stop_stepping_end_the_regime(legs):
+    """Once they are overdue, by more than what a regime may vary; not while their next onset may still come."""
+    walked = ideal_walk(TRIPOD, cycles=30)
+    stops = np.searchsorted(walked.time, 950.0) + 1  # within 20 of all onsets, which are 25 apart
+    stance = walked.stance.copy()
+    stance[stops:, :, legs] = True
+    last = walked.time[[np.flatnonzero(~stance[1:, 0, leg] & stance[:-1, 0, leg])[-1] + 1 for leg in legs]]
+    for late, lasts in ((-1.0, True), (TOLERANCE * 50.0 + (STEPS + 2) * 0.05, False)):
+        until = slice(np.searchsorted(walked.time, last.min() + 50.0 + late))
+        assert gait(part(replace(walked, stance=stance), until)).periodic.all() == lasts
+    assert not gait(replace(walked, stance=stance)).periodic.any()
+
+
 def test_starts_do_not_mix():
     """A tripod between a start that is not periodic and one that never steps."""
     tripod = ideal_walk(TRIPOD)

@@ -131,9 +131,10 @@ def _in_parts(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     for part in (*body.trunk, *(part for leg in body.legs for part in leg.parts)):
         if model.body(part).rootid[0] != model.body(body.root).id:
             yield f"the part {part!r} does not hang on the root; expected it to, on {body.root!r}"
-    joints = [model.joint(i).name for i in range(1, model.njnt)]
-    for joint in (name for name in joints if name not in body.joints):
-        yield f"the joint {joint!r} is no leg's; expected none but the root's and the legs'"
+    joints = [model.joint(i) for i in range(1, model.njnt)]
+    for joint in (joint for joint in joints if joint.name not in body.joints):
+        which = f"the joint {joint.name!r}" if joint.name else f"a joint of {model.body(joint.bodyid[0]).name!r}"
+        yield f"{which} is no leg's; expected none but the root's and the legs'"
 
 
 def _in_options(model: mujoco.MjModel) -> Iterator[str]:
@@ -156,16 +157,25 @@ def _in_numbers(model: mujoco.MjModel) -> Iterator[str]:
         values = np.atleast_1d(attrgetter(rule.field)(model))[rule.of.rows]
         fits = ((rule.least <= values) & (values <= rule.most)).reshape(len(values), -1).all(axis=1)
         for i in np.flatnonzero(~fits):
-            name = mujoco.mj_id2name(model, rule.of.kind, i)
-            whose = f"{rule.of.called} {name!r}" if name else rule.of.called
+            whose = f"{rule.of.called} {_which(model, rule.of.kind, int(i))}".rstrip()
             yield f"{rule.called} = {values[i].tolist()}{whose}; expected {rule.expected}"
+
+
+def _which(model: mujoco.MjModel, kind: mujoco.mjtObj, i: int) -> str:
+    """The name of one of a kind; of a pair without one, those of its geoms."""
+    if name := mujoco.mj_id2name(model, kind, i):
+        return repr(name)
+    if kind == PAIR.kind:
+        return " and ".join(repr(model.geom(pairs[i]).name) for pairs in (model.pair_geom1, model.pair_geom2))
+    return ""
 
 
 def _in_contacts(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     most = SOFTEST * body.longest_step
     for i in np.flatnonzero(~((model.pair_solref > 0).all(axis=1) & (model.pair_solref[:, 0] <= most))):
+        which = _which(model, PAIR.kind, int(i))
         yield (
-            f"solref = {model.pair_solref[i].tolist()} of the pair {model.pair(i).name!r}; expected a time constant"
+            f"solref = {model.pair_solref[i].tolist()} of the pair {which}; expected a time constant"
             f" above 0 and at most {most:g} s, {SOFTEST:g} of its longest steps, and a damping ratio above 0"
         )
 

@@ -2,7 +2,7 @@
 
 Every law is one function of a trial, a controller with starts, velocities and a stride; it raises a sentence on the
 first thing that is wrong, as `checked_plans` does for all who walk.  On paper nobody knows the legs, so reach is that
-of the stride: tips within `REACH` and a step of its range.
+of the stride: tips within `REACH` and two steps of its range.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,9 +32,9 @@ ACCELERATION = Acceleration(rate=0.005, start=0.1)
 """Of a trial that accelerates: V = 0.3 is reached after 40 time units.  It begins with the least V_r that is asked for
 where all are above this start, or none is."""
 
-REACH = 0.9
-"""How far a tip may be beyond PEP_min or AEP_0 on its own axis [mm], besides a time step's way at V_p, by which legs
-overshoot both."""
+REACH = 0.8
+"""How far a tip may be beyond PEP_min or AEP_0 on its own axis [mm], besides two time steps' way at V_p: legs overshoot
+both by a step, and one that is raised out there swings for another."""
 
 BESIDE = 0.5
 """How far a tip may be from its leg's line, as a part of the line's distance from the body axis."""
@@ -175,7 +175,7 @@ def _times(trial: Trial) -> None:
 def _reach(trial: Trial) -> None:
     stride, walk = trial.stride, trial.walk
     line, span = np.array(stride.geometry.y), stride.aep0 - stride.pep0
-    beyond, aside = REACH + stride.dt, BESIDE * np.abs(line)
+    beyond, aside = REACH + 2 * stride.dt, BESIDE * np.abs(line)
     along = stride.pep_min - beyond, stride.aep0 + beyond
     limits = {"x": along, "y": (line - aside, line + aside), "aep": along, "height": (-span / 2, span)}
     for name, (low, high) in limits.items():
