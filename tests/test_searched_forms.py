@@ -3,7 +3,7 @@
 import math
 from contextlib import nullcontext
 from dataclasses import InitVar, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -268,6 +268,22 @@ def test_a_search_begins_with_the_fields_that_it_does_not_choose(least, sentence
     begin = Picky(good=2.005, least=least, name="begun")
     with pytest.raises(InputError, match=sentence) if sentence else nullcontext():
         assert FieldsForm(Picky()).vector(begin).tolist() == [2.005, -0.5]
+
+
+class Gains(NamedTuple):
+    a: float = 1.0
+
+
+@dataclass(frozen=True)
+class Gained(Pace):
+    """With a record."""
+
+    gains: Gains = field(default_factory=Gains)
+
+
+def test_a_field_that_does_not_fit_is_shown_as_python_writes_it():
+    with pytest.raises(InputError, match=r"has gains = Gains\(a=2\.0\); expected Gains\(a=1\.0\), as of"):
+        FieldsForm(Gained()).vector(Gained(gains=Gains(2.0)))
 
 
 @dataclass(frozen=True)

@@ -121,8 +121,10 @@ class Settling:
         if conditions.contact.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
         touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
+        speed, at_rest = np.linalg.norm(batch.qvel[:, :3], axis=1), conditions.body.lengths.speed_at_rest
+        moving = speed[np.argmax(speed > at_rest)]
         for name, failed in {
-            "it still moves": np.linalg.norm(batch.qvel[:, :3], axis=1) > conditions.body.lengths.speed_at_rest,
+            f"it still moves at {moving:.3g} mm/s; expected at most {at_rest:g} mm/s": speed > at_rest,
             "a foot is off the ground": (touch <= 0).any(axis=1),
             "its feet carry less than half of its weight": touch.sum(axis=1) < 0.5 * compiled.weight,
             "the trunk is on the ground": (trunk > 0).any(axis=1),

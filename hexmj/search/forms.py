@@ -6,6 +6,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from hexmj.checks import short
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.sweeps.plain_settings import plain
@@ -96,8 +97,10 @@ class FieldsForm:
             raise InputError(f"{controller.name} to begin with; expected a {type(self.usual).__name__}")
         of: Any = self.usual
         for name in (one.name for one in fields(of) if one.init and one.name not in (*self.names, "name")):
-            here, there = (plain(getattr(one, name)) for one in (of, controller))
-            if repr(here) != repr(there):  # nan is nan
+            values = [getattr(one, name) for one in (of, controller)]
+            plainly = [repr(plain(value)) for value in values]
+            if plainly[0] != plainly[1]:  # nan is nan
+                here, there = map(short, values) if short(values[0]) != short(values[1]) else plainly
                 told = f"{name} = {there}; expected {here}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
         return np.array([getattr(controller, name) for name in self.names], dtype=float)
