@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
-from hexmj.cli.tables import print_json, save_figure, show
+from hexmj.cli.tables import four_digits, print_json, save_figure, show
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.conditions import FootPath, TimeScale
 from hexmj.storage.results import results_folder
@@ -69,5 +69,5 @@ class Walk(WalkingCommand):
 def _told(key: str, value: Any) -> str:
     """A number of a walk, or that there is none; a time in words."""
     if key in TIMES:
-        return f"at {value:.4g} time units" if math.isfinite(value) else "none within the walk"
-    return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else f"{value:.4g}"
+        return f"at {four_digits(value)} time units" if math.isfinite(value) else "none within the walk"
+    return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else four_digits(value)
