@@ -89,6 +89,12 @@ class CompiledBody:
         """How deep feet in the world, (..., axis) [mm], are in the ground, (...) [mm]; negative above it."""
         return depth_in_ground(self.conditions.ground, self.body.lengths, feet, self.foot_radius)
 
+    def carried(self, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Force of the ground on each foot along its normal, (..., leg), adhesion taken off [g mm/s^2]: below 0 where
+        that holds a foot that pulls; from what sensors show, (..., column), and actuators do, (..., actuator)."""
+        touch, held = sensors[..., self.columns.touch], force[..., self.columns.grasp]
+        return np.where(touch > 0, touch - held, touch) if held.size else touch.copy()
+
     def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Joint angles that put the tips where they are wanted in the root frame, (..., leg, axis) [mm].
 

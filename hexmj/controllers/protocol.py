@@ -62,7 +62,8 @@ class Sensed:
     lost: np.ndarray
     """(n, leg) contact a step before, and none now."""
     load: np.ndarray
-    """(n, leg) force of the ground along its normal [g mm/s^2]; an insect of 1 g weighs 9810."""
+    """(n, leg) force of the ground along its normal [g mm/s^2]; an insect of 1 g weighs 9810.  Adhesion is taken off:
+    below 0 it holds a foot that pulls."""
     joints: np.ndarray
     """(n, leg, joint) angles [rad]."""
     torques: np.ndarray

@@ -42,7 +42,8 @@ class PhysicalWalk:
     height: np.ndarray
     """(step, start, leg) of the feet above the ground [mm]; below 0 where they sink in."""
     load: np.ndarray
-    """(step, start, leg) normal force of the ground on the feet [g mm/s^2]."""
+    """(step, start, leg) force of the ground on the feet along its normal [g mm/s^2], adhesion taken off: below 0 where
+    that holds a foot that pulls."""
     conditions: Conditions
     """Of the walk."""
     stride: Stride

@@ -24,7 +24,7 @@ from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settled
 from hexmj.walks import PlannedWalk, joined
 
-SHOWN = ("qpos", "sensors", "standing", "targets", "force", "torque", "depth")
+SHOWN = ("qpos", "sensors", "standing", "load", "targets", "force", "torque", "depth")
 """What is shown of every start, see `Chunk`."""
 
 
@@ -44,6 +44,8 @@ class Chunk:
     """(n, substep, column), see `compiled.Columns`; the ground's forces are means over a step in parts."""
     standing: np.ndarray
     """(n, substep, leg) whether the ground carried the foot within the last `Numerics.contact_gap`."""
+    load: np.ndarray
+    """(n, substep, leg) force of the ground on the foot along its normal, adhesion taken off [g mm/s^2]."""
     targets: np.ndarray
     """(n, substep, leg, 3) where the tips shall be, in the root frame [mm]."""
     force: np.ndarray
@@ -139,10 +141,12 @@ class Insects:
             shown = self._steps.take(ids, orders.control)
         except Diverged as error:
             raise self._error(error, orders) from None
+        standing, load = self._senses.feel(ids, shown["sensors"], shown["force"])
         return shown | {
             "qpos": np.concatenate([before, shown["after"][:, :-1, :width]], axis=1),
             "force": shown["force"][:, :, self._columns.ctrl],
-            "standing": self._senses.feel(ids, shown["sensors"], shown["force"]),
+            "standing": standing,
+            "load": load,
             "targets": orders.tips,
         }
 

@@ -40,14 +40,15 @@ def measured_walk(
 
 
 def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How high the feet are above the ground [mm], and what it carries them with [g mm/s^2], both (step, n, leg).
+    """How high the feet are above the ground [mm], and what it carries them with, adhesion taken off [g mm/s^2], both
+    (step, n, leg).
 
     They are those in some columns of a chunk's substeps, (step,); NaN after a fall.
     """
     sensors, compiled = chunk.sensors[:, columns], settled.compiled
     feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
     shown = (columns < chunk.valid[:, None])[..., None]
-    values = -compiled.depth(feet), sensors[..., compiled.columns.touch]
+    values = -compiled.depth(feet), chunk.load[:, columns]
     height, load = (np.where(shown, one, np.nan).swapaxes(0, 1) for one in values)
     return height, load
 

@@ -30,8 +30,9 @@ class Senses:
         self._unloaded[ids], self._before[ids] = 0, True
         self._load[ids], self._torques[ids] = settled.load, settled.torques
 
-    def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Which feet of some starts stand after each of the next substeps, (n, substep, leg).
+    def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which feet of some starts stand after each of the next substeps, and the force of the ground on them along
+        its normal, adhesion taken off [g mm/s^2]; both (n, substep, leg).
 
         Args:
             ids: of the starts, (n,).
@@ -72,13 +73,18 @@ class Senses:
 def _feel(ids: Any, sensors: Any, force: Any, touch: int, longest_gap: int, felt: Any) -> Any:
     """`Senses.feel`; `felt` goes on: substeps without load and load (start, leg), and torques (start, joint)."""
     unloaded, load, torques = felt
+    joints = torques.shape[1]
+    grasps = force.shape[2] > joints
     standing = np.empty((len(ids), sensors.shape[1], 6), dtype=np.bool_)
+    loads = np.empty(standing.shape)
     for i, start in enumerate(ids):
         for t in range(sensors.shape[1]):
             for leg in range(6):
-                load[start, leg] = sensors[i, t, touch + leg]
-                unloaded[start, leg] = 0 if load[start, leg] > 0 else unloaded[start, leg] + 1
+                pressed = sensors[i, t, touch + leg]
+                loads[i, t, leg] = pressed - force[i, t, joints + leg] if grasps and pressed > 0 else pressed
+                unloaded[start, leg] = 0 if pressed > 0 else unloaded[start, leg] + 1
                 standing[i, t, leg] = unloaded[start, leg] <= longest_gap
-        for joint in range(torques.shape[1]):
+        load[start] = loads[i, -1]
+        for joint in range(joints):
             torques[start, joint] = force[i, -1, joint]
-    return standing
+    return standing, loads

@@ -40,7 +40,7 @@ class Settled:
     ctrl: np.ndarray
     """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion where they grasp."""
     load: np.ndarray
-    """(start, leg) normal force of the ground on each foot [g mm/s^2]."""
+    """(start, leg) force of the ground on each foot along its normal, adhesion taken off [g mm/s^2]."""
     torques: np.ndarray
     """(start, joint) of the servos [g mm^2/s^2]."""
     compiled: CompiledBody
@@ -120,20 +120,21 @@ class Settling:
             raise walk_error(error, "settling", 0.0, conditions) from None
         if conditions.contact.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
-        touch, trunk = batch.sensors[:, columns.touch].copy(), batch.sensors[:, columns.trunk]
+        touch, trunk = batch.sensors[:, columns.touch], batch.sensors[:, columns.trunk]
+        load = compiled.carried(batch.sensors, batch.force)
         speed, at_rest = np.linalg.norm(batch.qvel[:, :3], axis=1), conditions.body.lengths.speed_at_rest
         moving = speed[np.argmax(speed > at_rest)]
         for name, failed in {
             f"it still moves at {moving:.3g} mm/s; expected at most {at_rest:g} mm/s": speed > at_rest,
             "a foot is off the ground": (touch <= 0).any(axis=1),
-            "its feet carry less than half of its weight": touch.sum(axis=1) < 0.5 * compiled.weight,
+            "its feet carry less than half of its weight": load.sum(axis=1) < 0.5 * compiled.weight,
             "the trunk is on the ground": (trunk > 0).any(axis=1),
         }.items():
             if failed.any():
                 start = names[np.argmax(failed)]
                 raise SimulationError(f"start {start} did not settle in {settling_time:g} ms: {name}")
         torques = batch.force[:, columns.ctrl].copy()
-        return Settled(x, batch.states(np.arange(len(x))), ctrl, touch, torques, compiled, conditions, stride)
+        return Settled(x, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride)
 
     def _begun(self, count: int) -> MujocoBatch:
         """As many bodies that have not moved yet; those of last time, where they were as many."""

@@ -171,8 +171,9 @@ class LoadedPlan(LiftedPlan):
         """Take in the loads; a start whose feet all hang in the air has none."""
         if self._felt is None:
             self._felt = np.full(self.starts.shape, np.nan)
-        whole = sensed.load.sum(axis=1, keepdims=True)
-        self._felt[sensed.ids] = np.divide(sensed.load, whole, out=np.zeros_like(sensed.load), where=whole > 0)
+        pressed = np.maximum(sensed.load, 0.0)  # where adhesion holds a foot that pulls there is no weight on it
+        whole = pressed.sum(axis=1, keepdims=True)
+        self._felt[sensed.ids] = np.divide(pressed, whole, out=np.zeros_like(pressed), where=whole > 0)
 
     def _load(self, stands: np.ndarray) -> np.ndarray:
         planned = _equal_parts(stands)

@@ -1,4 +1,5 @@
-"""How far the walking insect is from its plan: a cell of the static limit."""
+"""How far the walking insect is from its plan, or, if the plan reads the legs, from what these were told: a cell of the
+static limit."""
 
 from typing import TYPE_CHECKING
 
@@ -48,8 +49,8 @@ def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Datas
 
 def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
     """`DISTANCES` of every start, (start,); NaN where the plan is lost at once."""
-    planned, measured, near, outcomes = walk.planned, walk.measured, grounded(walk), walk.outcomes
-    compared = planned.time[:, None] < np.minimum(outcomes.planned_loss, outcomes.fall)
+    planned, measured, near = walk.ordered, walk.measured, grounded(walk)
+    compared = planned.time[:, None] < np.minimum(loss_time(planned), walk.outcomes.fall)
     wanted, pressure = walk_margin(planned), pressure_margin(walk)
     with np.errstate(invalid="ignore"):  # where no foot stands in either, which does not count
         off, off_grounded = (np.abs(walk_margin(one) - wanted) for one in (measured, near))
