@@ -161,7 +161,8 @@ def _fitted(value: Any, wanted: Any) -> Any:
         if isinstance(value, list | tuple | range) or getattr(value, "ndim", 0):
             kinds = inner[:1] * len(value) if _is_of_any_length(wanted) else inner
             if len(kinds) == len(value):
-                return tuple(_fitted(one, kind) for one, kind in zip(value, kinds, strict=True))
+                values = getattr(value, "values", value)  # an iterated DataArray gives more of them
+                return tuple(_fitted(one, kind) for one, kind in zip(values, kinds, strict=True))
     elif wanted in (int, float):
         if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool | np.timedelta64):
             with suppress(OverflowError):  # a whole number beyond all floats stays what it is

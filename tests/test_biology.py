@@ -128,6 +128,15 @@ def test_quantities_agree_with_each_other_and_with_the_plan(walking):
         assert heights == sorted(heights, reverse=True)
 
 
+def test_work_is_of_the_insects_own_mass_whatever_it_carries(walking):
+    strides, compiled = walking[0][min(walking[0])], settle(draw_starts(1, 0)).compiled
+    carrying = replace(compiled, conditions=Conditions.of(load=1.0))
+    alone, together = (quantities(strides, one) for one in (compiled, carrying))
+    name = "work on the centre of mass"
+    assert together.pop(name) == 2.0 * alone.pop(name)
+    assert together == pytest.approx(alone, nan_ok=True)
+
+
 def test_a_leg_that_never_carries_counts_nowhere(walking):
     """As an amputee's."""
     strides, told = walking

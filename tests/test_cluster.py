@@ -221,6 +221,13 @@ def test_an_executor_that_is_shut_down_meanwhile_is_a_sentence(tmp_path: Path) -
     assert 1 <= len(contents(tmp_path / "kept")) < 6
 
 
+def test_an_executor_that_gives_no_future_is_a_sentence(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit = lambda *asked: 3  # pyright: ignore[reportAttributeAccessIssue]
+        with pytest.raises(InputError, match=r"gave 3; expected a concurrent\.futures\.Future"):
+            run(counted_cells(tmp_path, 2), tmp_path / "kept", executor=pool)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("gone", few_of(["scheduler", "ctrl-c"], "scheduler"))
 def test_a_command_that_loses_its_scheduler_or_is_stopped_keeps_what_is_finished(tmp_path: Path, gone: str) -> None:

@@ -1,11 +1,12 @@
 """Disturbed walks: the plan that meets a disturbance, and the strategies."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, ReadsLegs, Stride
+from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, ReadsLegs, Stride, physical_walk
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Sensed
@@ -55,6 +56,25 @@ def sensed(ids, tips, gained) -> Sensed:
 
 def same(one, other):
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("velocity", "x", "stance"))
+
+
+def test_the_leg_that_is_stopped_is_one_that_protracts_as_the_legs_are_told():
+    """Where none does, the next one that does."""
+    stopped = Disturbance("leg", np.array([4, 4, 4]), np.array([1, 4, 5]))
+    up = ~np.eye(6, dtype=bool)[[3, 4, 2]]
+    tips, standing = stopped.legs(np.zeros((3, 6)), up)
+    assert standing.all() and not tips.any()
+    up[1] = True
+    assert stopped.awaited(up).tolist() == [False, True, False]
+    assert not replace(stopped, kind="halt").awaited(up).any()
+    for asked in (disturbance("leg"), replace(disturbance("leg"), leg=(disturbance("leg").leg + 3) % 6)):
+        reading = ReadsLegs(Disturbed(LDVS, asked))
+        walks = [physical_walk(STABLE.starts, one, V, STEPS * STRIDE.dt) for one in (reading, ReadsLegs(LDVS))]
+        stance = [one.ordered.stance for one in walks]
+        for start in np.flatnonzero(walks[1].outcomes.fall > (asked.step + 200) * STRIDE.dt):
+            first = np.flatnonzero((stance[0][:, start] != stance[1][:, start]).any(axis=1))[0] + 1
+            assert asked.step[start] < first < asked.step[start] + 200
+            assert stance[0][first - 1, start].sum() > stance[1][first - 1, start].sum()
 
 
 def test_a_push_does_not_change_the_plan():

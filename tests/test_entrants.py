@@ -81,6 +81,14 @@ def test_controllers_of_files_have_short_names_and_all_different_ones(tmp_path: 
     ("given", "said"),
     [
         (lambda: League({"ldvs": hexmj.LDVS}), "entrants\\['ldvs'\\] = .* expected an Entrant"),  # pyright: ignore
+        (
+            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions.of(load=2.0)),
+            "load = 2.0; expected 0.0, since",
+        ),
+        (
+            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions.of(ground="step")),
+            "ground = 'step'; expected",
+        ),
         (lambda: League(entrants(("ldvs",)), periods=0), "periods = 0; expected a whole number of at least 12"),
         (lambda: Entrant(hexmj.load_controller("graham"), "no"), "ideal = 'no'; expected True or False"),  # pyright: ignore
         (lambda: Metronome("tripod"), "wave = 'tripod'; valid names: wilson, graham"),  # pyright: ignore

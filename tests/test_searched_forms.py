@@ -2,7 +2,8 @@
 
 import math
 from contextlib import nullcontext
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.controllers import Step, stepwise
-from hexmj.errors import InputError
+from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
 from hexmj.search.network_forms import FORMS
 from hexmj.search.samples import Sample
@@ -110,6 +111,26 @@ def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_o
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
 
+def test_a_candidate_whose_simulation_fails_costs_as_one_that_loses_all_and_is_not_found(monkeypatch):
+    """A start that does not settle is no candidate's fault."""
+
+    def outcomes(settled, controller, *args, **how):
+        if controller.good < 2:
+            raise SimulationError("start 0 diverged")
+        return SimpleNamespace(fall=np.full(len(settled.starts), np.inf))
+
+    monkeypatch.setattr("hexmj.measures.physical.physical_outcomes", outcomes)
+    problem = Problem(FieldsForm(Pace()), 0.3, 0.3, window=5.0, conditions=hexmj.Conditions())
+    assert Sample(problem, 2, 0).costs(np.array([[1.5, -0.5], [2.5, -0.5]])).tolist() == [1.0, 0.0]
+    found = search(problem, Effort(starts=2, budget=10, refine_budget=0))
+    assert found.vector[0] >= 2 and found.cost == 0
+    restless = replace(problem, conditions=hexmj.Conditions.of(settling_time=1.0))
+    with pytest.raises(SimulationError, match="did not settle"):
+        Sample(restless, 2, 0).costs(np.array([[2.5, -0.5]]))
+    with pytest.raises(SimulationError, match=r"with good = 1, .* does not walk from its 2 starts: start 0 diverged"):
+        Sample(problem, 2, 0).check_walks(np.array([1.0, -0.5]), "population")
+
+
 class TooFast(InputError):
     """Of a user's own."""
 
@@ -171,11 +192,19 @@ def test_starts_that_cannot_stand_are_refused_before_a_candidate_walks():
 @pytest.mark.parametrize(
     ("form", "sentence"),
     [
-        (lambda: FieldsForm(Pace(good=math.nan)), "the form's box is"),
-        (lambda: FieldsForm(Pace(good=math.inf)), "the form's box is"),
-        (lambda: FieldsForm(Pace(good=1e308)), "the form's box is"),
+        (
+            lambda: FieldsForm(Pace(good=math.nan)),
+            "the form's box of good is nan to nan; expected a least",
+        ),
+        (
+            lambda: FieldsForm(Pace(good=math.inf)),
+            r"form's box of good is 0 to inf; expected .*, each within 1e\+30",
+        ),
+        (lambda: FieldsForm(Pace(good=1e308)), "the form's box of good is"),
+        (lambda: FieldsForm(Pace(idle="3")), "idle = '3'; expected a number"),  # pyright: ignore[reportArgumentType]
+        (lambda: FieldsForm(Pace(idle=True)), "idle = True; expected a number"),
         (lambda: Askew(box_is=([0.0, 0.0], [1.0])), "box of the form = .*; expected numbers"),
-        (lambda: Askew(box_is=([1.0, 1.0], [0.0, 1.0])), "the form's box is"),
+        (lambda: Askew(box_is=([1.0, 1.0], [0.0, 1.0])), "the form's box of good is 1 to 0"),
         (lambda: Askew(begin=np.zeros(3)), "a search begins at .*; expected 2 finite numbers"),
         (lambda: Askew(binary=np.zeros(3, dtype=bool)), "the form's binary = .*; expected True or False for 2"),
         (lambda: Askew(binary=[False, False]), "binary of the form = .*; expected an array"),

@@ -104,6 +104,14 @@ def test_finished_walks_are_not_walked_again(slower, monkeypatch):
     assert sum(told) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
+def test_who_reads_the_legs_is_measured_against_what_these_are_told():
+    walk = physical_walk(draw_starts(6, 0), load_controller("tegotae"), 0.5, 60.0, conditions=Conditions.of(vp=20.0))
+    on_paper = replace(walk, ordered=walk.planned)
+    told, planned = (distances(one)["same_feet"].mean() for one in (walk, on_paper))
+    assert told > 1.02 * planned
+
+
 @pytest.mark.thorough
 def test_a_controller_may_read_the_legs(slower):
     few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}

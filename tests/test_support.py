@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj import LDVS, Conditions, draw_starts, loss_time, physical_walk, walk_margin
+from hexmj import LDVS, STICK_INSECT, Conditions, draw_starts, loss_time, physical_walk, walk_margin
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.measures.support import GROUNDED, centre_of_pressure, grounded, pressure_margin
+from hexmj.physics.settling import settle
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,19 @@ def test_at_rest_the_feet_press_below_the_centre_of_mass(resting):
     assert_allclose(centre_of_pressure(resting), 0.0, atol=0.02)  # mm
     assert_allclose(pressure_margin(resting), walk_margin(resting.measured), atol=0.02)
     assert_allclose(walk_margin(grounded(resting)), walk_margin(resting.planned), atol=0.5)
+
+
+def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_they_grasp():
+    """Adhesion pulls feet and ground together, and carries nothing."""
+    starts, weight = draw_starts(6, 0), STICK_INSECT.mass * 9810.0
+    far = []
+    for grasp in (0.0, 1.0, 5.0):
+        conditions = Conditions.of(vp=20.0, grasp=grasp)
+        assert_allclose(settle(starts, conditions).load.sum(axis=1), weight, rtol=0.01)
+        walk = physical_walk(starts, LDVS, 0.3, 60.0, conditions=conditions)
+        assert_allclose(walk.load.sum(axis=-1).mean(), weight, rtol=0.02)
+        far.append(np.linalg.norm(centre_of_pressure(walk), axis=-1).mean())
+    assert_allclose(far, far[0], rtol=0.1)
 
 
 def test_the_centre_of_pressure_lies_between_the_feet_that_carry(walked):

@@ -1,5 +1,6 @@
 """The words behind `hexmj`: which can be read, which decide what comes of a command, and what files they name."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -21,6 +22,9 @@ NO_TOML = (".py", ".nc")
 SHELLS = ("bash", "zsh", "fish")
 """Shells that can be told how the command goes on."""
 
+EMPTY = re.compile("--[^=]*=")
+"""An option whose value is empty, as one that a shell's variable should have told."""
+
 _TYPED: ContextVar[Sequence[str]] = ContextVar("typed", default=())
 _OWN: ContextVar[Mapping[Path, str]] = ContextVar("own", default=MappingProxyType({}))
 
@@ -31,7 +35,7 @@ def checked(words: list[str]) -> list[str]:
     Raises:
         InputError: a word that is empty, no print, or a book, or an option that is given twice or is tyro's own.
     """
-    if alone := [word for word in words if word in ("", "--")]:
+    if alone := [word for word in words if word in ("", "--") or EMPTY.fullmatch(word)]:
         raise InputError(f"{alone[0]!r} was given; expected options, each with its values, none of them empty")
     options = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
     if any(option.startswith("--tyro-") for option in options):

@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, show, table
-from hexmj.errors import InputError
+from hexmj.errors import InputError, check_distinct
 from hexmj.storage.results import results_folder
 
 
@@ -41,6 +41,9 @@ class Reproduce:
             raise InputError("--only without keys; expected at least one, or no --only for all")
         if self.beside == ():
             raise InputError("--beside without names; expected at least one, or no --beside for none")
+        for option, given in (("--only", self.only), ("--beside", self.beside)):
+            if given:
+                check_distinct(option, given)
         results_folder(self.out, (MANIFEST,))
         beside = self.beside or ()
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)

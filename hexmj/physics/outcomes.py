@@ -172,7 +172,8 @@ class OutcomesSoFar:
         for name in NUMBERS:
             if (wrong := np.isnan(getattr(found, name))).any():
                 start = int(np.argmax(wrong))
-                error = Diverged(start, f"its {name} is no number", self._settled.saved(start))
+                kinds = f"its {name} is no number" + (", since no foot has stood" if name == "slip" else "")
+                error = Diverged(start, kinds, self._settled.saved(start))
                 raise walk_error(error, "walking", 0.0, self._settled.conditions)
         return found
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from hexmj.checks import short
+from hexmj.checks import short, typed
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.sweeps.plain_settings import plain
@@ -103,4 +103,4 @@ class FieldsForm:
                 here, there = map(short, values) if short(values[0]) != short(values[1]) else plainly
                 told = f"{name} = {there}; expected {here}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")
-        return np.array([getattr(controller, name) for name in self.names], dtype=float)
+        return np.array([typed(name, getattr(controller, name), float) for name in self.names])

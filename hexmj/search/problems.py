@@ -98,8 +98,11 @@ class Problem:
         box = numbers("box of the form", form.box(reach))
         where = form.begin if begin is None else form.vector(begin)
         where = None if where is None else numbers("begin of the form", where)
-        if box.shape != (2, size) or not ((np.abs(box) <= MOST) & (box[0] < box[1])).all():
+        if box.shape != (2, size):
             raise InputError(f"the form's box is {box}; expected a least and a greatest value of its {size} parameters")
+        if (odd := np.flatnonzero(~((np.abs(box) <= MOST).all(axis=0) & (box[0] < box[1])))).size:
+            told = f"the form's box of {form.names[odd[0]]} is {box[0, odd[0]]:g} to {box[1, odd[0]]:g}"
+            raise InputError(f"{told}; expected a least and a greatest value, each within {MOST:g} of 0")
         if where is not None and (where.shape != (size,) or not (np.abs(where) <= MOST).all()):
             raise InputError(f"a search begins at {where}; expected {size} finite numbers")
         typed("binary of the form", form.binary, np.ndarray)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from hexmj.physics.settling import Settled
 
 REFUSED = 1.0
-"""Cost of a candidate that its controller refuses, at once or to walk, or whose tips no leg reaches: as if every start
-lost stability."""
+"""Cost of a candidate that its controller refuses, at once or to walk, whose tips no leg reaches, or of which a start's
+simulation fails: as if every start lost stability."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +108,8 @@ class Sample:
 
     def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
         """G of each candidate, (candidate,), of this one variant."""
+        if self.problem.conditions:
+            self._settled(self.problem.conditions, threads)  # a start that cannot stand is no candidate's fault
 
         def cost(vector: np.ndarray, threads: int | None) -> float:
             try:
@@ -120,7 +122,7 @@ class Sample:
                 ) from error
             try:
                 return self._cost(candidate, threads)
-            except (OutOfReach, Refused):
+            except (OutOfReach, Refused, SimulationError):
                 return REFUSED
             except InputError as error:
                 raise InputError(f"with {self._told(vector)}: {error}") from None
@@ -156,15 +158,17 @@ class Sample:
 
         Raises:
             InputError: its controller refuses to walk, or its tips no leg reaches in physics.
+            SimulationError: a start's simulation fails.
         """
         for one in self.variants.values():
+            who = f"the best candidate of the {stage}, with {self._told(best)},"
+            who += f" does not walk from its {self.n_starts} starts"
             try:
                 one._times(one.problem.controller(best), [one.problem.window], threads)
             except InputError as error:
-                raise InputError(
-                    f"the best candidate of the {stage}, with {self._told(best)}, does not walk from its"
-                    f" {self.n_starts} starts: {error}"
-                ) from None
+                raise InputError(f"{who}: {error}") from None
+            except SimulationError as error:
+                raise SimulationError(f"{who}: {error}", error.state, error.file_name) from None
 
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None

@@ -94,8 +94,8 @@ class Found:
     replayed: int
     """Different candidates whose cost an earlier run had kept."""
     refused: list[str]
-    """Why the controller refused candidates as they were made, which cost 1 each; so do those that refuse to walk or
-    reach too far, of which nothing is told."""
+    """Why the controller refused candidates as they were made, which cost 1 each; so do those that refuse to walk, that
+    reach too far or whose simulation fails, of which nothing is told."""
 
 
 def search(
@@ -119,7 +119,7 @@ def search(
     Raises:
         InputError: settings that make no sense, a file that is damaged or cannot be written, a folder in use, or a
             best candidate that its controller refuses, as where it refuses all.
-        SimulationError: a physical walk that failed; the evaluations before it are kept.
+        SimulationError: a start that does not settle, or a best candidate whose simulation fails.
     """
     typed("problem", problem, Problem)
     typed("effort", effort, Effort)
@@ -142,7 +142,7 @@ def _search(
     sizes = {"population": effort.starts} | ({"simplex": effort.refine_starts} if refine_budget else {})
     samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
     for sample in samples.values():
-        sample.settle(threads)  # a start that cannot stand is no candidate's fault
+        sample.settle(threads)
     searcher = _searcher(effort, domain)
     kept = {
         stage: KeptValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()

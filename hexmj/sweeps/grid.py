@@ -282,8 +282,11 @@ def _submitted(executor: Executor, parcel: _Parcel, mark: Path | None) -> "Futur
     if has_given_up(executor):
         raise InputError(f"executor = {executor!r:.80} has lost its scheduler; expected one of a client that has one")
     try:
-        return executor.submit(parcel, mark)
+        future = executor.submit(parcel, mark)
     except BrokenExecutor:
         raise
     except RuntimeError as error:  # it was shut down
         raise InputError(f"executor = {executor!r:.80}: {error}") from None
+    if not isinstance(future, Future):
+        raise InputError(f"executor = {executor!r:.80} gave {short(future)}; expected a concurrent.futures.Future")
+    return future

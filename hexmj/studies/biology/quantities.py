@@ -145,13 +145,15 @@ def _posture(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
 
 
 def _work(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
-    """Work over weight and way; negative work of a joint is lost, and costs nothing or as much as positive work."""
+    """Work over the insect's own weight, whatever it carries, and way; negative work of a joint is lost, and costs
+    nothing or as much as positive work."""
     power, gravity = strides.torques * strides.turning, compiled.weight / compiled.body.mass
     rate = compiled.weight * _ahead(strides).mean()
     positive = np.maximum(power, 0.0).sum(axis=1).mean() / rate
     centre = np.stack([_seen(one, FRAME / strides.step) for one in strides.centre.T], axis=1)
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=1) / strides.step
     gained = np.maximum(np.diff(0.5 * speed**2 + gravity * centre[1:, 2]), 0.0).sum()
+    gained *= 1.0 + compiled.conditions.masses.load  # which moves with it
     return {
         "cost of transport, positive work": positive,
         "cost of transport, all work": np.abs(power).sum(axis=1).mean() / rate,

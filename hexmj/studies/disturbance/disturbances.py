@@ -47,7 +47,7 @@ class Disturbance:
     step: np.ndarray
     """(start,) steps of the plan before it."""
     leg: np.ndarray
-    """(start,) index of the leg that kind 'leg' stops."""
+    """(start,) index of the leg that kind 'leg' stops, or, where that stands, of the first after it that does not."""
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
@@ -61,12 +61,18 @@ class Disturbance:
         """That of some starts, (n,) indices."""
         return replace(self, step=self.step[which], leg=self.leg[which])
 
+    def awaited(self, standing: np.ndarray) -> np.ndarray:
+        """Which starts, (start,), cannot be disturbed now, with these states, (start, leg): no leg protracts."""
+        return (self.kind == "leg") & np.all(standing, axis=1)
+
     def legs(self, tips: np.ndarray, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tips [mm] and states, both (start, leg), with which every start goes on if it is disturbed now."""
         if self.kind == "halt":
             return tips, np.ones_like(standing)
         if self.kind == "leg":
-            return tips, standing | (np.arange(6) == self.leg[:, None])
+            inorder = (self.leg[:, None] + np.arange(6)) % 6
+            first = np.argmin(np.take_along_axis(standing, inorder, axis=1), axis=1)
+            return tips, standing | (np.arange(6) == (self.leg + first)[:, None] % 6)
         return tips, standing
 
 

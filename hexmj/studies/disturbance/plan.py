@@ -23,7 +23,8 @@ class Disturbed:
 
     Without a strategy a halted body stands for `PAUSE`, then the plan starts from there; any other goes on at once.
     With postures it is halted too, reorganises its legs and goes on from the posture, its states included.  With an
-    acceleration it goes on with V_r(0), and Eq. 11 brings it back to V.
+    acceleration it goes on with V_r(0), and Eq. 11 brings it back to V.  Where the plan is told of the legs, the leg
+    that is stopped is one that protracts as they are then; if none does, the next one that does.
     """
 
     controller: SteerableController
@@ -68,6 +69,7 @@ class DisturbedPlan:
         self._plan, self._disturbance, self._postures = plan, controller.disturbance, controller.postures
         self.starts, self.stride, self.done = plan.starts, plan.stride, 0
         self.made_for, self._slows = getattr(plan, "made_for", None), controller.slows
+        self._step, self._told = self._disturbance.step.copy(), False
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, Rest] = {}
         self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
@@ -80,15 +82,19 @@ class DisturbedPlan:
         """The next `steps` steps; they do not depend on how the walk is divided into calls."""
         end, parts = self.done + steps, []
         while self.done < end:
-            self._disturb(self._disturbance.step == self.done)
+            now = self._step == self.done
+            awaited = now & self._told & self._disturbance.awaited(self._plan.standing)
+            self._step[awaited] += 1
+            self._disturb(now & ~awaited)
             self._resume(self.resumed == self.done)
-            coming = np.concatenate([self._disturbance.step, self.resumed, [end]])
+            coming = np.concatenate([self._step, self.resumed, [end]])
             parts.append(self._go_on(int(coming[coming > self.done].min()) - self.done))
         return joined(parts)
 
     def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
         """Go on from these tips [mm] and states, both (start, leg); a start that rests keeps to its rest."""
         self._plan.see(tips, standing)
+        self._told = True
 
     @property
     def tips(self) -> np.ndarray:
@@ -147,7 +153,7 @@ class DisturbedPlan:
         self.done, self._beside = self.done + steps, walk.y[-1].copy()
         for start, rest in self._rests.items():
             if before < self.resumed[start]:
-                rows = slice(before - self._disturbance.step[start], before - self._disturbance.step[start] + steps)
+                rows = slice(before - self._step[start], before - self._step[start] + steps)
                 walk.velocity[:, start] = 0.0
                 walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
                 walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
@@ -160,4 +166,5 @@ class DisturbedReadingPlan(DisturbedPlan):
 
     def sense(self, sensed: Sensed) -> None:
         """Hand on what the legs tell."""
+        self._told = True
         self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]

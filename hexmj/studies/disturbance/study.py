@@ -60,9 +60,8 @@ class DisturbedWalks(SameStarts):
         v, slows = checked_list(self.velocities), "slow_down" in self.strategies
         low = self.recovery.start if slows else 0.0
         if not ((v > 0) & (v >= low)).all():
-            raise InputError(
-                f"velocities = {v.tolist()}; expected above 0 and at least V_r(0), {low:g}, if it slows down"
-            )
+            least = f" and at least V_r(0), {low:g}, to which it slows down" if slows else ""
+            raise InputError(f"velocities = {v.tolist()}; expected above 0{least}")
         check_reached(v, self.stride, self.recovery if slows else None)
         window, dt = self.observed[1], self.stride.dt
         if slows and (longest := float((window + self.recovery.duration(v)).max())) > MOST_STEPS * dt:
@@ -77,6 +76,8 @@ class DisturbedWalks(SameStarts):
                     " push lasts"
                 )
         self.conditions.but(grasp=self.adhesion)
+        if "grasp" in self.strategies and (grasp := self.conditions.contact.grasp):
+            raise InputError(f"grasp = {grasp:g}; expected 0, since the strategy 'grasp' has its own, adhesion")
         _ = self._cells()
 
     @property

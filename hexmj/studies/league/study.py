@@ -92,6 +92,10 @@ class League:
             raise InputError("no controller was given; expected at least one")
         for name, entrant in self.entrants.items():
             typed(f"entrants[{name!r}]", entrant, Entrant)
+        given, usual = self.conditions.flat(), Conditions().flat()
+        for name in ("load", "ground"):
+            if given[name] != usual[name]:
+                raise InputError(f"{name} = {given[name]!r}; expected {usual[name]!r}, since trials have their own")
         if not (0 < self.tried_at < 1 and (self.observed[0] > 0).all()):
             raise InputError(
                 f"velocities = {self.velocities}, of the trials = {self.tried_at}; expected each above 0 and below 1"
