@@ -138,6 +138,16 @@ def test_a_taken_port_and_a_missing_viser_are_sentences(run, monkeypatch):
     assert "--velocity was given with a recording" in error
 
 
+def test_an_address_is_for_the_browser(run, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":4321")
+    for option, value in (("port", 0), ("host", "0.0.0.0")):
+        code, _, error = run("view", f"--{option}", value)
+        assert (code, error) == (
+            2,
+            f"hexmj: --{option} was given where there is a screen; expected it with --browser\n",
+        )
+
+
 def test_a_screen_that_is_not_there_is_a_sentence(run, monkeypatch):
     monkeypatch.setenv("DISPLAY", ":4321")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -40,7 +40,7 @@ class Disturb(StudyCommand):
     """Impulses of the pushes, in multiples of the insect's mass times V_p."""
     strategies: Sequence[Answer] | None = None
     """Legs go to the nearest posture of undisturbed walking, or the walk begins again from --initial-velocity, or feet
-    hold on to the ground; all, beside none, unless given."""
+    hold on to the ground; all, beside none, unless given, and none alone where the option has no values."""
     recovery: float = RECOVERY.rate
     """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper's is 0.00008."""
     initial_velocity: float = RECOVERY.start

@@ -43,6 +43,8 @@ class View:
         from hexmj.view.desktop import screen
 
         on_screen = screen() and not self.browser
+        if on_screen and (names := [name for name in changed(self, View()) if name in ("host", "port")]):
+            raise InputError(f"--{names[0]} was given where there is a screen; expected it with --browser")
         if self.recording is None:
             self._view_walk(on_screen)
         else:
