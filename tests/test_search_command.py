@@ -319,6 +319,20 @@ def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
     assert " of 10 starts were lost)" in told
 
 
+def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = "import dataclasses, hexmj\nfrom hexmj.controllers.cruse1998.readings import Reading\n"
+    text += "X = dataclasses.replace(hexmj.LDVS, reading=Reading(cap='sum'), name='x')\n"
+    (tmp_path / "own.py").write_text(text)
+    words = ["search", "--form", "ldvs", "--begin", "own.py:X", "--velocity", 0.5, "--starts", 4, "--budget", 10]
+    words += ["--refine-budget", 0, "--verdict-starts", 4, "--window", 5]
+    code, _, error = run(*words)
+    said = "--begin = own.py:X: its reading has no name; expected --reading beside it, one of printed, lasting"
+    assert code == 2 and said in error
+    code, out, _ = run(*words, "--reading", "lasting", "--json")
+    assert code == 0 and json.loads(out)["settings"]["problem"]["form"]["reading"]["ipsilateral"] == "lasting"
+
+
 def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
     """Unless others are given; what it finds walks by them."""
     sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--window", "start"]

@@ -68,6 +68,7 @@ def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_
         walk = physical_walk(starts, LDVS, 0.3, 60.0, conditions=conditions)
         assert_allclose(walk.load.sum(axis=-1).mean(), weight, rtol=0.02)
         far.append(np.linalg.norm(centre_of_pressure(walk), axis=-1).mean())
+        assert (pressure_margin(walk) >= 0).all()
     assert_allclose(far, far[0], rtol=0.1)
 
 

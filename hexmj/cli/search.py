@@ -164,15 +164,20 @@ class Search(WalkingCommand):
     def _as_begun(self) -> Controlled:
         """Planning with the order of updates and the reading of the set that the search begins with, unless given."""
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.cruse1998.readings import reading_name
+        from hexmj.controllers.cruse1998.readings import READINGS, reading_name
         from hexmj.search.network_forms import FORMS
 
         begun = loaded(self.begin) if self.begin and self.form in FORMS else None
         if type(begun) is not Cruse1998:
             return self.controlled
-        rules = {"order": begun.order, "reading": reading_name(begun.reading)}
-        taken = {rule: name for rule, name in rules.items() if name != "printed" and not getattr(self.controlled, rule)}
-        return replace(self.controlled, **taken)
+        taken: dict[str, Any] = {} if self.controlled.order else {"order": begun.order}
+        if not self.controlled.reading:
+            try:
+                taken["reading"] = reading_name(begun.reading)
+            except InputError:
+                told = f"--begin = {self.begin}: its reading has no name"
+                raise InputError(f"{told}; expected --reading beside it, one of {', '.join(READINGS)}") from None
+        return replace(self.controlled, **{rule: name for rule, name in taken.items() if name != "printed"})
 
     def _form(self) -> "Form":
         from hexmj.controllers.named import PART, parameter_file

@@ -25,20 +25,22 @@ def grounded(walk: PhysicalWalk, share: float = GROUNDED) -> Walk:
 
 
 def centre_of_pressure(walk: PhysicalWalk) -> np.ndarray:
-    """Where the ground's forces act, seen from the centre of mass, (step, start, 2) [mm]; NaN where it carries none."""
-    whole = walk.load.sum(axis=-1, keepdims=True)
-    share = np.divide(walk.load, whole, out=np.full_like(walk.load, np.nan), where=whole > 0)
+    """Where the ground pushes feet up, seen from the centre of mass, (step, start, 2) [mm]; NaN where it pushes none.
+
+    A foot that pulls, and is held by adhesion, counts nothing.
+    """
+    pushed = np.maximum(walk.load, 0.0)
+    with np.errstate(invalid="ignore"):
+        share = pushed / pushed.sum(axis=-1, keepdims=True)
     return (share[..., None] * walk.measured.feet).sum(axis=-2)
 
 
 def pressure_margin(walk: PhysicalWalk) -> np.ndarray:
     """Distance of the centre of pressure from the nearest edge of the polygon of the feet at the ground, (step, start).
 
-    It lies on the edge over which the body tips, and outside, where this is below 0, only if feet grasp; NaN [mm] where
-    the ground carries no foot.
+    It never lies outside, and on the edge over which the body tips; NaN [mm] where the ground pushes no foot up.
     """
     support, centre = grounded(walk), centre_of_pressure(walk)
     known = np.isfinite(centre[..., 0])
     feet = np.where(known[..., None, None], support.feet - centre[..., None, :], 0.0)
-    margin = stability_margin(feet, support.stance & known[..., None])
-    return np.where(known, margin if walk.conditions.contact.grasp else np.abs(margin), np.nan)
+    return np.where(known, np.abs(stability_margin(feet, support.stance & known[..., None])), np.nan)
