@@ -158,10 +158,10 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return _fitted(value, one)
         raise TypeError
     if origin in (tuple, Sequence):
-        if isinstance(value, list | tuple | range) or getattr(value, "ndim", 0):
+        if (several := isinstance(value, list | tuple | range)) or getattr(value, "ndim", 0):
             kinds = inner[:1] * len(value) if _is_of_any_length(wanted) else inner
             if len(kinds) == len(value):
-                values = getattr(value, "values", value)  # an iterated DataArray gives more of them
+                values = value if several else getattr(value, "values", value)  # a DataArray's own are DataArrays
                 return tuple(_fitted(one, kind) for one, kind in zip(values, kinds, strict=True))
     elif wanted in (int, float):
         if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool | np.timedelta64):

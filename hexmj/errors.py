@@ -29,7 +29,8 @@ class StillThrown(InputError):
 
 
 class SimulationError(RuntimeError):
-    """A physical simulation that did not settle or diverged; it is never counted as an outcome."""
+    """A physical simulation that did not settle or diverged; it is never counted as an outcome, and by it a
+    candidate of a search costs as much as one that refuses to walk."""
 
     def __init__(self, sentence: str, state: Mapping[str, Any] | None = None, file_name: str = "") -> None:
         """What happened, and the last good state, if it is known, with a name for its file."""

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -325,7 +326,8 @@ def test_a_wrong_type_gets_one_sentence(call: Callable[[], Any], words: str):
 
 def test_numbers_of_numpy_are_numbers():
     """And stand in settings as Python's own."""
-    assert compare(velocities=flss(velocities=[0.3, 0.5]).velocity).velocity.values.tolist() == [0.3, 0.5]
+    for both in (flss(velocities=[0.3, 0.5]).velocity, namedtuple("Two", "one values")(0.3, 0.5)):
+        assert compare(velocities=both).velocity.values.tolist() == [0.3, 0.5]
     usual = flss(n_starts=30, seed=4, window=20.0, velocities=[0.5])
     given = flss(n_starts=np.int64(30), seed=np.uint8(4), window=np.float64(20.0), velocities=np.array([0.5]))
     assert given.equals(usual)
