@@ -57,6 +57,10 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
     different = len(np.unique(history.candidate.values[history.stage == 0], axis=0))
     different += len(np.unique(history.candidate.values[history.stage == 1], axis=0))
     assert f"{answer['evaluations']} evaluations, {different} candidates known from an earlier run" in text
+    lost = (history.cost.values == 1).sum()
+    assert (f"; {lost} cost 1: all of their starts were lost, or they do not walk" in " ".join(text.split())) == (
+        lost > 0
+    )
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == files
 
 

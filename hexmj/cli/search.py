@@ -294,10 +294,14 @@ class Search(WalkingCommand):
     def _show(
         self, problem: "Problem", found: "Found", verdict: "xr.Dataset", n_starts: int, files: list[Path]
     ) -> None:
+        from hexmj.search.samples import REFUSED
+
         vectors = {name: _numbers(problem.form, loaded(one)) for name, one in self._beside.items()}
         rows = zip(problem.form.names, found.vector, *vectors.values(), strict=True)
         numbers = [(name.replace("_", " "), *(f"{value:.4g}" for value in values)) for name, *values in rows]
         refused = f"; {len(found.refused)} were refused, the first by {found.refused[0]}" if found.refused else ""
+        if all_lost := int((found.history.cost.values >= REFUSED).sum()):
+            refused = f"; {all_lost} cost 1: all of their starts were lost, or they do not walk{refused}"
         over = f"{self.over} over {len(problem.variants)} variants of " if self.over != "usual" else ""
         windows = verdict.window.values.tolist()
         judged = [
