@@ -158,10 +158,11 @@ def _fitted(value: Any, wanted: Any) -> Any:
                 return _fitted(value, one)
         raise TypeError
     if origin in (tuple, Sequence):
-        if (several := isinstance(value, list | tuple | range)) or getattr(value, "ndim", 0):
+        if isinstance(value, list | tuple | range) or getattr(value, "ndim", 0):
             kinds = inner[:1] * len(value) if _is_of_any_length(wanted) else inner
             if len(kinds) == len(value):
-                values = value if several else getattr(value, "values", value)  # a DataArray's own are DataArrays
+                itself = isinstance(value, list | tuple | range | np.ndarray)
+                values = value if itself else getattr(value, "values", value)  # a DataArray's own are DataArrays
                 return tuple(_fitted(one, kind) for one, kind in zip(values, kinds, strict=True))
     elif wanted in (int, float):
         if isinstance(value, Integral if wanted is int else Real) and not isinstance(value, bool | np.timedelta64):

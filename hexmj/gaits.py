@@ -17,7 +17,7 @@ from hexmj.phases import PAIRS, circular_mean
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
-from hexmj.walks import Walk, part_of
+from hexmj.walks import Walk, checked_walk, part_of
 
 TOLERANCE = 0.002
 """A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
@@ -90,7 +90,7 @@ def gait(walk: Walk) -> Gait:
     Raises:
         InputError: a walk of fewer than two steps, of no starts, or whose time does not grow.
     """
-    if len(typed("walk", walk, Walk).time) < 2:
+    if len(checked_walk(walk).time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     if not walk.stance.shape[1]:
         raise InputError("a walk of 0 starts; expected at least 1")

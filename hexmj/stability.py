@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import numbers, states, typed
+from hexmj.checks import numbers, states
 from hexmj.errors import InputError
 from hexmj.jitted import jitted
 from hexmj.legs import in_order
 from hexmj.process.threads import run_blocks
-from hexmj.walks import Walk
+from hexmj.walks import Walk, checked_walk
 
 ROUNDING = 4.0 * 2.0**-53
 """Bounds the error of a difference of two products, relative to the sum of their sizes (Shewchuk 1997, orient2d):
@@ -66,7 +66,7 @@ def _of_legs(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
-    typed("walk", walk, Walk)
+    checked_walk(walk)
     margin = _margins_of(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 

@@ -79,6 +79,17 @@ class PlannedWalk(Walk):
     """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
 
 
+def checked_walk(walk: Walk) -> Walk:
+    """What shall be a walk.
+
+    Raises:
+        InputError: it is none, if perhaps one that has two.
+    """
+    if isinstance(getattr(walk, "measured", None), Walk):
+        raise InputError(f"walk is a {type(walk).__name__}; expected a Walk: its `planned`, `ordered` or `measured`")
+    return typed("walk", walk, Walk)
+
+
 def extent(walk: Walk) -> str:
     """How many steps and starts a walk has, how long it is and how fast, in a line."""
     steps, starts = walk.stance.shape[:2]

@@ -16,6 +16,7 @@ from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError, SimulationError
+from hexmj.gaits import gait
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
@@ -26,7 +27,7 @@ from hexmj.physics.drive import drive
 from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import Settled, settle
-from hexmj.stability import loss_time
+from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 
@@ -181,6 +182,13 @@ def test_what_one_is_told_until_it_falls_does_not_depend_on_who_walks_beside_it(
     assert np.isnan(both.ordered.x[fallen][:, np.isfinite(both.outcomes.fall)]).all()
     assert np.isfinite(both.ordered.x[:, np.isnan(both.outcomes.fall)]).all()
     assert fallen.any() and not np.isfinite(both.outcomes.fall).all()
+
+
+@pytest.mark.parametrize("function", [loss_time, walk_margin, gait])
+def test_of_a_physical_walk_one_of_its_walks_is_asked_for(function):
+    walked = physical_walk(draw_starts(1, 0), LDVS, 0.3, 5.0)
+    with pytest.raises(InputError, match="walk is a PhysicalWalk; expected a Walk: its `planned`, `ordered` or `meas"):
+        function(walked)
 
 
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
