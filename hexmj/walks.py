@@ -83,7 +83,7 @@ def checked_walk(walk: Walk) -> Walk:
     """What shall be a walk.
 
     Raises:
-        InputError: it is none, if perhaps one that has two.
+        InputError: it is none; of a physical walk it names those that this has.
     """
     if isinstance(getattr(walk, "measured", None), Walk):
         raise InputError(f"walk is a {type(walk).__name__}; expected a Walk: its `planned`, `ordered` or `measured`")

@@ -40,7 +40,9 @@ class Senses:
             force: of the actuators, the joints' first, (n, substep, actuator).
         """
         felt = self._unloaded, self._load, self._torques
-        return _feel(ids, sensors, force, self._compiled.columns.touch.start, self._longest_gap, felt)
+        loads = self._compiled.carried(sensors, force)
+        touch = sensors[..., self._compiled.columns.touch]
+        return _feel(ids, touch, loads, force, self._longest_gap, felt), loads
 
     def standing(self, ids: np.ndarray | slice = np.s_[:]) -> np.ndarray:
         """Which feet of some starts stand now, (n, leg); of all unless told."""
@@ -70,21 +72,17 @@ class Senses:
 
 
 @jitted
-def _feel(ids: Any, sensors: Any, force: Any, touch: int, longest_gap: int, felt: Any) -> Any:
-    """`Senses.feel`; `felt` goes on: substeps without load and load (start, leg), and torques (start, joint)."""
+def _feel(ids: Any, touch: Any, loads: Any, force: Any, longest_gap: int, felt: Any) -> Any:
+    """Which feet stand, of `Senses.feel`; `felt` goes on: substeps without touch and load (start, leg), and torques
+    (start, joint)."""
     unloaded, load, torques = felt
-    joints = torques.shape[1]
-    grasps = force.shape[2] > joints
-    standing = np.empty((len(ids), sensors.shape[1], 6), dtype=np.bool_)
-    loads = np.empty(standing.shape)
+    standing = np.empty(touch.shape, dtype=np.bool_)
     for i, start in enumerate(ids):
-        for t in range(sensors.shape[1]):
+        for t in range(touch.shape[1]):
             for leg in range(6):
-                pressed = sensors[i, t, touch + leg]
-                loads[i, t, leg] = pressed - force[i, t, joints + leg] if grasps and pressed > 0 else pressed
-                unloaded[start, leg] = 0 if pressed > 0 else unloaded[start, leg] + 1
+                unloaded[start, leg] = 0 if touch[i, t, leg] > 0 else unloaded[start, leg] + 1
                 standing[i, t, leg] = unloaded[start, leg] <= longest_gap
         load[start] = loads[i, -1]
-        for joint in range(joints):
+        for joint in range(torques.shape[1]):
             torques[start, joint] = force[i, -1, joint]
-    return standing, loads
+    return standing

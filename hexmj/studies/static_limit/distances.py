@@ -49,12 +49,12 @@ def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Datas
 
 def distances(walk: PhysicalWalk) -> dict[str, np.ndarray]:
     """`DISTANCES` of every start, (start,); NaN where the plan is lost at once."""
-    planned, measured, near = walk.ordered, walk.measured, grounded(walk)
-    compared = planned.time[:, None] < np.minimum(loss_time(planned), walk.outcomes.fall)
-    wanted, pressure = walk_margin(planned), pressure_margin(walk)
+    told, measured, near = walk.ordered, walk.measured, grounded(walk)
+    compared = told.time[:, None] < np.minimum(loss_time(told), walk.outcomes.fall)
+    wanted, pressure = walk_margin(told), pressure_margin(walk)
     with np.errstate(invalid="ignore"):  # where no foot stands in either, which does not count
         off, off_grounded = (np.abs(walk_margin(one) - wanted) for one in (measured, near))
-    same, same_near = ((one.stance == planned.stance).all(axis=-1) for one in (measured, near))
+    same, same_near = ((one.stance == told.stance).all(axis=-1) for one in (measured, near))
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
     touching = compared & measured.stance.any(axis=-1)  # without any foot there is no margin
     return {
