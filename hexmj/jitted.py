@@ -1,7 +1,9 @@
 """Compiled functions, kept from run to run while nothing that they are made of changes."""
 
+import pickle
 from collections.abc import Callable
 from hashlib import sha256
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -10,6 +12,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 njit: Any = numba.njit
 """Whose types tell not all of its options."""
+
+SEAL = sha256().digest_size
+"""Length of a checksum [bytes]."""
 
 part = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """A function that only compiled ones call, for Python would crash.  Without what that would call it by, it compiles in
@@ -28,6 +33,7 @@ def jitted(function: Function) -> Function:
     made: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
     if made is not function:  # as it is with NUMBA_DISABLE_JIT
         _stamp_when_asked(made._cache, function)
+        _seal(made._cache._cache_file)
     return made
 
 
@@ -40,6 +46,35 @@ def _stamp_when_asked(cache: Any, function: Callable[..., Any]) -> None:
         return load(*asked)
 
     cache.load_overload = load_overload
+
+
+def _seal(files: Any) -> None:
+    """Let each of a cache's files tell what it was compiled from and for, under a checksum.
+
+    numba renews an index before the code, and numbers files from 1 again: where a full disk or a kill comes between, or
+    two processes do so at once, an index names a file of other code.  Such a file, or a damaged one, is none.
+    """
+    usual_save, usual_load = files.save, files.load
+
+    def write(name: str, sealed: bytes) -> None:
+        with files._open_for_write(files._data_path(name)) as file:
+            file.write(sealed)
+
+    def read(name: str) -> bytes:
+        return Path(files._data_path(name)).read_bytes()
+
+    def save(key: Any, code: Any) -> None:
+        told = files._dump((files._source_stamp, key, code))
+        usual_save(key, sha256(told).digest() + told)
+
+    def load(key: Any) -> Any:
+        found = usual_load(key)
+        if found is None or sha256(found[SEAL:]).digest() != found[:SEAL]:
+            return None
+        *told, code = pickle.loads(found[SEAL:])
+        return code if told == [files._source_stamp, key] else None
+
+    files._save_data, files._load_data, files.save, files.load = write, read, save, load
 
 
 def _made_of(function: Callable[..., Any]) -> str:

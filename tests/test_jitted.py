@@ -64,3 +64,32 @@ def test_what_the_package_compiles_is_told_the_same_in_any_process():
     compiled = [one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")]
     assert len(compiled) > 30
     assert not any(" at 0x" in _made_of(one) for one in compiled)
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        lambda before, now: before,
+        lambda before, now: flipped(now, len(now) // 2),
+        lambda before, now: now[: len(now) // 2],
+        lambda before, now: b"",
+    ],
+)
+def test_code_that_is_another_or_damaged_is_compiled_anew(tmp_path, damaged):
+    """An index is renewed before its code: where the disk is full then, it names the code from before the edit."""
+    text = "from hexmj.jitted import jitted\n@jitted\ndef outer(x):\n    return x + 1.0\n"
+    text += "print(outer(1.0), *outer.stats.cache_hits.values())\n"
+    (tmp_path / "outer.py").write_text(text)
+    assert ran(tmp_path) == [2.0]
+    (code,) = tmp_path.glob("kept/*/*.nbc")
+    before = code.read_bytes()
+    (tmp_path / "outer.py").write_text(text.replace("+ 1.0", "+ 55.0"))
+    assert ran(tmp_path) == [56.0]
+    code.write_bytes(damaged(before, code.read_bytes()))
+    assert ran(tmp_path) == [56.0]
+    assert ran(tmp_path) == [56.0, 1.0]
+
+
+def flipped(data: bytes, place: int) -> bytes:
+    """With one bit turned."""
+    return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]

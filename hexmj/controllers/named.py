@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import getattr_static
 from operator import attrgetter
 from os.path import isfile
 from pathlib import Path
@@ -145,9 +146,10 @@ def _found(where: str, what: str, name: str) -> Controller:
     """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
     module = _module(where, name)
     if what.partition(".")[0] not in vars(module) and not hasattr(module, "__getattr__"):
-        classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "begin")]
+        own = {key: value for key, value in vars(module).items() if not isinstance(value, ModuleType)}
+        there = [key for key, value in own.items() if callable(getattr_static(value, "begin", None))]
         missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
-        raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(classes) or 'none'}")
+        raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(there) or 'none'}")
 
     def make() -> Any:
         found = attrgetter(what)(module)
