@@ -129,6 +129,7 @@ class Nobody:
     [
         ({}, {}, "no controller was given"),
         ("ldvs", {}, "expected a controller, a frozen dataclass"),
+        ([LDVS], {}, "expected one, or several in a dict"),
         ({"nobody": Nobody()}, {}, "expected a controller, a frozen dataclass"),
         (LDVS, {"n_starts": 0}, "starts = 0; expected a whole number"),
         (LDVS, {"seed": -1}, "seed = -1; expected"),

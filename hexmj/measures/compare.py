@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from hexmj.checks import check_types, given, printable, typed
+from hexmj.checks import check_types, given, printable, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
@@ -139,6 +139,8 @@ def compare(
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
+    if isinstance(controllers, list | tuple):
+        raise InputError(f"controllers = {short(controllers)}; expected one, or several in a dict, by their names")
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}

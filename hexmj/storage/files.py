@@ -154,6 +154,8 @@ def opened(path: Path) -> Iterator[BinaryIO]:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise InputError(f"{path} is a pipe or a device; expected a file")
             yield file
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder; expected a file, as one in it") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
