@@ -4,9 +4,11 @@ import pickle
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -82,5 +84,13 @@ def _made_of(function: Callable[..., Any]) -> str:
     code: Any = function.__code__
     names = [name for name in code.co_names if name != function.__name__]
     known = {name: function.__globals__[name] for name in names if name in function.__globals__}
-    told = [_made_of(one.py_func) if hasattr(one, "py_func") else repr(one) for one in known.values()]
-    return repr((code.co_code, code.co_consts, code.co_names, told))
+    return repr((code.co_code, code.co_consts, code.co_names, [_told(one) for one in known.values()]))
+
+
+def _told(one: Any) -> str:
+    """Something that a function looks up, whatever path leads to its module and however NumPy prints numbers."""
+    if hasattr(one, "py_func"):
+        return _made_of(one.py_func)
+    if isinstance(one, ModuleType):
+        return one.__name__
+    return repr(one.item() if isinstance(one, np.generic) else one)
