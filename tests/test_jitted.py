@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hexmj
 from hexmj import rotations, stability
 from hexmj.bodies import newton
 from hexmj.controllers.cruse1998 import kernel
@@ -109,3 +110,9 @@ def test_code_of_other_types_is_compiled_anew(tmp_path):
 def flipped(data: bytes, place: int) -> bytes:
     """With one bit turned."""
     return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]
+
+
+def test_whatever_is_kept_stands_under_a_checksum():
+    """numba's own `cache=True` has none."""
+    sources = Path(hexmj.__file__).parent.rglob("*.py")
+    assert [one.name for one in sources if "cache=True" in one.read_text()] == ["jitted.py"]

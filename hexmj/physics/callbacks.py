@@ -63,7 +63,7 @@ def _unheard(warning: str) -> None:
     """Nothing."""
 
 
-@cfunc("float64()", cache=True)
+@cfunc("float64()")
 def _midnight() -> float:
     return 0.0
 
