@@ -19,7 +19,8 @@ LDVS = hexmj.LDVS
 MINE = '''
 from dataclasses import dataclass
 import numpy as np
-from hexmj.controllers import Step, stepwise
+import hexmj
+from hexmj.controllers import Controller, Step, stepwise
 
 @dataclass(frozen=True)
 class Still:

@@ -81,7 +81,7 @@ def test_numbers_for_libraries_that_are_none(name: str, number: str):
 
 
 def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
-    words = "render", "--window", "1", "--out", str(tmp_path / "film.mp4")
+    words = "render", "--window", "1", "--out", str(tmp_path / "film")
     done = done_with(words, PYGLFW_LIBRARY="/nonexistent", MUJOCO_GL="")
     assert done.returncode == 1
     assert "Nothing can be rendered here (MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none)" in done.stderr
@@ -92,7 +92,7 @@ def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
     done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
     assert done.returncode == 0, done.stderr
-    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film.mp4")), MUJOCO_GL=wish)
+    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film")), MUJOCO_GL=wish)
     if done.returncode:  # OSMesa may be there
         assert done.returncode == 1
         assert done.stderr.startswith("hexmj: Nothing can be rendered here (")

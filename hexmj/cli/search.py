@@ -301,7 +301,8 @@ class Search(WalkingCommand):
         numbers = [(name.replace("_", " "), *(f"{value:.4g}" for value in values)) for name, *values in rows]
         refused = f"; {len(found.refused)} were refused, the first by {found.refused[0]}" if found.refused else ""
         if all_lost := int((found.history.cost.values >= REFUSED).sum()):
-            refused = f"; {all_lost} cost 1: all of their starts were lost, or they do not walk{refused}"
+            where = " in a variant" if self.over == "worst" else ""
+            refused = f"; {all_lost} cost 1: all of their starts were lost{where}, or they do not walk{refused}"
         over = f"{self.over} over {len(problem.variants)} variants of " if self.over != "usual" else ""
         windows = verdict.window.values.tolist()
         judged = [

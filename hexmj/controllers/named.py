@@ -146,8 +146,7 @@ def _found(where: str, what: str, name: str) -> Controller:
     """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
     module = _module(where, name)
     if what.partition(".")[0] not in vars(module) and not hasattr(module, "__getattr__"):
-        own = {key: value for key, value in vars(module).items() if not isinstance(value, ModuleType)}
-        there = [key for key, value in own.items() if callable(getattr_static(value, "begin", None))]
+        there = [key for key, value in vars(module).items() if _can_begin(value)]
         missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
         raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(there) or 'none'}")
 
@@ -156,6 +155,12 @@ def _found(where: str, what: str, name: str) -> Controller:
         return found() if isinstance(found, type) else found
 
     return _made(make, name, "expected a class with defaults for all fields")
+
+
+def _can_begin(value: Any) -> bool:
+    """Whether something looks like a controller or a class of them, and is no module or protocol."""
+    other = isinstance(value, ModuleType) or getattr_static(value, "_is_protocol", False)
+    return not other and callable(getattr_static(value, "begin", None))
 
 
 def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:

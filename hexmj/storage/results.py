@@ -56,13 +56,15 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
     What killed processes left there half written is removed.
 
     Raises:
-        InputError: the path or a name in it is taken by something else, or cannot be written to.
+        InputError: the path or a name in it is taken by something else, cannot be written to, or looks like a file's.
     """
     try:
         nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))
         if not nearest.is_dir():
             what = "is a file" if nearest.exists() else "is a link to nothing"
             raise InputError(f"--out {path}: {nearest} {what}; expected a folder")
+        if nearest != path and path.suffix in {Path(name).suffix for name in names} - {""}:
+            raise InputError(f"--out {path} is called like a file; expected a folder, which {names[0]} is put into")
         missing = path.absolute().relative_to(nearest.absolute()).parts
         if os.pardir in missing:
             raise InputError(f"--out {path} leads through {missing[0]}, which is not there; expected a folder")
