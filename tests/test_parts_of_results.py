@@ -168,6 +168,15 @@ def test_velocities_of_other_numbers_of_starts_are_drawn_together():
     assert "starts" not in hexmj.plot(xr.concat([few, many], "velocity", combine_attrs="drop_conflicts")).get_suptitle()
 
 
+@pytest.mark.parametrize("other", [{"stride": hexmj.Stride(aep0=8.0)}, {"acceleration": hexmj.Acceleration(0.01)}])
+def test_velocities_of_other_walks_are_drawn_together_without_what_differs(other):
+    both = [hexmj.flss(hexmj.LDVS, [v], n_starts=5, **how) for v, how in ((0.3, {}), (0.5, other))]
+    with pytest.raises(InputError, match="expected one window, stride and acceleration, or"):
+        hexmj.plot(xr.concat(both, "velocity"))
+    title = hexmj.plot(xr.concat(both, "velocity", combine_attrs="drop_conflicts")).get_suptitle()
+    assert title.endswith("ldvs; 5 starts; window walk; seed 0")
+
+
 def test_kinematic_and_physical_flss_are_not_drawn_as_one():
     results = [measure(hexmj.LDVS, [0.5], n_starts=2, window=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
     for both in (results, results[::-1]):

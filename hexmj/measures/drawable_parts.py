@@ -35,22 +35,23 @@ def check_axes(result: "xr.Dataset") -> None:
 def check_window(result: "xr.Dataset") -> None:
     """Refuse observation times that are not those of the window in the settings, as of results that were joined.
 
-    Nothing is said of a result without such times, nor of variants, whose strides are their own.
+    Nothing is said of a result without such times or settings, nor of variants, whose strides are their own.
 
     Raises:
         InputError: with the first time that differs.
     """
     told = settings(result)
-    if "duration" not in result.variables or "window" not in told or "variant" in result.duration.dims:
+    known = {"window", "stride", "acceleration"} <= told.keys()
+    if "duration" not in result.variables or not known or "variant" in result.duration.dims:
         return
     stride = Stride(**{name: value for name, value in told["stride"].items() if name != "geometry"})
-    acceleration = Acceleration(**told["acceleration"]) if told.get("acceleration") else None
+    acceleration = Acceleration(**told["acceleration"]) if told["acceleration"] else None
     times = observation_time(told["window"], result.velocity.values, stride, acceleration)
     walked = result.duration.transpose(..., "velocity").values
     if (odd := walked[~np.isclose(walked, times)]).size:
         raise InputError(
             f"a result with the window {told['window']} in its settings, but with walks of {odd[0]:g} time units;"
-            ' expected one window, or results joined with combine_attrs="drop_conflicts"'
+            ' expected one window, stride and acceleration, or results joined with combine_attrs="drop_conflicts"'
         )
 
 
