@@ -49,6 +49,11 @@ class Switched(Still):
     def without(self, part):
         return {2: self, 3: None}[part]
 
+@dataclass(frozen=True)
+class Bare:
+    name: str
+    begin = Still.begin
+
 taller = Still("taller", 3.0)
 Switched.usual = Still()
 number = 6

@@ -92,7 +92,7 @@ def test_files_give_the_same_walk_as_the_preset(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[symmetric]\np5_i = 1.0", "unknown key 'p5_i'; valid keys: p1_i"),
+        ("[symmetric]\np5_i = 1.0", "unknown key 'p5_i'; valid keys: 'p1_i'"),
         ("[symmetric]\np1_i = 'ten'", "p1_i = 'ten'; expected a number"),
         ("[symmetric]\np1_i = true", "expected a number"),
         ("[symmetric]\np1_i = nan", "finite"),
@@ -101,7 +101,7 @@ def test_files_give_the_same_walk_as_the_preset(tmp_path):
         ("[other]\na = 1", "expected one table, .* and before it order and reading"),
         ("", "holds nothing"),
         ("[weights.p9]\n'1,2' = 1.0", r"unknown table \[weights.p9\]; valid names: p1"),
-        ("[weights.p1]\n'1,6' = 1.0", "unknown key '1,6'; valid keys: 1,2"),
+        ("[weights.p1]\n'1,6' = 1.0", "unknown key '1,6'; valid keys: '1,2'"),
         ("[weights.p4]\n'2,1' = 2", "binary"),
         ("weights = 3", "expected one table"),
         ("[weights]\np1 = 3", "expected a table with the keys"),

@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import MISSING, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import getattr_static
@@ -146,7 +146,7 @@ def _found(where: str, what: str, name: str) -> Controller:
     """An object of a module, or of a file that ends in .py: a controller, or one of a class with its defaults."""
     module = _module(where, name)
     if what.partition(".")[0] not in vars(module) and not hasattr(module, "__getattr__"):
-        there = [key for key, value in vars(module).items() if _can_begin(value)]
+        there = [key for key, value in vars(module).items() if _offers(value)]
         missing = f"no {what} there" if what else f"a file, and which controller of it? expected {name}:NAME"
         raise InputError(f"controller {name!r}: {missing}; controllers there: {', '.join(there) or 'none'}")
 
@@ -157,10 +157,14 @@ def _found(where: str, what: str, name: str) -> Controller:
     return _made(make, name, "expected a class with defaults for all fields")
 
 
-def _can_begin(value: Any) -> bool:
-    """Whether something looks like a controller or a class of them, and is no module or protocol."""
-    other = isinstance(value, ModuleType) or getattr_static(value, "_is_protocol", False)
-    return not other and callable(getattr_static(value, "begin", None))
+def _offers(value: Any) -> bool:
+    """Whether something looks like a controller, or like a class of them with defaults."""
+    kind = value if isinstance(value, type) else type(value)
+    if not (is_dataclass(kind) and callable(getattr_static(kind, "begin", None))):
+        return False
+    return value is not kind or all(
+        one.default is not MISSING or one.default_factory is not MISSING for one in fields(kind) if one.init
+    )
 
 
 def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:

@@ -88,7 +88,7 @@ def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
         raise InputError(f"{where} is {table!r}; expected a table with the keys {', '.join(valid)}")
     for key, value in table.items():
         if key not in valid:
-            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(valid)}")
+            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(map(repr, valid))}")
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
             raise InputError(f"{where}: {key} = {value!r:.40}; expected a number, finite and below 1e100")
     return {key: float(value) for key, value in table.items()}
