@@ -54,6 +54,15 @@ class Bare:
     name: str
     begin = Still.begin
 
+@dataclass(frozen=True, init=False)
+class Whole(Still):
+    def __init__(self):
+        super().__init__()
+
+    @classmethod
+    def begin(cls, *asked):
+        return Still().begin(*asked)
+
 taller = Still("taller", 3.0)
 Switched.usual = Still()
 number = 6
@@ -239,7 +248,7 @@ def test_toml_that_names_itself_is_refused(tmp_path, name):
         ("./mine_of_a_user:Still", "./mine_of_a_user is neither a module nor a file that ends in .py$"),
         ("nothing_of_this_name:Still", "nothing_of_this_name cannot be imported: ModuleNotFoundError"),
         ("broken.py:Still", "broken.py cannot be loaded: ModuleNotFoundError: No module named 'nothing_of_this_name'$"),
-        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched, taller$"),
+        ("mine_of_a_user.py:Stil", "no Stil there; controllers there: Still, Needy, Named, Switched, Whole, taller$"),
         ("mine_of_a_user.py:Switched-without-1", "Switched-without-1' cannot be made: KeyError: 1; expected a"),
         ("mine_of_a_user.py:Switched-without-3", "Switched-without-3: controller = None; expected a controller"),
         ("mine_of_a_user.py:number", "controller = 6; expected a controller, a frozen dataclass"),

@@ -3,10 +3,10 @@
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
-from inspect import getattr_static
+from inspect import getattr_static, signature
 from operator import attrgetter
 from os.path import isfile
 from pathlib import Path
@@ -160,11 +160,10 @@ def _found(where: str, what: str, name: str) -> Controller:
 def _offers(value: Any) -> bool:
     """Whether something looks like a controller, or like a class of them with defaults."""
     kind = value if isinstance(value, type) else type(value)
-    if not (is_dataclass(kind) and callable(getattr_static(kind, "begin", None))):
+    if not is_dataclass(kind) or getattr_static(kind, "begin", None) is None:
         return False
-    return value is not kind or all(
-        one.default is not MISSING or one.default_factory is not MISSING for one in fields(kind) if one.init
-    )
+    asked = signature(kind).parameters.values() if value is kind else ()
+    return not any(one.default is one.empty and one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in asked)
 
 
 def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:

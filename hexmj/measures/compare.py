@@ -139,7 +139,7 @@ def compare(
     Raises:
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
-    if isinstance(controllers, list | tuple):
+    if type(controllers) in (list, tuple):
         raise InputError(f"controllers = {short(controllers)}; expected one, or several in a dict, by their names")
     if not isinstance(controllers, Mapping):
         check_controller_type(controllers)
