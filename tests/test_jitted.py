@@ -31,7 +31,13 @@ def ran(folder: Path) -> list[float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("old", "new", "told"), [("+ 1.0", "+ 5.0", 12.0), ("FACTOR = 2.0", "FACTOR = 3.0", 6.0), ("", "", 4.0)]
+    ("old", "new", "told"),
+    [
+        ("+ 1.0", "+ 5.0", 12.0),
+        ("FACTOR = 2.0", "FACTOR = 3.0", 6.0),
+        ("FACTOR = 2.0", "import numpy\nFACTOR = numpy.float32(2.0)", 4.0),
+        ("", "", 4.0),
+    ],
 )
 def test_an_edit_of_another_file_is_compiled(tmp_path, old, new, told):
     for name, text in (("helper", HELPER), ("outer", OUTER)):
