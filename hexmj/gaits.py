@@ -17,7 +17,7 @@ from hexmj.phases import PAIRS, circular_mean
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
-from hexmj.walks import Walk, checked_walk, part_of
+from hexmj.walks import Walk, check_time_grows, checked_walk, part_of
 
 TOLERANCE = 0.002
 """A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
@@ -94,8 +94,7 @@ def gait(walk: Walk) -> Gait:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     if not walk.stance.shape[1]:
         raise InputError("a walk of 0 starts; expected at least 1")
-    if not (np.diff(walk.time) > 0).all():
-        raise InputError("a walk whose time does not grow with each step; expected that of one walk")
+    check_time_grows(walk)
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
     longest = int(_steps(regimes["looked_at"], walk.time).max())
     return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)

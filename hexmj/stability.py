@@ -15,7 +15,7 @@ from hexmj.errors import InputError
 from hexmj.jitted import jitted
 from hexmj.legs import in_order
 from hexmj.process.threads import run_blocks
-from hexmj.walks import Walk, checked_walk
+from hexmj.walks import Walk, check_time_grows, checked_walk
 
 ROUNDING = 4.0 * 2.0**-53
 """Bounds the error of a difference of two products, relative to the sum of their sizes (Shewchuk 1997, orient2d):
@@ -72,8 +72,13 @@ def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
 
 
 def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:
-    """Time of the first loss of static stability (Eq. 7), (start,) [time units]; inf where there is none."""
+    """Time of the first loss of static stability (Eq. 7), (start,) [time units]; inf where there is none.
+
+    Raises:
+        InputError: no walk, one without steps, or one whose time does not grow.
+    """
     lost = walk_margin(walk, threads) <= 0.0
+    check_time_grows(walk)
     if not len(lost):
         raise InputError("a walk of 0 steps; expected at least 1")
     return np.where(lost.any(axis=0), walk.time[np.argmax(lost, axis=0)], np.inf)

@@ -90,6 +90,16 @@ def checked_walk(walk: Walk) -> Walk:
     return typed("walk", walk, Walk)
 
 
+def check_time_grows(walk: Walk) -> None:
+    """Refuse a walk that is none, as of several that were joined.
+
+    Raises:
+        InputError: its time does not grow with each step.
+    """
+    if not (np.diff(walk.time) > 0).all():
+        raise InputError("a walk whose time does not grow with each step; expected that of one walk")
+
+
 def extent(walk: Walk) -> str:
     """How many steps and starts a walk has, how long it is and how fast, in a line."""
     steps, starts = walk.stance.shape[:2]

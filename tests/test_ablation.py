@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -67,6 +68,12 @@ def test_without_all_mechanisms_the_network_is_uncoordinated() -> None:
 def test_what_cannot_be_switched_is_refused_in_a_sentence(name: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         hexmj.load_controller(name)
+
+
+def test_a_mechanism_is_no_text() -> None:
+    text: Any = "3"
+    with pytest.raises(InputError, match="mechanism = '3'; expected one of 1, 2, 3, 4"):
+        hexmj.LDVS.without(text)
 
 
 @pytest.mark.thorough

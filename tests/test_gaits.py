@@ -18,6 +18,7 @@ from hexmj.gaits import CYCLES, STEPS, TOLERANCE, Gait, gait, limit_gait
 from hexmj.legs import FIG1, MIRROR
 from hexmj.measures.kinematic import walk
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, classify, unrolled, wilson_phase
+from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import Walk, of_starts
@@ -346,8 +347,9 @@ def test_what_makes_no_sense():
     with pytest.raises(InputError, match="a walk of 1 steps"):
         gait(walk(np.zeros((1, 6)), HWS, 0.4, 0.1))
     back = walk(np.zeros((1, 6)), HWS, 0.4, 20.0)
-    with pytest.raises(InputError, match="a walk whose time does not grow"):
-        gait(replace(back, time=back.time[::-1].copy()))
+    for told in (gait, loss_time):
+        with pytest.raises(InputError, match="a walk whose time does not grow"):
+            told(replace(back, time=back.time[::-1].copy()))
     with pytest.raises(InputError, match="a walk of 0 starts"):
         gait(of_starts(back, slice(0)))
 

@@ -81,8 +81,8 @@ class Cruse1998:
     def _having(self, mechanism: int, value: float, name: str) -> "Cruse1998":
         """Every weight of a mechanism set to a value."""
         kinds = [kind for kind in NEIGHBOURS if kind[1] == str(mechanism)]
-        if not kinds:
-            raise InputError(f"mechanism = {mechanism}; expected one of 1, 2, 3, 4")
+        if not kinds or isinstance(mechanism, str):
+            raise InputError(f"mechanism = {mechanism!r}; expected one of 1, 2, 3, 4")
         one: Any = self.weights
         if isinstance(one, Symmetric):
             changed = replace(one, **{key: value for key in asdict(one) if key.partition("_")[0] in kinds})
