@@ -85,6 +85,8 @@ def record_plan(
         raise InputError(
             f"the plan's {steps} times are not those of its first steps; expected multiples of {stride.dt}"
         )
+    if np.isnan(planned.x).any():
+        raise InputError("plan: a walk of which no more is known from a fall on; expected a plan to its end")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((len(plan.time), ROOT_QPOS))
