@@ -1,6 +1,7 @@
 """Every check of `hexmj doctor` passes here and, where its failure is simulated, reports it and names a remedy."""
 
 import json
+import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from drawing import drawing
 from hexmj.cli import machine_checks
 from hexmj.cli.machine_checks import CHECKS, Unfit, examine
+from hexmj.controllers.cruse1998 import kernel
 from hexmj.errors import SimulationError
 from hexmj.measures import physical
 from hexmj.process import threads
@@ -71,6 +73,10 @@ def no_cache(monkeypatch, tmp_path):
     monkeypatch.setattr(machine_checks.tempfile, "TemporaryFile", refuse)
 
 
+def no_compiler(monkeypatch, tmp_path):
+    monkeypatch.setattr(kernel, "record", lambda: None)  # as it is with NUMBA_DISABLE_JIT
+
+
 def a_vain_wish(monkeypatch, tmp_path):
     monkeypatch.setattr(gl, "_VAIN", ["nonsense"])
 
@@ -94,6 +100,7 @@ def no_walk(monkeypatch, tmp_path):
         ("rendering", a_vain_wish, "MUJOCO_GL = nonsense is not there; expected one of egl, glfw and osmesa that is"),
         ("films", no_ffmpeg, "ffmpeg"),
         ("compiled code", no_cache, "Permission denied"),
+        ("compiled code", no_compiler, "NUMBA_DISABLE_JIT is set"),
         ("walking", no_walk, "start 0 diverged"),
     ],
 )
@@ -123,6 +130,20 @@ def test_what_was_left_out_is_no_failure(run, monkeypatch):
     code, out, _ = run("doctor")
     assert code == 0
     assert out.startswith("note   films: ") and out.endswith('pip install ".[film]"\n')
+
+
+@drawing
+def test_what_can_be_kept_nowhere_hides_no_other_check():
+    """As where numba finds no folder that it may write to."""
+    nowhere = "from numba.core.caching import CacheImpl as c; c._locator_classes.clear(); import hexmj.__main__ as m; "
+    done = subprocess.run(
+        [sys.executable, "-c", f"{nowhere} m.main()", "doctor", "--json"], capture_output=True, text=True
+    )
+    well = {one["name"]: one["well"] for one in json.loads(done.stdout)["checks"]}
+    assert done.returncode == 1
+    assert well == {name: name not in ("compiled code", "walking") for name in CHECKS}
+    version = [sys.executable, "-c", f"{nowhere} m.main()", "--version"]
+    assert subprocess.run(version, capture_output=True, text=True).stdout.startswith("hexmj ")
 
 
 def test_one_failure_does_not_hide_the_others(monkeypatch):

@@ -98,7 +98,7 @@ def deciding(words: Sequence[str]) -> list[str]:
 def named(words: Sequence[str]) -> Iterator[str]:
     """Everything that may be a name: words, values behind `=`, and controllers that TOML files among them name; all
     without what tells that a mechanism is left out."""
-    from hexmj.controllers.named import PART
+    from hexmj.controllers.varied_names import PART
 
     for word in words:
         name = PART.sub("", word.partition("=")[2] if word.startswith("--") else word)

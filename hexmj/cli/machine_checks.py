@@ -146,6 +146,8 @@ def compiled() -> str:
     from hexmj.controllers.cruse1998 import kernel
 
     record: Any = kernel.record
+    if not hasattr(record, "stats"):
+        raise Unfit("nothing is compiled, for NUMBA_DISABLE_JIT is set, and walks take far longer")
     folder = record.stats.cache_path
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -175,8 +177,8 @@ CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "threads": (threads, "give --threads with the number of cores that are granted"),
     "rendering": (rendering, f"install {PACKAGES} and leave MUJOCO_GL unset, or set it to egl; only films need it"),
     "films": (films, "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
-    "compiled code": (compiled, "set NUMBA_CACHE_DIR to a folder that can be written to"),
-    "walking": (walking, "reinstall mujoco and numba within the bounds above; if it stays, report it"),
+    "compiled code": (compiled, "leave NUMBA_DISABLE_JIT unset, and set NUMBA_CACHE_DIR to a folder that is writable"),
+    "walking": (walking, "mend what else is WRONG, or reinstall mujoco and numba; if it stays, report it"),
 }
 """Name of a check -> the check, and what to do where it fails."""
 

@@ -129,7 +129,7 @@ class Search(WalkingCommand):
 
     def _check(self) -> None:
         """Refuse what makes no sense together, or would not be obeyed."""
-        from hexmj.controllers.named import PART
+        from hexmj.controllers.varied_names import PART
 
         thread_count(self.workers.threads)
         if not self.physical:
@@ -180,7 +180,8 @@ class Search(WalkingCommand):
         return replace(self.controlled, **{rule: name for rule, name in taken.items() if name != "printed"})
 
     def _form(self) -> "Form":
-        from hexmj.controllers.named import PART, parameter_file
+        from hexmj.controllers.named import parameter_file
+        from hexmj.controllers.varied_names import PART
         from hexmj.search.forms import FieldsForm
         from hexmj.search.network_forms import FORMS, NetworkForm
 

@@ -1,7 +1,6 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
 import os
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -18,6 +17,7 @@ from hexmj.controllers.cruse1998 import PRESETS
 from hexmj.controllers.cruse1998.presets import read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.toml_fields import with_fields
+from hexmj.controllers.varied_names import PART, VARIED
 from hexmj.errors import InputError
 from hexmj.storage.files import SEARCHED, read_toml
 from hexmj.storage.literal import literal
@@ -28,12 +28,6 @@ ENTRY_POINTS = "hexmj.controllers"
 
 NO_FILE = "expected the path of one from the current folder; ~ is expanded by shells, in front of a word"
 """What is said of a file that is not there."""
-
-VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
-"""Names of controllers of which one mechanism or rule is left out, or switched on."""
-
-PART = re.compile(r"(-(without|with)-\d)+$")
-"""The end of such names."""
 
 
 def load_controller(name: str) -> Controller:

@@ -4,9 +4,10 @@ from typing import Any
 
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
 from hexmj.controllers.cruse1998.presets import own_tables
-from hexmj.controllers.named import PART, parameter_file
+from hexmj.controllers.named import parameter_file
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, Evolved
+from hexmj.controllers.varied_names import PART
 from hexmj.storage.files import SEARCHED, read_toml
 from hexmj.sweeps.plain_settings import plain
 

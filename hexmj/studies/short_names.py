@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import PurePath
 
-from hexmj.controllers.named import VARIED, known_names
+from hexmj.controllers.named import known_names
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.varied_names import VARIED
 
 LONGEST = 24
 """Letters of a name that a controller gives itself, at most."""
