@@ -88,9 +88,9 @@ def _made_of(function: Callable[..., Any]) -> str:
 
 
 def _told(one: Any) -> str:
-    """Something that a function looks up, whatever path leads to a module and however NumPy prints a number."""
+    """Something that a function looks up, whatever path leads to a module and however NumPy prints numbers."""
     if hasattr(one, "py_func"):
         return _made_of(one.py_func)
     if isinstance(one, ModuleType):
         return one.__name__
-    return repr((one.dtype.str, one.item()) if isinstance(one, np.generic) else one)
+    return repr((one.dtype.str, one.tolist()) if isinstance(one, np.generic | np.ndarray) else one)

@@ -94,9 +94,9 @@ def check_time_grows(walk: Walk) -> None:
     """Refuse a walk that is none, as of several that were joined.
 
     Raises:
-        InputError: its time does not grow with each step.
+        InputError: its time is not finite, or does not grow with each step.
     """
-    if not (np.diff(walk.time) > 0).all():
+    if not (np.isfinite(walk.time).all() and (np.diff(walk.time) > 0).all()):
         raise InputError("a walk whose time does not grow with each step; expected that of one walk")
 
 

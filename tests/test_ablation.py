@@ -14,6 +14,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import general
+from hexmj.controllers.rivals.walknet import Walknet
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
 from hexmj.studies.ablation.figure import FEWER, NONE, ablation_figure
@@ -57,7 +58,7 @@ def test_without_all_mechanisms_the_network_is_uncoordinated() -> None:
     ("name", "said"),
     [
         ("ldvs-without-2", "ldvs-without-2 is ldvs: expected a mechanism that makes a difference"),
-        ("ldvs-without-7", "mechanism = 7; expected one of 1, 2, 3, 4"),
+        ("ldvs-without-7", "mechanism = 7; expected a whole number of at least 1 and at most 4"),
         ("ldvs-with-3", "ldvs with mechanism 3; expected 2 or 4"),
         ("walknet-without-5", "walknet without rule 5; expected one of 1, 2, 3"),
         ("walknet-with-2", "walknet has no mechanisms or rules that can be switched on; expected walknet-without-2"),
@@ -70,10 +71,14 @@ def test_what_cannot_be_switched_is_refused_in_a_sentence(name: str, said: str) 
         hexmj.load_controller(name)
 
 
-def test_a_mechanism_is_no_text() -> None:
-    text: Any = "3"
-    with pytest.raises(InputError, match="mechanism = '3'; expected one of 1, 2, 3, 4"):
-        hexmj.LDVS.without(text)
+@pytest.mark.parametrize("wrong", ["3", True, 2.0, np.array("2"), np.array([2]), None])
+def test_mechanisms_and_rules_are_whole_numbers(wrong: Any) -> None:
+    """And nothing that looks like one."""
+    for without in (hexmj.LDVS.without, hexmj.LDVS.having, Walknet().without):
+        with pytest.raises(InputError, match="expected a whole number"):
+            without(wrong)
+    three: Any = np.int64(3)
+    assert hexmj.LDVS.without(three) == hexmj.LDVS.without(3)
 
 
 @pytest.mark.thorough

@@ -350,6 +350,8 @@ def test_what_makes_no_sense():
     for told in (gait, loss_time):
         with pytest.raises(InputError, match="a walk whose time does not grow"):
             told(replace(back, time=back.time[::-1].copy()))
+        with pytest.raises(InputError, match="a walk whose time does not grow"):
+            told(replace(back, time=np.append(back.time[:-1], np.inf)))
     with pytest.raises(InputError, match="a walk of 0 starts"):
         gait(of_starts(back, slice(0)))
 

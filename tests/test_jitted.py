@@ -13,7 +13,7 @@ from hexmj import rotations, stability
 from hexmj.bodies import newton
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.environments import compiled_passes
-from hexmj.jitted import _made_of
+from hexmj.jitted import _made_of, _told
 from hexmj.physics import outcomes
 
 HELPER = "from hexmj.jitted import jitted\nFACTOR = 2.0\n@jitted\ndef inner(x):\n    return x + 1.0\n"
@@ -116,6 +116,16 @@ def test_code_of_other_types_is_compiled_anew(tmp_path):
 def flipped(data: bytes, place: int) -> bytes:
     """With one bit turned."""
     return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]
+
+
+def test_arrays_count_to_their_last_number_and_bit():
+    """Of which NumPy prints eight digits, and of many numbers a few."""
+    numbers = np.arange(5000.0)
+    for place in (1, 2500):
+        other = numbers.copy()
+        other[place] = np.nextafter(other[place], np.inf)
+        assert _told(other) != _told(numbers) == _told(numbers.copy())
+    assert _told(numbers.astype(int)) != _told(numbers)
 
 
 def test_whatever_is_kept_stands_under_a_checksum():

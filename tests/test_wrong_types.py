@@ -265,9 +265,14 @@ BAD: list[tuple[Callable[[], Any], str]] = [
         lambda: plan_recorded(slice(1, None)),
         "the plan's 49 times are not those of its first steps; expected multiples of 0.1",
     ),
-    (
-        lambda: hexmj.record_plan(replace(walk(), x=walk().x * np.nan), hexmj.Conditions(), hexmj.Stride()),
-        "plan: a walk of which no more is known from a fall on; expected a plan to its end",
+    *(
+        (
+            lambda name=name: hexmj.record_plan(
+                replace(walk(), **{name: getattr(walk(), name) * np.nan}), hexmj.Conditions(), hexmj.Stride()
+            ),
+            "plan: a walk of which no more is known from a fall on; expected a plan to its end",
+        )
+        for name in ("x", "y", "velocity")
     ),
     (lambda: hexmj.save_recording(plan_recorded(), "/dev/full"), "/dev/full is a pipe or a device; expected a file"),
     (lambda: hexmj.render([plan_recorded()], "x\0.mp4"), "path = 'x\\x00.mp4'; expected one without a null"),

@@ -154,9 +154,16 @@ def _found(where: str, what: str, name: str) -> Controller:
 def _offers(value: Any) -> bool:
     """Whether something looks like a controller, or like a class of them with defaults."""
     kind = value if isinstance(value, type) else type(value)
-    if not is_dataclass(kind) or getattr_static(kind, "begin", None) is None:
+    if (
+        not is_dataclass(kind)
+        or getattr_static(kind, "begin", None) is None
+        or "begin" in {one.name for one in fields(kind)}
+    ):
         return False
-    asked = signature(kind).parameters.values() if value is kind else ()
+    try:
+        asked = signature(kind).parameters.values() if value is kind else ()
+    except (TypeError, ValueError):  # of a class that a built-in one makes
+        return False
     return not any(one.default is one.empty and one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in asked)
 
 

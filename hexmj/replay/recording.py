@@ -85,7 +85,7 @@ def record_plan(
         raise InputError(
             f"the plan's {steps} times are not those of its first steps; expected multiples of {stride.dt}"
         )
-    if np.isnan(planned.x).any():
+    if any(np.isnan(told).any() for told in (planned.x, planned.y, planned.velocity)):
         raise InputError("plan: a walk of which no more is known from a fall on; expected a plan to its end")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)

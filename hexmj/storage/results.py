@@ -63,7 +63,7 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
         if not nearest.is_dir():
             what = "is a file" if nearest.exists() else "is a link to nothing"
             raise InputError(f"--out {path}: {nearest} {what}; expected a folder")
-        if nearest != path and path.suffix in {Path(name).suffix for name in names} - {""}:
+        if nearest != path and path.suffix.lower() in {Path(name).suffix for name in names} - {""}:
             raise InputError(f"--out {path} is called like a file; expected a folder, which {names[0]} is put into")
         missing = path.absolute().relative_to(nearest.absolute()).parts
         if os.pardir in missing:

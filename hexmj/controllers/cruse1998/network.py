@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, whole
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.controllers.cruse1998.readings import Reading
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
@@ -66,6 +66,7 @@ class Cruse1998:
         Raises:
             InputError: no such mechanism, or one that the set has not got.
         """
+        mechanism = whole("mechanism", mechanism, 1, 4)
         return self._having(mechanism, 0.0, f"{self.name}-without-{mechanism}")
 
     def having(self, mechanism: int) -> "Cruse1998":
@@ -74,6 +75,7 @@ class Cruse1998:
         Raises:
             InputError: another mechanism, or one that the set has already.
         """
+        mechanism = whole("mechanism", mechanism, 1, 4)
         if mechanism not in (2, 4):
             raise InputError(f"{self.name} with mechanism {mechanism}; expected 2 or 4, which are on or off")
         return self._having(mechanism, 1.0, f"{self.name}-with-{mechanism}")
@@ -81,8 +83,6 @@ class Cruse1998:
     def _having(self, mechanism: int, value: float, name: str) -> "Cruse1998":
         """Every weight of a mechanism set to a value."""
         kinds = [kind for kind in NEIGHBOURS if kind[1] == str(mechanism)]
-        if not kinds or isinstance(mechanism, str):
-            raise InputError(f"mechanism = {mechanism!r}; expected one of 1, 2, 3, 4")
         one: Any = self.weights
         if isinstance(one, Symmetric):
             changed = replace(one, **{key: value for key in asdict(one) if key.partition("_")[0] in kinds})

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.checks import check_types
+from hexmj.checks import check_types, whole
 from hexmj.controllers.rivals.lifted import Legs, Lifted
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
@@ -213,6 +213,7 @@ class Walknet(Lifted):
         Raises:
             InputError: a rule that does not act.
         """
+        rule = whole("rule", rule, 0)
         if rule not in self.rules:
             raise InputError(f"{self.name} without rule {rule}; expected one of {', '.join(map(str, self.rules))}")
         return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(one for one in self.rules if one != rule))
