@@ -43,7 +43,7 @@ class Stride:
     dt: float = 0.1
     """Time step of a plan, of Eq. 6 for the network [time units; in one, a protracting tip moves 1 mm]."""
     geometry: Geometry = field(default=FIG1)
-    """Lines of the tips: 'fig1', or 'centred' with the centre of mass above O_2."""
+    """Lines of the tips: fig1, as in Fig. 1 (`FIG1`), or centred (`CENTRED`), with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
         check_types(self)
