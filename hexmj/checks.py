@@ -5,7 +5,7 @@ NumPy's scalars are taken for the Python numbers that they are; True and False a
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from enum import EnumType
@@ -36,6 +36,7 @@ _NAMES = {
     NoneType: "None",
     np.ndarray: "an array",
     Callable: "a function",
+    Mapping: "a dict",
 }
 """What is expected, by type; of any other class one of its objects."""
 

@@ -229,6 +229,18 @@ def unusual(told: Mapping[str, Any]) -> list[str]:
     return [name for name, value in told.items() if name in obeyed or value != usual[name]]
 
 
+def check_obeyed(conditions: Conditions) -> None:
+    """Refuse measures of an obstacle that the ground has not got: a walk would not obey them.
+
+    Raises:
+        InputError: one of them is not as usual.
+    """
+    ground, usual = conditions.ground, vars(Ground())
+    for name, value in vars(ground).items():
+        if name not in ("ground", *OBEYED[ground.ground]) and value != usual[name]:
+            raise InputError(f"{name} = {value} with ground = {ground.ground}; expected it with a ground that has it")
+
+
 def bounds(body: Body) -> dict[str, Bound]:
     """What each condition may be, by its own name, for a body."""
     lengths = body.lengths

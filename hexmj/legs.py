@@ -14,6 +14,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
+from hexmj.labels import labels_of
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
 """Names by index: side, then segment from front (1) to rear (3)."""
@@ -72,7 +73,13 @@ GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
 
 
 def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
-    """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers.
+    """Values as (..., leg), see `ordered`."""
+    return ordered(values, name, behind)[0]
+
+
+def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
+    """Values as (..., leg), the legs as `LEGS` has them where xarray or pandas labels them, but by rising numbers; and
+    which legs these are, where labels tell.
 
     Args:
         values: of legs, or of some of them; an axis `leg`, or one that has all labels, may stand anywhere, the others
@@ -85,7 +92,7 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
     """
     several: Iterable[Any] = values if type(values) in (list, tuple) else ()
     if any(hasattr(one, "iloc") or _is_of_xarray(one) for one in several):
-        return [in_order(one, name, behind) for one in several]
+        return [in_order(one, name, behind) for one in several], []
     labels = [] if behind else [*getattr(values, "columns", ())]
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
         on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
@@ -95,11 +102,11 @@ def in_order(values: Any, name: str = "starts", behind: int = 0) -> Any:
         values, labels = _of_xarray(values, name, behind)
     numbered = all(isinstance(one, Integral) for one in labels) and labels == sorted({*labels})
     if numbered or hasattr(values, "data_vars") or np.ndim(values) <= behind:
-        return values
-    places = [labels.index(leg) for leg in LEGS if leg in labels]
-    if len(places) != len(labels):
+        return values, []
+    legs = [leg for leg in LEGS if leg in labels]
+    if len(legs) != len(labels):
         raise InputError(f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}")
-    return np.take(np.asarray(values), places, axis=-1 - behind)
+    return np.take(np.asarray(values), [labels.index(leg) for leg in legs], axis=-1 - behind), legs
 
 
 def check_order(values: Any, name: str) -> None:
@@ -108,8 +115,7 @@ def check_order(values: Any, name: str) -> None:
     Raises:
         InputError: they are such.
     """
-    axes = values.axes if hasattr(values, "iloc") else getattr(values, "indexes", {}).values()
-    for labels in ([*axis] for axis in axes):
+    for labels in labels_of(values):
         if _name_legs(labels) and labels != [*LEGS]:
             raise InputError(
                 f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}, in order"

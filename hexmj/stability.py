@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import numbers, states
 from hexmj.errors import InputError
 from hexmj.jitted import jitted
-from hexmj.legs import in_order
+from hexmj.legs import ordered
 from hexmj.process.threads import run_blocks
 from hexmj.walks import Walk, check_time_grows, checked_walk
 
@@ -61,7 +61,10 @@ def _margins_of(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np
 
 
 def _of_legs(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    return numbers("feet", in_order(feet, "feet", behind=1)), states("stance", in_order(stance, "stance"))
+    (tips, of), (stands, whose) = ordered(feet, "feet", behind=1), ordered(stance, "stance")
+    if of and whose and of != whose:
+        raise InputError(f"feet of {', '.join(of)}, stance of {', '.join(whose)}; expected those of the same legs")
+    return numbers("feet", tips), states("stance", stands)
 
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:

@@ -1,6 +1,7 @@
-"""Legs that xarray, pandas or another table labels are taken by their names, in whatever order they come."""
+"""Legs that xarray, pandas or another table labels are taken by their names, in whatever order they come; parameters
+are refused in another order."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import h5py
@@ -11,7 +12,10 @@ import xarray as xr
 from scipy import sparse
 
 import hexmj
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.legs import FIG1, LEGS, MIRROR
+from hexmj.search.network_forms import FORMS
+from hexmj.search.samples import Sample
 from hexmj.walks import PlannedWalk
 
 FEET = np.column_stack([FIG1.origin, FIG1.y])
@@ -128,3 +132,50 @@ def test_labelled_legs_of_a_posture_may_come_in_any_order():
         hexmj.stability_margin(places.iloc[:, 0], stands[0])
     with pytest.raises(hexmj.InputError, match=r"^stance of the legs .*; expected L1, L2, L3, R1, R2, R3$"):
         hexmj.stability_margin(feet, down.assign_coords(leg=[*"abcdef"]))
+
+
+def test_feet_and_stances_are_those_of_the_same_legs():
+    feet = pd.DataFrame(np.arange(8.0).reshape(4, 2), index=["R1", "L1", "L2", "L3"])
+    with pytest.raises(
+        hexmj.InputError, match="feet of L1, L2, L3, R1, stance of L1, L2, R1, R2; expected those of the"
+    ):
+        hexmj.support_polygon(feet, pd.Series([True] * 4, index=["L1", "L2", "R1", "R2"]))
+    assert len(hexmj.support_polygon(feet, pd.Series([True, True, False, False], index=["L1", "R1", "L2", "L3"]))) == 2
+
+
+def test_labelled_parameters_stand_in_order():
+    """pandas sorts columns by their names."""
+    own: Any = hexmj.LDVS.weights
+    every = general(own).to_vector()
+    ordered = pd.Series(asdict(own))
+    assert hexmj.Symmetric.from_vector(ordered) == own
+    forms = {name: hexmj.NetworkForm(name) for name in FORMS}
+    labelled = pd.Series(every, forms["general"].names)
+    assert np.array_equal(hexmj.Weights.from_vector(labelled).to_vector(), every)
+    sample = Sample(hexmj.Problem(forms["ldvs"], 0.3, 0.3, window=20.0), 5, 0)
+    table = ordered.to_frame().T
+    wrong_order: Any = table.sort_index(axis="columns")
+    tables: list[Any] = [table, Table(table)]
+    for one in tables:
+        assert np.array_equal(sample.costs(one), sample.costs(own.to_vector()[None]))
+    fields = hexmj.FieldsForm(hexmj.load_controller("righetti"))
+    usual: Any = xr.DataArray(fields.begin, {"parameter": [*fields.names]})
+    assert fields.controller(usual) == fields.usual
+    for wrong in (
+        lambda: hexmj.Symmetric.from_vector(ordered.sort_index()),
+        lambda: hexmj.Weights.from_vector(labelled.sort_index(ascending=False)),
+        lambda: forms["ldvs"].controller(ordered[::-1]),
+        lambda: forms["hws"].controller(ordered),
+        lambda: fields.controller(usual[::-1]),
+        lambda: sample.costs(wrong_order),
+        lambda: sample.costs(tables[1].__class__(wrong_order)),
+    ):
+        with pytest.raises(hexmj.InputError, match=r"in this order$"):
+            wrong()
+
+
+def test_a_vector_has_a_number_for_each_parameter():
+    forms = *map(hexmj.NetworkForm, FORMS), hexmj.FieldsForm(hexmj.load_controller("righetti"))
+    for form in forms:
+        with pytest.raises(hexmj.InputError, match=rf"shape \(3,\); expected {len(form.names)}: "):
+            form.controller(np.zeros(3))

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("checks", "errors", "intervals", "jitted", "legs", "phases", "rotations", "storage", "version"),
+    ("checks", "errors", "intervals", "jitted", "labels", "legs", "phases", "rotations", "storage", "version"),
     ("field_docs", "pictures", "process", "user_code"),
     ("sweeps",),  # knows nothing of walking
     ("diagrams", "timing"),

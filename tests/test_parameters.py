@@ -5,6 +5,7 @@ import runpy
 import shlex
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,7 +59,13 @@ def test_vectors_go_back_and_forth(controller):
 
 def test_short_forms_leave_out_the_velocity_dependence():
     assert Symmetric.from_vector(HWS_WEIGHTS.to_vector(9)) == HWS_WEIGHTS
-    assert not Weights.from_vector(general(LDVS.weights).to_vector(48)).p34.any()
+    assert np.array_equal(
+        Weights.from_vector(general(HWS_WEIGHTS).to_vector(48)).to_vector(), general(HWS_WEIGHTS).to_vector()
+    )
+    weights: Any
+    for weights, short in ((LDVS.weights, 9), (general(LDVS.weights), 48)):
+        with pytest.raises(InputError, match=r"p34.* lack it"):
+            weights.to_vector(short)
     assert general(LDVS.weights).p34.any()
 
 

@@ -84,6 +84,14 @@ def test_without_a_terminal_lines_are_printed(monkeypatch, capsys):
     assert first.startswith(r"walking\n: 50% in 0 s, about 0 s to go")
 
 
+def test_without_standard_error_nothing_is_printed(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "EVERY", 0.02)
+    monkeypatch.setattr(sys, "stderr", None)
+    with progress.progress_bar("walking"):
+        time.sleep(0.3)
+    assert capsys.readouterr().out == ""
+
+
 def test_a_terminal_is_told_of_compiling_while_nothing_is_done(monkeypatch):
     """And no longer."""
     screen = Terminal()

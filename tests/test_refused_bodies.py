@@ -155,6 +155,11 @@ def test_descriptions_that_the_mjcf_does_not_fit_are_refused(changes: dict[str, 
         ("<mujoco model", "<mujoco mod", "does not compile"),
         ("</worldbody>", '</worldbody><equality><weld body1="mesothorax"/></equality>', "equality constraints = 1"),
         ('gravity="0 0 -9810"', 'gravity="0 0 -9810" density="1000" viscosity="10"', "density = 1000.0; expected 0"),
+        (
+            '<geom name="ground"',
+            '<geom name="ground" surfacevel="4.5 0 0"',
+            "of the geom 'ground'; expected 0: the ground stays",
+        ),
         ('<body name="mesothorax"', '<body name="mesothorax" gravcomp="1"', "gravcomp = 1.0 of the body 'mesothorax'"),
     ],
 )

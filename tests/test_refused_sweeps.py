@@ -92,7 +92,7 @@ def shut() -> Executor:
         (lambda: run(None), "cells = None; expected a Sequence"),  # pyright: ignore
         (lambda: run(odd_cells(2), executor=shut()), "cannot schedule new futures after shutdown"),
         (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
-        (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a Mapping"),  # pyright: ignore
+        (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a dict"),  # pyright: ignore
         (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
         (lambda: Cell("odd", odd, {}, work=-1), "work = -1.0 of odd; expected a finite number above 0"),
         (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore

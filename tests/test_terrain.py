@@ -38,7 +38,7 @@ from hexmj.studies.terrain.study import FARTHER, Terrain, reach
 from hexmj.sweeps import Cell, conduct
 
 GROUNDS = {
-    "flat": Conditions.of(ground_at=45.0),
+    "flat": Conditions(),
     "step": Conditions.of(ground="step", ground_at=45.0),
     "gap": Conditions.of(ground="gap", ground_at=45.0, ground_length=5.0),
     "hurdle": Conditions.of(ground="hurdle", ground_at=45.0),
@@ -173,7 +173,7 @@ def test_the_distance_is_what_was_walked_in_whole_steps():
     flat = conduct(Terrain(LDVS, **told)).sel(obstacle="flat").squeeze()
     duration = flat.attrs["distance"] / 0.4
     starts = draw_starts(3, 0, told["stride"])
-    walk = physical_walk(starts, LDVS, 0.4, duration, conditions=FARTHER, stride=told["stride"], threads=1)
+    walk = physical_walk(starts, LDVS, 0.4, duration, stride=told["stride"], threads=1)
     upright = np.isinf(flat.fall.values)
     walked = walk.qpos[-1, :, 0] - settle(starts, FARTHER, told["stride"], 1).qpos[:, 0]
     assert upright.any() and duration % 0.8 > 0.1
@@ -284,10 +284,10 @@ def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
     assert np.abs(shown[0] - shown[1]).mean() > 2.0
 
 
-@pytest.mark.parametrize("ground", ["step", "gap"])
-def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground):
+@pytest.mark.parametrize(("ground", "size"), [("step", {"ground_height": 2.0}), ("gap", {"ground_length": 1.0})])
+def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
     body = replace(STICK_INSECT, lengths=replace(STICK_INSECT.lengths, ground_reach=60.0))
-    ahead = Conditions.of(ground=ground, ground_length=1.0, ground_at=46.0, ground_height=2.0)
+    ahead = Conditions.of(ground=ground, ground_at=46.0, **size)
     with pytest.raises(InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected a window in which no"):
         physical_walk(draw_starts(1, 3), PRESETS["own-0.3"], 0.3, 700.0, conditions=replace(ahead, body=body))
 

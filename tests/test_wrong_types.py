@@ -19,6 +19,7 @@ from hexmj.checks import typed
 from hexmj.conditions import Ground, Masses, TimeScale
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
 from hexmj.gaits import gait, limit_gait
@@ -188,6 +189,26 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.Cruse1998("hws"), "weights = 'hws'; expected a Symmetric or a Weights"),  # pyright: ignore
     (lambda: replace(LDVS, order=1), "order = 1; valid names: printed, undelayed, sequential"),
     (lambda: replace(LDVS, name=3), "name = 3; expected a text"),
+    *(
+        (lambda key=key: hexmj.Weights.of({key: 1.0}), f"{key} has no weight; expected one of p1, p2, ")  # pyright: ignore
+        for key in (("p9", (0, 1)), ("p1", (6, 1)), ("p1", (-6, -5)), ("p1", 3))
+    ),
+    *(
+        (
+            lambda walks=walks: walks(hexmj.Conditions.of(ground_height=6.0)),
+            "ground_height = 6.0 with ground = flat; expected",
+        )
+        for walks in (
+            lambda told: hexmj.compare(hexmj.LDVS, 0.3, n_starts=1, window=1.0, conditions=told),
+            lambda told: hexmj.physical_walk(STARTS[:1], hexmj.LDVS, 0.3, 1.0, conditions=told),
+            lambda told: dm.load(conditions=told),
+        )
+    ),
+    (lambda: hexmj.NetworkForm("ldvs").vector("x"), "controller = 'x'; expected a controller"),  # pyright: ignore
+    (lambda: hexmj.Weights.of({("p1", (0, 1)): "a"}), "p1 (0, 1) = 'a'; expected a number"),  # pyright: ignore
+    (lambda: hexmj.Weights.of([1]), "numbers = [1]; expected a dict"),  # pyright: ignore
+    (lambda: hexmj.LDVS.weights.to_vector(7), "size = 7; valid names: 9, 10"),  # pyright: ignore
+    (lambda: general(hexmj.LDVS.weights).to_vector(10), "size = 10; valid names: 48, 58"),  # pyright: ignore
     (lambda: hexmj.Weights.from_vector(["0"] * 58), "weights = ['0', '0', "),  # pyright: ignore
     (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Conditions(time=3), "time = 3; expected a TimeScale"),  # pyright: ignore

@@ -42,6 +42,7 @@ LEG_DOFS = Owner(" of a leg's joint", slice(ROOT_QVEL, None))
 JOINT = Owner(" of the joint", _ALL, _OBJECT.mjOBJ_JOINT)
 BODY = Owner(" of the body", _ALL, _OBJECT.mjOBJ_BODY)
 ACTUATOR = Owner(" of the actuator", _ALL, _OBJECT.mjOBJ_ACTUATOR)
+GEOM = Owner(" of the geom", _ALL, _OBJECT.mjOBJ_GEOM)
 PAIR = Owner(" of the pair", _ALL, _OBJECT.mjOBJ_PAIR)
 PAIR_ENDS = PAIR._replace(rows=np.s_[:, :2])
 
@@ -89,6 +90,7 @@ RULES = (
     Rule("damping", "actuator_damping", ACTUATOR, 0, 0, SERVO),
     Rule("damping", "actuator_dampingpoly", ACTUATOR, 0, 0, SERVO),
     Rule("actuatorgroupdisable", "opt.disableactuator", MODEL, 0, 0, "none"),
+    Rule("surfacevel", "geom_surfacevel", GEOM, 0, 0, "0: the ground stays where it is"),
     Rule("condim", "pair_dim", PAIR, 3, inf, "3 or more: friction"),
     Rule("solreffriction", "pair_solreffriction", PAIR, 0, 0, "0: friction is as hard as the contact"),
     Rule("solimp", "pair_solimp", PAIR_ENDS, 0.9, inf, "0.9 or more, MuJoCo's own, at both ends"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from hexmj.checks import check_types, given, printable, short, typed
-from hexmj.conditions import Conditions
+from hexmj.conditions import Conditions, check_obeyed
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
@@ -145,7 +145,8 @@ def compare(
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}
     typed("folder", folder, Path | str | None)
-    walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
+    check_obeyed(conditions := given("conditions", conditions, Conditions))
+    walks = conditions, given("stride", stride, Stride), acceleration
     return conduct(Comparison(controllers, several(velocities), n_starts, window, seed, *walks), folder, **how)
 
 

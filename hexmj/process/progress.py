@@ -114,7 +114,9 @@ def _in_lines(label: str) -> Iterator[Progress]:
             left = f", about {max(gone / sofar - gone, 0.0):.0f} s to go" if sofar > 0 else nothing
             nothing = ""
             with suppress(OSError, ValueError, AttributeError):  # closed, or nobody listens any more
-                print(f"{literal(label)}: {sofar:.0%} in {gone:.0f} s{left}", file=sys.stderr, flush=True)
+                line = f"{literal(label)}: {sofar:.0%} in {gone:.0f} s{left}\n"
+                sys.stderr.write(line)  # print takes standard output where there is none
+                sys.stderr.flush()
 
     teller = Thread(target=tell, daemon=True)
     teller.start()

@@ -9,6 +9,7 @@ import numpy as np
 from hexmj.checks import short, typed
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.labels import vector_of
 from hexmj.sweeps.plain_settings import plain
 
 
@@ -89,10 +90,12 @@ class FieldsForm:
     def controller(self, vector: np.ndarray) -> Controller:
         """See `Form.controller`."""
         of: Any = self.usual
-        return replace(of, **dict(zip(self.names, vector.tolist(), strict=True)))
+        values = vector_of(vector, self.names, "parameters").tolist()
+        return replace(of, **dict(zip(self.names, values, strict=True)))
 
     def vector(self, controller: Controller) -> np.ndarray:
         """See `Form.vector`."""
+        check_controller_type(controller)
         if type(controller) is not type(self.usual):
             raise InputError(f"{controller.name} to begin with; expected a {type(self.usual).__name__}")
         of: Any = self.usual

@@ -14,15 +14,25 @@ import numpy as np
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import Cruse1998, Order
 from hexmj.controllers.cruse1998.readings import Reading, in_words
-from hexmj.controllers.cruse1998.weights import BINARY, NEIGHBOURS, AnyWeights, Symmetric, Weights, general
-from hexmj.controllers.protocol import Controller
+from hexmj.controllers.cruse1998.weights import (
+    BINARY,
+    NEIGHBOURS,
+    AnyWeights,
+    Symmetric,
+    Weights,
+    general,
+    names_of,
+    pairs,
+)
+from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.labels import vector_of
 from hexmj.legs import MIRROR
 
 FormName = Literal["hws", "ldvs", "mirrored", "general"]
 
-_ALL = [(kind, d, e) for kind, neighbours in NEIGHBOURS.items() for d in range(6) for e in neighbours[d]]
-_LEFT = [(kind, d, e) for kind, d, e in _ALL if d < 3]
+_ALL = [(kind, pair) for kind in NEIGHBOURS for pair in pairs(kind)]
+_LEFT = [(kind, pair) for kind, pair in _ALL if pair[0] < 3]
 
 
 @dataclass(frozen=True)
@@ -47,27 +57,23 @@ def _symmetric(size: Literal[9, 10]) -> Parameters:
     return Parameters(tuple(names), Symmetric.from_vector, vector)
 
 
-def _names(places: list[tuple[str, int, int]]) -> tuple[str, ...]:
-    return tuple(f"{kind} {d + 1},{e + 1}" for kind, d, e in places)
-
-
 def _mirrored(vector: np.ndarray) -> Weights:
     matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    for (kind, d, e), value in zip(_LEFT, vector, strict=True):
+    for (kind, (d, e)), value in zip(_LEFT, vector, strict=True):
         matrices[kind][d, e] = matrices[kind][MIRROR[d], MIRROR[e]] = value
     return Weights(**matrices)
 
 
 def _left(weights: AnyWeights) -> np.ndarray:
     every = general(weights)
-    return np.array([getattr(every, kind)[d, e] for kind, d, e in _LEFT])
+    return np.array([getattr(every, kind)[pair] for kind, pair in _LEFT])
 
 
 FORMS: dict[FormName, Parameters] = {
     "hws": _symmetric(9),
     "ldvs": _symmetric(10),
-    "mirrored": Parameters(_names(_LEFT), _mirrored, _left),
-    "general": Parameters(_names(_ALL), Weights.from_vector, lambda weights: general(weights).to_vector()),
+    "mirrored": Parameters(names_of(_LEFT), _mirrored, _left),
+    "general": Parameters(names_of(_ALL), Weights.from_vector, lambda weights: general(weights).to_vector()),
 }
 """Forms by their names."""
 
@@ -116,10 +122,12 @@ class NetworkForm:
 
     def controller(self, vector: np.ndarray) -> Cruse1998:
         """See `forms.Form.controller`."""
-        return Cruse1998(FORMS[self.name].weights(vector), self.order, reading=self.reading)
+        weights = FORMS[self.name].weights(vector_of(vector, self.names, "parameters"))
+        return Cruse1998(weights, self.order, reading=self.reading)
 
     def vector(self, controller: Controller) -> np.ndarray:
         """See `forms.Form.vector`."""
+        check_controller_type(controller)
         if type(controller) is not Cruse1998:
             raise InputError(f"{controller.name} is not made of weights alone; expected a set of the 1998 network")
         rules = [(one.order, in_words(one.reading)) for one in (controller, self)]

@@ -13,6 +13,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
 from hexmj.intervals import wilson_intervals
+from hexmj.labels import check_labels
 from hexmj.measures.kinematic import first_loss
 from hexmj.process.progress import Progress, part_of
 from hexmj.process.threads import thread_count
@@ -97,6 +98,7 @@ class Sample:
         Raises:
             InputError: no such vectors.
         """
+        check_labels(vectors, self.problem.form.names, "vectors")
         vectors = numbers("vectors", vectors)
         if vectors.shape[1:] != (len(self.problem.form.names),):
             raise InputError(f"vectors of the shape {vectors.shape}; expected (candidate, parameter)")

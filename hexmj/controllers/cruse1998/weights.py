@@ -7,12 +7,14 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import product
 from typing import Literal
 
 import numpy as np
 
-from hexmj.checks import check_types, numbers
+from hexmj.checks import check_types, numbers, short, typed
 from hexmj.errors import InputError
+from hexmj.labels import check_labels
 from hexmj.legs import N1, N2, N3, N4, check_order
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
@@ -29,6 +31,14 @@ def pairs(kind: str) -> list[tuple[int, int]]:
 def _in_vector(size: int) -> list[tuple[str, tuple[int, int]]]:
     """Kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
     return [(kind, pair) for kind in NEIGHBOURS if kind != "p34" or size == 58 for pair in pairs(kind)]
+
+
+_PLACES = {(kind, pair) for kind in NEIGHBOURS for pair in product(range(6), repeat=2)}
+
+
+def names_of(places: Sequence[tuple[str, tuple[int, int]]]) -> tuple[str, ...]:
+    """Names of weights, ``p1 1,2`` of a kind and a pair: the paper counts legs from 1."""
+    return tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,22 +84,42 @@ class Weights:
 
     @classmethod
     def of(cls, numbers: Mapping[tuple[str, tuple[int, int]], float]) -> "Weights":
-        """From numbers by kind and (destination, source) leg; what is not given is 0."""
+        """From numbers by kind and (destination, source) leg, each from 0 to 5; what is not given is 0.
+
+        Raises:
+            InputError: other keys, or numbers that make no sense.
+        """
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for (kind, pair), value in numbers.items():
-            matrices[kind][pair] = value
+        for key, value in typed("numbers", numbers, Mapping).items():
+            if key not in _PLACES:
+                raise InputError(
+                    f"{short(key)} has no weight; expected one of {', '.join(NEIGHBOURS)}, and two legs from 0 to 5"
+                )
+            kind, pair = key
+            matrices[kind][pair] = typed(f"{kind} {pair}", value, float)
         return cls(**matrices)
 
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
-        """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d."""
+        """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d.
+
+        Raises:
+            InputError: other numbers of them, labels in another order, or weights that make no sense.
+        """
         numbered = numbers("weights", vector)
         if (size := numbered.size) not in (48, 58):
             raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
+        check_labels(vector, names_of(_in_vector(size)), "weights")
         return cls.of(dict(zip(_in_vector(size), numbered.ravel(), strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
-        """The inverse of `from_vector`."""
+        """The inverse of `from_vector`.
+
+        Raises:
+            InputError: another size, or 48 where p34 is not 0.
+        """
+        if typed("size", size, Literal[48, 58]) == 48 and self.p34.any():
+            raise InputError("p34 is not 0; expected 58 weights, of which 48 lack it")
         return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
 
 
@@ -128,17 +158,28 @@ class Symmetric:
 
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
-        """Read ten numbers in the order of the fields, or nine without p34_i."""
+        """Read ten numbers in the order of the fields, or nine without p34_i.
+
+        Raises:
+            InputError: other numbers of them, labels in another order, or weights that make no sense.
+        """
         names = [f.name for f in fields(cls)]
         values = numbers("weights", vector).ravel().tolist()
         if len(values) == 9:
             names.remove("p34_i")
         elif len(values) != 10:
             raise InputError(f"{len(values)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
+        check_labels(vector, names, "weights")
         return cls(**dict(zip(names, values, strict=True)))
 
     def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
-        """The inverse of `from_vector`."""
+        """The inverse of `from_vector`.
+
+        Raises:
+            InputError: another size, or 9 where p34_i is not 0.
+        """
+        if typed("size", size, Literal[9, 10]) == 9 and self.p34_i:
+            raise InputError(f"p34_i = {self.p34_i}; expected 10 parameters, of which 9 lack it")
         return np.array([v for key, v in asdict(self).items() if key != "p34_i" or size == 10])
 
     def expand(self) -> Weights:
