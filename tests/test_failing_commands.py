@@ -32,6 +32,15 @@ def test_a_library_that_cannot_be_loaded_is_not_blamed_on_the_output(run, monkey
     assert (code, error) == (2, "hexmj: the system: Could not find/load shared object file\n")
 
 
+def test_a_folder_that_goes_meanwhile_is_not_blamed_on_the_output(run, monkeypatch):
+    def fail(*_, **__):
+        raise FileNotFoundError(2, "No such file or directory")  # as os.getcwd() does
+
+    monkeypatch.setattr("hexmj.measures.kinematic.first_loss", fail)
+    code, _, error = run("flss", "--starts", 5, "--window", 10)
+    assert (code, error) == (2, "hexmj: the current folder is no longer there; expected one that is\n")
+
+
 @pytest.mark.parametrize(
     ("failed", "why"),
     [

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from hexmj.controllers.checked_plans import said
 from tiers import few_of
 
 WALK = ("walk", "--physical", "--window", "1")
@@ -107,6 +108,34 @@ def test_a_folder_that_has_gone(tmp_path: Path):
         ["sh", "-c", script], cwd=gone, env=os.environ | there, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (2, "hexmj: the current folder is no longer there; expected one that is\n")
+
+
+def test_who_walks_in_a_folder_that_has_gone_needs_none(tmp_path: Path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    program = "import hexmj; print(hexmj.first_loss(hexmj.draw_starts(2, 0), hexmj.LDVS, 0.3, 5.0).shape)"
+    script = f'rmdir "{gone}"; exec "{sys.executable}" -P -c "{program}"'
+    there = {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, filter(None, sys.path)))}
+    done = subprocess.run(["sh", "-c", script], cwd=gone, env=os.environ | there, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("(2,)\n", "")
+
+
+def test_a_thread_leaves_the_folder_to_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Which may change it while a plan is at work."""
+    begun, moved = threading.Event(), threading.Event()
+
+    def plan() -> None:
+        with said("a plan"):
+            begun.set()
+            moved.wait(60)
+
+    thread = threading.Thread(target=plan)
+    thread.start()
+    begun.wait(60)
+    monkeypatch.chdir(tmp_path)
+    moved.set()
+    thread.join()
+    assert Path.cwd() == tmp_path
 
 
 def test_no_thread_is_a_sentence(run: Any, monkeypatch: pytest.MonkeyPatch):

@@ -14,6 +14,8 @@ from hexmj.storage.literal import literal
 NARROWEST = 40
 """Columns of a terminal; in a few, boxes of help are never done."""
 
+GONE = "the current folder is no longer there; expected one that is"
+
 _NUMBERS = {"NUMBA_NUM_THREADS": (1, 2**31 - 1), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
 """Variables of the environment -> least and most that libraries take: threads; seconds to the end of the year 9999."""
 
@@ -31,7 +33,7 @@ def settle() -> None:
     try:
         os.getcwd()
     except FileNotFoundError:
-        raise InputError("the current folder is no longer there; expected one that is") from None
+        raise InputError(GONE) from None
     columns = shutil.get_terminal_size().columns
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))

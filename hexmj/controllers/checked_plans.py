@@ -6,8 +6,9 @@ What a user's code raises becomes one sentence that says where.
 import os
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from threading import current_thread, main_thread
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -232,8 +233,11 @@ def tell(plan: ReadingPlan, sensed: Sensed) -> None:
 
 @contextmanager
 def said(what: str) -> Iterator[None]:
-    """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back."""
-    here = os.getcwd()
+    """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back.
+
+    But not in a thread beside the main one: the folder is the whole program's, and may be changed there meanwhile.
+    """
+    here = _folder() if current_thread() is main_thread() else ""
     try:
         yield
     except InputError:
@@ -247,5 +251,13 @@ def said(what: str) -> Iterator[None]:
             f"{what}: {type(error).__name__} in {place.filename}, line {place.lineno}: {said:.300}"
         ) from error
     finally:
-        if os.getcwd() != here:
-            os.chdir(here)
+        if here and _folder() != here:
+            with suppress(FileNotFoundError):  # it was removed meanwhile
+                os.chdir(here)
+
+
+def _folder() -> str:
+    """The current folder; empty where it was removed, and nobody may need it."""
+    with suppress(FileNotFoundError):
+        return os.getcwd()
+    return ""
