@@ -110,13 +110,15 @@ def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
 
 
 def check_order(values: Any, name: str) -> None:
-    """Refuse values of which xarray or pandas labels an axis by legs, and in another order than `LEGS`.
+    """Refuse values of which xarray or pandas labels an axis by legs, but in another order than `LEGS`, or by numbers
+    that do not rise.
 
     Raises:
         InputError: they are such.
     """
     for labels in labels_of(values):
-        if _name_legs(labels) and labels != [*LEGS]:
+        falling = all(isinstance(one, Integral) for one in labels) and labels != sorted({*labels})
+        if falling or (_name_legs(labels) and labels != [*LEGS]):
             raise InputError(
                 f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}, in order"
             )

@@ -92,6 +92,10 @@ def test_labelled_weights_stand_in_order():
         assert np.array_equal(replace(plain, p1=table).p1, plain.p1)
         with pytest.raises(hexmj.InputError, match=told):
             replace(plain, p1=table[[*LEGS][::-1]] if table is tables[0] else table[:, ::-1])
+    numbered: Any = pd.DataFrame(plain.p1, [1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 6])
+    assert np.array_equal(replace(plain, p1=numbered).p1, plain.p1)
+    with pytest.raises(hexmj.InputError, match="p1 of the legs 4, 5, 6, 1, 2, 3; expected L1"):
+        replace(plain, p1=numbered.iloc[[3, 4, 5, 0, 1, 2]])
 
 
 class Table:

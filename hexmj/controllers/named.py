@@ -38,7 +38,8 @@ def load_controller(name: str) -> Controller:
             or 4 (``ldvs-with-2``); ``module:object`` or ``file.py:object``, a controller or a class of controllers,
             which is made with its defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with weights of
             the 1998 network, or with the name of a `controller` and, unless all are usual, a table of its `fields`.
-            With other weights or fields it has the name of the file.
+            With other weights or fields it has the name of the file.  What a search has found is judged by other starts
+            than its own, those of seed 0 (of robust-0.3 and robust-0.7 also of 5 and 1), as by those of 1998.
 
     Raises:
         InputError: no such name, file, module or object, or an object that is no controller.
