@@ -28,6 +28,9 @@ LABEL = 200
 NO_ARRAY = ValueError, TypeError, RuntimeError, AttributeError
 """What objects raise that are asked for an array and cannot be one, as a dataset or a tensor with gradients."""
 
+TILDE = "expected the path of the folder for which ~ stands: only shells put it there, in front of a word"
+"""What is said of a path that begins with ~."""
+
 _NAMES = {
     float: "a number",
     int: "a whole number",
@@ -102,6 +105,8 @@ def path_of(path: Path | str) -> Path:
         os.fsencode(path)
     except UnicodeEncodeError:
         raise InputError(f"path = {str(path)!r:.80}; expected characters that names of files can have") from None
+    if Path(path).parts[:1] == ("~",):
+        raise InputError(f"path = {str(path)!r:.80}; {TILDE}")
     if path == "":
         raise InputError("path = ''; expected a name, or '.' for the current folder")
     return Path(path)

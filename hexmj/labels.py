@@ -1,6 +1,7 @@
 """Labels of xarray, pandas or another table along the axes of values that are read by their places."""
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -10,21 +11,34 @@ from hexmj.errors import InputError
 
 
 def labels_of(values: Any) -> list[list[Any]]:
-    """What labels each axis of values; nothing for those without labels."""
+    """What labels each axis of values, in order; nothing for an axis without labels."""
     if hasattr(values, "iloc"):
         return [[*axis] for axis in values.axes]
-    columns = getattr(values, "columns", ())  # of a table that has no index, as polars' tables
-    return [[*axis] for axis in (*getattr(values, "indexes", {}).values(), columns)]
+    if hasattr(values, "dims") and hasattr(values, "indexes"):  # of xarray
+        along = {values[name].dims[0]: [*labels] for name, labels in values.indexes.items()}
+        return [along.get(axis, []) for axis in values.dims]
+    columns = getattr(values, "columns", ())
+    return [[], [*columns] if isinstance(columns, list | tuple) else []]  # of a table without an index, as of polars
+
+
+def falling(labels: Sequence[Any]) -> bool:
+    """Whether labels are whole numbers that do not rise."""
+    return all(isinstance(one, Integral) for one in labels) and list(labels) != sorted({*labels})
 
 
 def check_labels(values: Any, names: Sequence[str], name: str) -> None:
-    """Refuse values of which an axis is labelled by some of these names, and not by all of them in order.
+    """Refuse values, (..., parameter), of which an axis is labelled by some of these names, unless the last one is by
+    all of them in order; or the last one by numbers that do not rise.
 
     Raises:
         InputError: they are such.
     """
-    for labels in labels_of(values):
-        if labels != [*names] and not {*map(str, labels)}.isdisjoint(names):
+    for one in values if type(values) in (list, tuple) else ():
+        check_labels(one, names, name)
+    *others, last = labels_of(values)
+    for labels in (*others, last):
+        named = not {*map(str, labels)}.isdisjoint(names)
+        if (named and (labels is not last or labels != [*names])) or (labels is last and falling(labels)):
             raise InputError(
                 f"{name} of {', '.join(map(str, labels)):.80}; expected {', '.join(names):.200}, in this order"
             )

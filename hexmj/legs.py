@@ -14,7 +14,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-from hexmj.labels import labels_of
+from hexmj.labels import falling, labels_of
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
 """Names by index: side, then segment from front (1) to rear (3)."""
@@ -117,8 +117,7 @@ def check_order(values: Any, name: str) -> None:
         InputError: they are such.
     """
     for labels in labels_of(values):
-        falling = all(isinstance(one, Integral) for one in labels) and labels != sorted({*labels})
-        if falling or (_name_legs(labels) and labels != [*LEGS]):
+        if falling(labels) or (_name_legs(labels) and labels != [*LEGS]):
             raise InputError(
                 f"{name} of the legs {', '.join(map(str, labels)):.80}; expected {', '.join(LEGS)}, in order"
             )

@@ -92,10 +92,22 @@ def test_labelled_weights_stand_in_order():
         assert np.array_equal(replace(plain, p1=table).p1, plain.p1)
         with pytest.raises(hexmj.InputError, match=told):
             replace(plain, p1=table[[*LEGS][::-1]] if table is tables[0] else table[:, ::-1])
+    assert np.array_equal(replace(plain, p1=Unlabelled(plain.p1)).p1, plain.p1)
     numbered: Any = pd.DataFrame(plain.p1, [1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 6])
     assert np.array_equal(replace(plain, p1=numbered).p1, plain.p1)
     with pytest.raises(hexmj.InputError, match="p1 of the legs 4, 5, 6, 1, 2, 3; expected L1"):
         replace(plain, p1=numbered.iloc[[3, 4, 5, 0, 1, 2]])
+
+
+class Unlabelled(np.ndarray):
+    """Whose `columns` and `indexes` are something else."""
+
+    def __new__(cls, values: np.ndarray) -> Any:
+        return np.asarray(values).view(cls)
+
+    def indexes(self) -> None: ...
+
+    columns = None
 
 
 class Table:
@@ -162,6 +174,10 @@ def test_labelled_parameters_stand_in_order():
     tables: list[Any] = [table, Table(table)]
     for one in tables:
         assert np.array_equal(sample.costs(one), sample.costs(own.to_vector()[None]))
+    square: Any = pd.concat([table] * 10)
+    candidates: Any = xr.DataArray(square.values, {"parameter": [*ordered.index]}, ("candidate", "parameter"))
+    for one in (square, candidates):
+        assert len({*sample.costs(one)}) == 1
     fields = hexmj.FieldsForm(hexmj.load_controller("righetti"))
     usual: Any = xr.DataArray(fields.begin, {"parameter": [*fields.names]})
     assert fields.controller(usual) == fields.usual
@@ -172,6 +188,9 @@ def test_labelled_parameters_stand_in_order():
         lambda: forms["hws"].controller(ordered),
         lambda: fields.controller(usual[::-1]),
         lambda: sample.costs(wrong_order),
+        lambda: sample.costs(square.T),
+        lambda: sample.costs([ordered[::-1], ordered]),  # pyright: ignore
+        lambda: hexmj.Symmetric.from_vector(pd.Series(own.to_vector())[::-1]),
         lambda: sample.costs(tables[1].__class__(wrong_order)),
     ):
         with pytest.raises(hexmj.InputError, match=r"in this order$"):

@@ -158,7 +158,7 @@ def test_descriptions_that_the_mjcf_does_not_fit_are_refused(changes: dict[str, 
         (
             '<geom name="ground"',
             '<geom name="ground" surfacevel="4.5 0 0"',
-            "of the geom 'ground'; expected 0: the ground stays",
+            "of the geom 'ground'; expected 0: nothing moves",
         ),
         ('<body name="mesothorax"', '<body name="mesothorax" gravcomp="1"', "gravcomp = 1.0 of the body 'mesothorax'"),
     ],

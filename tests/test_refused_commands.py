@@ -100,6 +100,7 @@ NONSENSE = [
     (["flss", "--pep-min", "5"], "hexmj: pep_min = 5.0, pep0 = -10.0, aep0 = 10.0 mm; expected"),
     (["flss", "--model", "x" * 400], "neither one of hws, ldvs"),
     (["flss", "--out", "results/flss/manifest.json"], "is a file; expected a folder"),
+    (["flss", "--out=~/flss"], "hexmj: --out ~/flss: expected the path of the folder for which ~ stands"),
     (["walk", "--out", "walk.PNG"], "walk.PNG is called like a file; expected a folder, which"),
     (["render", "--out", "film.mp4"], "film.mp4 is called like a file; expected a folder, which"),
     (["render", *(f"{n}.nc" for n in range(7))], "7 recordings were given; expected 1 to 6"),

@@ -230,6 +230,14 @@ def test_a_title_fits_into_its_figure():
     assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.width
 
 
+def test_what_is_written_again_stays_as_private(tmp_path: Path):
+    path = hexmj.save(xr.Dataset({"one": 1.0}), tmp_path / "kept.nc")
+    for mode in (0o600, 0o664):
+        path.chmod(mode)
+        hexmj.save(xr.Dataset({"one": 2.0}), path)
+        assert path.stat().st_mode & 0o777 == mode
+
+
 def test_a_notebook_is_shown_a_figure():
     shown = Image.open(io.BytesIO(hexmj.plot(flss())._repr_png_()))
     assert shown.format == "PNG"

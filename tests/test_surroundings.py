@@ -120,12 +120,16 @@ def test_who_walks_in_a_folder_that_has_gone_needs_none(tmp_path: Path):
     assert (done.stdout, done.stderr) == ("(2,)\n", "")
 
 
-def test_a_thread_leaves_the_folder_to_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Which may change it while a plan is at work."""
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_thread_leaves_the_folder_to_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: bool):
+    """Which may change it while a plan is at work, unless that changes it as well."""
+    before = Path.cwd()
     begun, moved = threading.Event(), threading.Event()
 
     def plan() -> None:
         with said("a plan"):
+            if moves:
+                os.chdir("/")
             begun.set()
             moved.wait(60)
 
@@ -135,7 +139,7 @@ def test_a_thread_leaves_the_folder_to_the_program(tmp_path: Path, monkeypatch: 
     monkeypatch.chdir(tmp_path)
     moved.set()
     thread.join()
-    assert Path.cwd() == tmp_path
+    assert Path.cwd() == (before if moves else tmp_path)
 
 
 def test_no_thread_is_a_sentence(run: Any, monkeypatch: pytest.MonkeyPatch):

@@ -22,6 +22,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
+from hexmj.environments.task import Task
 from hexmj.gaits import gait, limit_gait
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
@@ -30,6 +31,7 @@ from hexmj.paper.reproduce import measure
 from hexmj.phases import circular_mean, circular_range, unrolled, wilson_phase
 from hexmj.physics.settling import settle
 from hexmj.search import samples, stages
+from hexmj.studies.biology.study import Biology
 from hexmj.walks import one_start, part_of
 
 anything: Any = hexmj
@@ -190,8 +192,12 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: replace(LDVS, order=1), "order = 1; valid names: printed, undelayed, sequential"),
     (lambda: replace(LDVS, name=3), "name = 3; expected a text"),
     *(
+        (lambda key=key: hexmj.Weights.of({key: 1.0}), f"a weight's key = {key}; expected 2 values")  # pyright: ignore
+        for key in (("p1", (1.0, 0.0)), ("p1", (False, 1)), ("p1", 3))
+    ),
+    *(
         (lambda key=key: hexmj.Weights.of({key: 1.0}), f"{key} has no weight; expected one of p1, p2, ")  # pyright: ignore
-        for key in (("p9", (0, 1)), ("p1", (6, 1)), ("p1", (-6, -5)), ("p1", 3))
+        for key in (("p9", (0, 1)), ("p1", (6, 1)), ("p1", (-6, -5)))
     ),
     *(
         (
@@ -202,13 +208,16 @@ BAD: list[tuple[Callable[[], Any], str]] = [
             lambda told: hexmj.compare(hexmj.LDVS, 0.3, n_starts=1, window=1.0, conditions=told),
             lambda told: hexmj.physical_walk(STARTS[:1], hexmj.LDVS, 0.3, 1.0, conditions=told),
             lambda told: dm.load(conditions=told),
+            lambda told: Task(conditions=told),
+            lambda told: Biology(hexmj.LDVS, conditions=told),
+            lambda told: hexmj.Problem(hexmj.NetworkForm(), 0.3, 0.3, conditions=told),
         )
     ),
     (lambda: hexmj.NetworkForm("ldvs").vector("x"), "controller = 'x'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Weights.of({("p1", (0, 1)): "a"}), "p1 (0, 1) = 'a'; expected a number"),  # pyright: ignore
     (lambda: hexmj.Weights.of([1]), "numbers = [1]; expected a dict"),  # pyright: ignore
-    (lambda: hexmj.LDVS.weights.to_vector(7), "size = 7; valid names: 9, 10"),  # pyright: ignore
-    (lambda: general(hexmj.LDVS.weights).to_vector(10), "size = 10; valid names: 48, 58"),  # pyright: ignore
+    (lambda: hexmj.LDVS.weights.to_vector(7), "size = 7; expected 9 or 10"),  # pyright: ignore
+    (lambda: general(hexmj.LDVS.weights).to_vector(10), "size = 10; expected 48 or 58"),  # pyright: ignore
     (lambda: hexmj.Weights.from_vector(["0"] * 58), "weights = ['0', '0', "),  # pyright: ignore
     (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Conditions(time=3), "time = 3; expected a TimeScale"),  # pyright: ignore
@@ -294,6 +303,10 @@ BAD: list[tuple[Callable[[], Any], str]] = [
             "plan: a walk of which no more is known from a fall on; expected a plan to its end",
         )
         for name in ("x", "y", "velocity")
+    ),
+    (
+        lambda: hexmj.save_recording(plan_recorded(), "~/kept.nc"),
+        "path = '~/kept.nc'; expected the path of the folder for",
     ),
     (lambda: hexmj.save_recording(plan_recorded(), "/dev/full"), "/dev/full is a pipe or a device; expected a file"),
     (lambda: hexmj.render([plan_recorded()], "x\0.mp4"), "path = 'x\\x00.mp4'; expected one without a null"),

@@ -90,7 +90,7 @@ RULES = (
     Rule("damping", "actuator_damping", ACTUATOR, 0, 0, SERVO),
     Rule("damping", "actuator_dampingpoly", ACTUATOR, 0, 0, SERVO),
     Rule("actuatorgroupdisable", "opt.disableactuator", MODEL, 0, 0, "none"),
-    Rule("surfacevel", "geom_surfacevel", GEOM, 0, 0, "0: the ground stays where it is"),
+    Rule("surfacevel", "geom_surfacevel", GEOM, 0, 0, "0: nothing moves along its own surface"),
     Rule("condim", "pair_dim", PAIR, 3, inf, "3 or more: friction"),
     Rule("solreffriction", "pair_solreffriction", PAIR, 0, 0, "0: friction is as hard as the contact"),
     Rule("solimp", "pair_solimp", PAIR_ENDS, 0.9, inf, "0.9 or more, MuJoCo's own, at both ends"),

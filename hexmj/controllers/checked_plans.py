@@ -3,12 +3,10 @@
 What a user's code raises becomes one sentence that says where.
 """
 
-import os
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
-from threading import current_thread, main_thread
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +27,7 @@ from hexmj.legs import LEGS
 from hexmj.process.threads import check_memory, thread_count
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride, check_reached
+from hexmj.user_code.current_folder import kept_folder
 from hexmj.walks import PLANNED, PlannedWalk, copied
 
 KEPT = 400
@@ -233,13 +232,10 @@ def tell(plan: ReadingPlan, sensed: Sensed) -> None:
 
 @contextmanager
 def said(what: str) -> Iterator[None]:
-    """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back.
-
-    But not in a thread beside the main one: the folder is the whole program's, and may be changed there meanwhile.
-    """
-    here = _folder() if current_thread() is main_thread() else ""
+    """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back."""
     try:
-        yield
+        with kept_folder():
+            yield
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -250,14 +246,3 @@ def said(what: str) -> Iterator[None]:
         raise InputError(
             f"{what}: {type(error).__name__} in {place.filename}, line {place.lineno}: {said:.300}"
         ) from error
-    finally:
-        if here and _folder() != here:
-            with suppress(FileNotFoundError):  # it was removed meanwhile
-                os.chdir(here)
-
-
-def _folder() -> str:
-    """The current folder; empty where it was removed, and nobody may need it."""
-    with suppress(FileNotFoundError):
-        return os.getcwd()
-    return ""

@@ -21,6 +21,7 @@ from hexmj.controllers.varied_names import PART, VARIED
 from hexmj.errors import InputError
 from hexmj.storage.files import SEARCHED, read_toml
 from hexmj.storage.literal import literal
+from hexmj.user_code.current_folder import kept_folder
 from hexmj.user_code.loaded import importable
 
 ENTRY_POINTS = "hexmj.controllers"
@@ -182,18 +183,16 @@ def _made(make: Callable[[], Any], name: str, expected: str) -> Controller:
 
 
 def _module(where: str, name: str) -> ModuleType:
-    here = os.getcwd()
     if not where.endswith(".py") and (os.sep in where or ("." in where and isfile(where))):
         raise InputError(f"controller {name!r}: {where} is neither a module nor a file that ends in .py")
     try:
-        if not where.endswith(".py"):
-            return import_module(where)
-        if isfile(where):
-            return importable(where)
+        with kept_folder():
+            if not where.endswith(".py"):
+                return import_module(where)
+            if isfile(where):
+                return importable(where)
     except InputError as error:
         raise InputError(f"controller {name!r}: {error}") from None
     except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
-    finally:
-        os.chdir(here)  # which some files change
     raise InputError(f"controller {name!r}: {where} is no file; {NO_FILE}")

@@ -27,7 +27,7 @@ from dm_env import specs
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.loading import check_home, compile_body
 from hexmj.checks import given
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
 from hexmj.environments.compiled_passes import beyond, worth
@@ -78,7 +78,6 @@ def load(
         InputError: a value that makes no sense; here, or for an action in `step`.
     """
     conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
-    check_obeyed(conditions)
     task = Task(velocity, actions, controller, conditions, stride, duration)
     compiled = compile_body(conditions, conditions.timestep(stride))
     check_home(compiled)

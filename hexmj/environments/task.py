@@ -40,7 +40,7 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.checks import check_types, numbers
-from hexmj.conditions import Conditions
+from hexmj.conditions import Conditions, check_obeyed
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -87,6 +87,7 @@ class Task:
                 f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p"
             )
         check_controller_type(self.controller)
+        check_obeyed(self.conditions)
         steps_within(self.duration, self.stride)
 
     @property

@@ -67,6 +67,7 @@ class Comparison:
             printable("a controller's name", name)
             settings_of(controller)  # now, not after the work
         check_draw(self.n_starts, self.seed)
+        check_obeyed(self.conditions)
         _ = self.observed
 
     @property
@@ -145,8 +146,7 @@ def compare(
         check_controller_type(controllers)
         controllers = {controllers.name: controllers}
     typed("folder", folder, Path | str | None)
-    check_obeyed(conditions := given("conditions", conditions, Conditions))
-    walks = conditions, given("stride", stride, Stride), acceleration
+    walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
     return conduct(Comparison(controllers, several(velocities), n_starts, window, seed, *walks), folder, **how)
 
 

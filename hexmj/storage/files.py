@@ -6,6 +6,7 @@ A sealed file ends with a checksum of all that stands before it: 80 bytes that r
 import hashlib
 import os
 import re
+import shutil
 import stat
 import time
 import tomllib
@@ -80,6 +81,8 @@ def replacing(path: Path) -> Iterator[Path]:
             with part.open("rb+") as file:
                 os.fsync(file.fileno())
                 WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
+            if real.exists():
+                shutil.copymode(real, part)  # as whoever shares it, or does not, has set it
             os.replace(part, real)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None

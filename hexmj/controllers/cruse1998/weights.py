@@ -91,11 +91,11 @@ class Weights:
         """
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
         for key, value in typed("numbers", numbers, Mapping).items():
-            if key not in _PLACES:
+            kind, pair = typed("a weight's key", key, tuple[str, tuple[int, int]])
+            if (kind, pair) not in _PLACES:
                 raise InputError(
                     f"{short(key)} has no weight; expected one of {', '.join(NEIGHBOURS)}, and two legs from 0 to 5"
                 )
-            kind, pair = key
             matrices[kind][pair] = typed(f"{kind} {pair}", value, float)
         return cls(**matrices)
 
@@ -118,7 +118,9 @@ class Weights:
         Raises:
             InputError: another size, or 48 where p34 is not 0.
         """
-        if typed("size", size, Literal[48, 58]) == 48 and self.p34.any():
+        if size not in (48, 58):
+            raise InputError(f"size = {short(size)}; expected 48 or 58")
+        if size == 48 and self.p34.any():
             raise InputError("p34 is not 0; expected 58 weights, of which 48 lack it")
         return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
 
@@ -178,7 +180,9 @@ class Symmetric:
         Raises:
             InputError: another size, or 9 where p34_i is not 0.
         """
-        if typed("size", size, Literal[9, 10]) == 9 and self.p34_i:
+        if size not in (9, 10):
+            raise InputError(f"size = {short(size)}; expected 9 or 10")
+        if size == 9 and self.p34_i:
             raise InputError(f"p34_i = {self.p34_i}; expected 10 parameters, of which 9 lack it")
         return np.array([v for key, v in asdict(self).items() if key != "p34_i" or size == 10])
 
