@@ -35,7 +35,7 @@ def check_labels(values: Any, names: Sequence[str], name: str) -> None:
     """
     for one in values if type(values) in (list, tuple) else ():
         check_labels(one, names, name)
-    *others, last = labels_of(values)
+    *others, last = labels_of(values) or [[]]
     for labels in (*others, last):
         named = not {*map(str, labels)}.isdisjoint(names)
         if (named and (labels is not last or labels != [*names])) or (labels is last and falling(labels)):

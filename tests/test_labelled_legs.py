@@ -163,6 +163,7 @@ def test_labelled_parameters_stand_in_order():
     """pandas sorts columns by their names."""
     own: Any = hexmj.LDVS.weights
     every = general(own).to_vector()
+    assert hexmj.Symmetric.from_vector([*xr.DataArray(own.to_vector())]) == own
     ordered = pd.Series(asdict(own))
     assert hexmj.Symmetric.from_vector(ordered) == own
     forms = {name: hexmj.NetworkForm(name) for name in FORMS}
