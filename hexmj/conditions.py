@@ -235,10 +235,15 @@ def check_obeyed(conditions: Conditions) -> None:
     Raises:
         InputError: one of them is not as usual.
     """
-    ground, usual = conditions.ground, vars(Ground())
-    for name, value in vars(ground).items():
-        if name not in ("ground", *OBEYED[ground.ground]) and value != usual[name]:
-            raise InputError(f"{name} = {value} with ground = {ground.ground}; expected it with a ground that has it")
+    for name in vain(conditions.ground):
+        told = f"{name} = {getattr(conditions.ground, name)} with ground = {conditions.ground.ground}"
+        raise InputError(f"{told}; expected it with a ground that has it")
+
+
+def vain(ground: Ground) -> list[str]:
+    """Names of a ground's measures that are not as usual, though its kind does not obey them."""
+    usual, obeyed = vars(Ground()), ("ground", *OBEYED[ground.ground])
+    return [name for name, value in vars(ground).items() if name not in obeyed and value != usual[name]]
 
 
 def bounds(body: Body) -> dict[str, Bound]:

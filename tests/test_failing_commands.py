@@ -1,5 +1,6 @@
 """What fails on a command's way is one sentence: compiled code, memory, a simulation."""
 
+import os
 import shlex
 import subprocess
 import sys
@@ -32,9 +33,13 @@ def test_a_library_that_cannot_be_loaded_is_not_blamed_on_the_output(run, monkey
     assert (code, error) == (2, "hexmj: the system: Could not find/load shared object file\n")
 
 
-def test_a_folder_that_goes_meanwhile_is_not_blamed_on_the_output(run, monkeypatch):
+def test_a_folder_that_goes_meanwhile_is_not_blamed_on_the_output(run, monkeypatch, tmp_path):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+
     def fail(*_, **__):
-        raise FileNotFoundError(2, "No such file or directory")  # as os.getcwd() does
+        (tmp_path / "gone").rmdir()
+        os.getcwd()
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", fail)
     code, _, error = run("flss", "--starts", 5, "--window", 10)

@@ -12,7 +12,7 @@ from typing import Any
 from hexmj.cli import answer_stream
 from hexmj.cli.command_words import checked, typed
 from hexmj.cli.commands import COMMANDS, GOES_ON, options_of
-from hexmj.cli.surroundings import GONE, settle
+from hexmj.cli.surroundings import GONE, has_gone, settle
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.process.signals import of_stop
 from hexmj.storage.literal import literal
@@ -68,7 +68,7 @@ def main() -> None:
     except OSError as error:
         if is_of_numbas_cache(error):
             sys.exit(_complain(f"{NUMBA} ({error.strerror or error})", 2))
-        if error.errno == errno.ENOENT and not error.filename:
+        if not error.filename and has_gone():
             sys.exit(_complain(GONE, 2))
         where = error.filename or ("the system" if error.errno in (None, *SHORT) else OUTPUT)
         if where == OUTPUT:

@@ -13,7 +13,7 @@ from tyro.constructors import (
     StructTypeInfo,
 )
 
-from hexmj.conditions import OBEYED, Conditions, Ground
+from hexmj.conditions import Conditions, Ground, vain
 from hexmj.errors import InputError
 from hexmj.legs import GEOMETRIES, Geometry
 
@@ -46,11 +46,9 @@ def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
     parts = [one.name for one in fields(Conditions) if one.name != "body"]
 
     def conditions(**given: Any) -> Conditions:
-        if type(ground := given["ground"]) is Ground:
-            vain = [name for name in changed(ground, Ground()) if name not in ("ground", *OBEYED[ground.ground])]
-            if vain:
-                name = vain[0].replace("_", "-")
-                raise InputError(f"--{name} with --ground {ground.ground}; expected it with a ground that has it")
+        if type(ground := given["ground"]) is Ground and (names := vain(ground)):
+            name = names[0].replace("_", "-")
+            raise InputError(f"--{name} with --ground {ground.ground}; expected it with a ground that has it")
         return Conditions.of(**{name: value for part in given.values() for name, value in asdict(part).items()})
 
     return StructConstructorSpec(

@@ -30,10 +30,8 @@ def settle() -> None:
     Raises:
         InputError: the current folder has gone, or one of the numbers is none.
     """
-    try:
-        os.getcwd()
-    except FileNotFoundError:
-        raise InputError(GONE) from None
+    if has_gone():
+        raise InputError(GONE)
     columns = shutil.get_terminal_size().columns
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))
@@ -47,6 +45,15 @@ def settle() -> None:
     os.environ["MPLBACKEND"] = "agg"  # figures go to files
     drop_vain_wish()
     _spare_glfw_its_programs()
+
+
+def has_gone() -> bool:
+    """Whether the current folder was removed."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _spare_glfw_its_programs() -> None:
