@@ -105,11 +105,17 @@ def path_of(path: Path | str) -> Path:
         os.fsencode(path)
     except UnicodeEncodeError:
         raise InputError(f"path = {str(path)!r:.80}; expected characters that names of files can have") from None
-    if Path(path).parts[:1] == ("~",):
+    if stands_for_home(path):
         raise InputError(f"path = {str(path)!r:.80}; {TILDE}")
     if path == "":
         raise InputError("path = ''; expected a name, or '.' for the current folder")
     return Path(path)
+
+
+def stands_for_home(path: Path | str) -> bool:
+    """Whether a path begins with ~ or ~name as shells expand it, but none has."""
+    first = os.fspath(path).partition("/")[0]
+    return first == "~" or os.path.expanduser(first) != first
 
 
 def printable(name: str, value: Any) -> str:

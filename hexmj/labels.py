@@ -1,6 +1,6 @@
 """Labels of xarray, pandas or another table along the axes of values that are read by their places."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -17,8 +17,13 @@ def labels_of(values: Any) -> list[list[Any]]:
     if hasattr(values, "dims") and hasattr(values, "indexes"):  # of xarray
         along = {values[name].dims[0]: [*labels] for name, labels in values.indexes.items()}
         return [along.get(axis, []) for axis in values.dims]
+    return [[], columns_of(values)]
+
+
+def columns_of(values: Any) -> list[Any]:
+    """Names of a table's columns, of a table without an index, too, as of polars; nothing for other values."""
     columns = getattr(values, "columns", ())
-    return [[], [*columns] if isinstance(columns, list | tuple) else []]  # of a table without an index, as of polars
+    return [*columns] if isinstance(columns, Iterable) else []
 
 
 def falling(labels: Sequence[Any]) -> bool:
@@ -33,15 +38,14 @@ def check_labels(values: Any, names: Sequence[str], name: str) -> None:
     Raises:
         InputError: they are such.
     """
-    for one in values if type(values) in (list, tuple) else ():
-        check_labels(one, names, name)
-    *others, last = labels_of(values) or [[]]
-    for labels in (*others, last):
-        named = not {*map(str, labels)}.isdisjoint(names)
-        if (named and (labels is not last or labels != [*names])) or (labels is last and falling(labels)):
-            raise InputError(
-                f"{name} of {', '.join(map(str, labels)):.80}; expected {', '.join(names):.200}, in this order"
-            )
+    for one in (values, *(values if isinstance(values, Sequence) else ())):
+        *others, last = labels_of(one) or [[]]
+        for labels in (*others, last):
+            named = not {*map(str, labels)}.isdisjoint(names)
+            if (named and (labels is not last or labels != [*names])) or (labels is last and falling(labels)):
+                raise InputError(
+                    f"{name} of {', '.join(map(str, labels)):.80}; expected {', '.join(names):.200}, in this order"
+                )
 
 
 def vector_of(values: Any, names: Sequence[str], name: str) -> np.ndarray:

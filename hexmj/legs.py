@@ -14,7 +14,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-from hexmj.labels import falling, labels_of
+from hexmj.labels import columns_of, falling, labels_of
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
 """Names by index: side, then segment from front (1) to rear (3)."""
@@ -93,7 +93,7 @@ def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
     several: Iterable[Any] = values if type(values) in (list, tuple) else ()
     if any(hasattr(one, "iloc") or _is_of_xarray(one) for one in several):
         return [in_order(one, name, behind) for one in several], []
-    labels = [] if behind else [*getattr(values, "columns", ())]
+    labels = [] if behind else columns_of(values)
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
         on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
         values = values.T if on_its_side and len(values) == len(LEGS) else values

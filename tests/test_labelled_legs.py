@@ -1,6 +1,7 @@
 """Legs that xarray, pandas or another table labels are taken by their names, in whatever order they come; parameters
 are refused in another order."""
 
+from collections import deque
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -75,6 +76,7 @@ def test_labelled_legs_may_come_in_any_order():
         with pytest.raises(hexmj.InputError, match=r"^starts (have|of) .*; expected "):
             walk(given)
     assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
+    assert np.array_equal(walk(Unlabelled(starts)).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 
@@ -113,8 +115,8 @@ class Unlabelled(np.ndarray):
 class Table:
     """As polars has one: it knows its columns, and no index."""
 
-    def __init__(self, table: Any) -> None:
-        self.columns, self._values = [*table.columns], table.to_numpy()
+    def __init__(self, table: Any, kind: Any = list) -> None:
+        self.columns, self._values = kind(table.columns), table.to_numpy()
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self._values, dtype=dtype)
@@ -191,8 +193,10 @@ def test_labelled_parameters_stand_in_order():
         lambda: sample.costs(wrong_order),
         lambda: sample.costs(square.T),
         lambda: sample.costs([ordered[::-1], ordered]),  # pyright: ignore
+        lambda: sample.costs(deque([ordered[::-1]])),  # pyright: ignore
         lambda: hexmj.Symmetric.from_vector(pd.Series(own.to_vector())[::-1]),
-        lambda: sample.costs(tables[1].__class__(wrong_order)),
+        lambda: sample.costs(Table(wrong_order)),  # pyright: ignore
+        lambda: sample.costs(Table(wrong_order, pd.Index)),  # pyright: ignore
     ):
         with pytest.raises(hexmj.InputError, match=r"in this order$"):
             wrong()

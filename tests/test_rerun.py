@@ -239,13 +239,20 @@ def test_a_result_that_cannot_be_read_gets_a_sentence_before_anything_is_repeate
     assert "; it was changed after it was written" in error
 
 
-@pytest.mark.parametrize("where", ["from dataclasses", "        x = starts.copy()"])
-def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_path, monkeypatch, where):
-    """As it is imported, or as it begins a plan."""
+@pytest.mark.parametrize(
+    ("before", "begins"),
+    [
+        ("from dataclasses", ""),
+        ("    def begin", "    def __post_init__(self):\n        "),
+        ("        x = starts.copy()", "        "),
+    ],
+)
+def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_path, monkeypatch, before, begins):
+    """As it is imported, as its controller is made, or as that begins a plan."""
     monkeypatch.chdir(tmp_path)
     Path("sub").mkdir()
-    away = f"{where[: len(where) - len(where.lstrip())]}os.chdir(os.path.dirname(os.path.abspath(__file__)))\n"
-    Path("sub/mine.py").write_text("import os\n" + MINE.replace(where, away + where, 1))
+    away = f"{begins}os.chdir(os.path.dirname(os.path.abspath(__file__)))\n"
+    Path("sub/mine.py").write_text("import os\n" + MINE.replace(before, away + before, 1))
     words = ["flss", "--model", "sub/mine.py:Drags", "--velocities", 0.5, "--starts", 5, "--window", 10]
     assert run(*words, "--out", "out")[0] == 0
     assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"sub/mine.py"}

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,13 @@ def test_a_thread_leaves_the_folder_to_the_program(tmp_path: Path, monkeypatch: 
     moved.set()
     thread.join()
     assert Path.cwd() == (before if moves else tmp_path)
+
+
+def test_helpers_of_a_plan_do_not_move_the_program():
+    before = Path.cwd()
+    with said("a plan"), ThreadPoolExecutor(1) as helper:
+        helper.submit(os.chdir, "/").result()
+    assert Path.cwd() == before
 
 
 def test_no_thread_is_a_sentence(run: Any, monkeypatch: pytest.MonkeyPatch):

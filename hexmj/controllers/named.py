@@ -31,6 +31,7 @@ NO_FILE = "expected the path of one from the current folder; ~ is expanded by sh
 """What is said of a file that is not there."""
 
 
+@kept_folder()
 def load_controller(name: str) -> Controller:
     """A controller by its name.
 
@@ -186,11 +187,10 @@ def _module(where: str, name: str) -> ModuleType:
     if not where.endswith(".py") and (os.sep in where or ("." in where and isfile(where))):
         raise InputError(f"controller {name!r}: {where} is neither a module nor a file that ends in .py")
     try:
-        with kept_folder():
-            if not where.endswith(".py"):
-                return import_module(where)
-            if isfile(where):
-                return importable(where)
+        if not where.endswith(".py"):
+            return import_module(where)
+        if isfile(where):
+            return importable(where)
     except InputError as error:
         raise InputError(f"controller {name!r}: {error}") from None
     except (Exception, SystemExit) as error:  # whatever the user's code raises

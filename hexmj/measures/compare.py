@@ -165,6 +165,8 @@ def physical_flss(
 ) -> "xr.Dataset":
     """Physical FLSS: the frequency with which the trunk touches the ground; arguments and errors as of `compare`.
 
+    No polygon counts here: the contact gap of the conditions matters to controllers alone that read the legs.
+
     Returns:
         The table of `kinematic.flss`, the frequency of `BESIDE` with its interval; the times of the fall and of
         `BESIDE`, and the outcomes `REPORTED`, of every start.

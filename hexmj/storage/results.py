@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.checks import TILDE, path_of, typed
+from hexmj.checks import TILDE, path_of, stands_for_home, typed
 from hexmj.errors import InputError
 from hexmj.storage import netcdf
 from hexmj.storage.attributes import attributes
@@ -58,7 +58,7 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
     Raises:
         InputError: the path or a name in it is taken by something else, cannot be written to, or looks like a file's.
     """
-    if path.parts[:1] == ("~",):
+    if stands_for_home(path):
         raise InputError(f"--out {path}: {TILDE}")
     try:
         nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))

@@ -10,7 +10,7 @@ import numpy as np
 
 from hexmj.bodies.description import ROOT_QPOS
 from hexmj.checks import given, numbers, typed
-from hexmj.conditions import Bound, Conditions
+from hexmj.conditions import Bound, Conditions, check_obeyed
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -95,6 +95,7 @@ class LiveWalk:
         self.controller, self.velocity = controller, typed("velocity", velocity, float)
         self.start = numbers("start", in_order(start))
         self.conditions = given("conditions", conditions, Conditions)
+        check_obeyed(self.conditions)
         self.stride = given("stride", stride, Stride)
         self.begin()
 

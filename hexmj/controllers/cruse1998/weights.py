@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from hexmj.checks import check_types, numbers, short, typed
+from hexmj.checks import check_types, numbers, short, typed, whole
 from hexmj.errors import InputError
 from hexmj.labels import check_labels
 from hexmj.legs import N1, N2, N3, N4, check_order
@@ -118,7 +118,7 @@ class Weights:
         Raises:
             InputError: another size, or 48 where p34 is not 0.
         """
-        if size not in (48, 58):
+        if whole("size", size, 0) not in (48, 58):
             raise InputError(f"size = {short(size)}; expected 48 or 58")
         if size == 48 and self.p34.any():
             raise InputError("p34 is not 0; expected 58 weights, of which 48 lack it")
@@ -180,7 +180,7 @@ class Symmetric:
         Raises:
             InputError: another size, or 9 where p34_i is not 0.
         """
-        if size not in (9, 10):
+        if whole("size", size, 0) not in (9, 10):
             raise InputError(f"size = {short(size)}; expected 9 or 10")
         if size == 9 and self.p34_i:
             raise InputError(f"p34_i = {self.p34_i}; expected 10 parameters, of which 9 lack it")

@@ -93,7 +93,7 @@ class League:
         for name, entrant in self.entrants.items():
             typed(f"entrants[{name!r}]", entrant, Entrant)
         given, usual = self.conditions.flat(), Conditions().flat()
-        for name in ("load", "ground"):
+        for name in ("load", "ground", "ground_height", "ground_at", "ground_length"):
             if given[name] != usual[name]:
                 raise InputError(f"{name} = {given[name]!r}; expected {usual[name]!r}, since trials have their own")
         if not (0 < self.tried_at < 1 and (self.observed[0] > 0).all()):
