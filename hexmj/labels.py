@@ -21,8 +21,10 @@ def labels_of(values: Any) -> list[list[Any]]:
 
 
 def columns_of(values: Any) -> list[Any]:
-    """Names of a table's columns, of a table without an index, too, as of polars; nothing for other values."""
-    columns = getattr(values, "columns", ())
+    """Names of a table's columns, of one without an index, too, as of polars, or of a named row's numbers; nothing for
+    other values."""
+    row = isinstance(values, tuple) and all(map(np.isscalar, values))
+    columns = getattr(values, "_fields" if row else "columns", ())
     return [*columns] if isinstance(columns, Iterable) else []
 
 

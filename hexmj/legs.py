@@ -91,7 +91,7 @@ def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
         InputError: labels of other legs, of one twice, or that could be of two axes.
     """
     several: Iterable[Any] = values if type(values) in (list, tuple) else ()
-    if any(hasattr(one, "iloc") or _is_of_xarray(one) for one in several):
+    if any(hasattr(one, "iloc") or _is_of_xarray(one) or columns_of(one) for one in several):
         return [in_order(one, name, behind) for one in several], []
     labels = [] if behind else columns_of(values)
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas

@@ -98,6 +98,9 @@ def test_a_manifest_names_nothing_that_is_gone(tmp_path):
     with pytest.raises(InputError, match=r"gone\.nc was removed or renamed while the command ran; expected it to stay"):
         save_manifest(Flss(), {}, [tmp_path / "gone.nc"], tmp_path / "manifest.json")
     assert not list(tmp_path.iterdir())
+    write_whole(tmp_path / "ours.nc", b"ours").write_bytes(b"another command's")
+    with pytest.raises(InputError, match=r"ours\.nc was written by something else while the command ran; expected it"):
+        save_manifest(Flss(), {}, [tmp_path / "ours.nc"], tmp_path / "manifest.json")
 
 
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):

@@ -77,6 +77,7 @@ def test_labelled_legs_may_come_in_any_order():
             walk(given)
     assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
     assert np.array_equal(walk(Unlabelled(starts)).x, walk(starts).x)
+    assert np.array_equal(walk([*table[shuffled].itertuples(index=False)]).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 
@@ -179,8 +180,8 @@ def test_labelled_parameters_stand_in_order():
         assert np.array_equal(sample.costs(one), sample.costs(own.to_vector()[None]))
     square: Any = pd.concat([table] * 10)
     candidates: Any = xr.DataArray(square.values, {"parameter": [*ordered.index]}, ("candidate", "parameter"))
-    for one in (square, candidates):
-        assert len({*sample.costs(one)}) == 1
+    for one in (square, candidates, [*square.itertuples(index=False)]):
+        assert len({*sample.costs(one)}) == 1  # pyright: ignore
     fields = hexmj.FieldsForm(hexmj.load_controller("righetti"))
     usual: Any = xr.DataArray(fields.begin, {"parameter": [*fields.names]})
     assert fields.controller(usual) == fields.usual
@@ -194,6 +195,8 @@ def test_labelled_parameters_stand_in_order():
         lambda: sample.costs(square.T),
         lambda: sample.costs([ordered[::-1], ordered]),  # pyright: ignore
         lambda: sample.costs(deque([ordered[::-1]])),  # pyright: ignore
+        lambda: sample.costs([*wrong_order.itertuples(index=False)]),  # pyright: ignore
+        lambda: sample.costs([*table.itertuples()]),  # pyright: ignore
         lambda: hexmj.Symmetric.from_vector(pd.Series(own.to_vector())[::-1]),
         lambda: sample.costs(Table(wrong_order)),  # pyright: ignore
         lambda: sample.costs(Table(wrong_order, pd.Index)),  # pyright: ignore

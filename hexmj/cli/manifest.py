@@ -67,13 +67,15 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
     The code is followed from the module of the command's options.
 
     Raises:
-        InputError: the code, or what a controller names, was edited meanwhile, one of those files was removed, or a
-            file cannot be written or read.
+        InputError: the code, or what a controller names, was edited meanwhile, one of those files was removed or
+            written by something else, or a file cannot be written or read.
     """
     check_loaded()
     for file in (written := [*written]):
         if not file.is_file():
             raise InputError(f"{file} was removed or renamed while the command ran; expected it to stay")
+        if digest_of(file) != WRITTEN[file.absolute()][:DIGEST]:
+            raise InputError(f"{file} was written by something else while the command ran; expected it to stay")
     typed = command_words.command()
     own = {str(file): one for file, one in command_words.own().items()}
     made = code(frozenset({type(command).__module__, *_modules(typed)}))

@@ -43,7 +43,7 @@ class PhysicalWalk:
     """(step, start, leg) of the feet above the ground [mm]; below 0 where they sink in."""
     load: np.ndarray
     """(step, start, leg) force of the ground on the feet along its normal [g mm/s^2], adhesion taken off: below 0 where
-    that holds a foot that pulls."""
+    that holds a foot that pulls.  Of the substep that comes next; after the last step as if that came again."""
     conditions: Conditions
     """Of the walk."""
     stride: Stride

@@ -44,7 +44,7 @@ def encode(data: "xr.Dataset") -> bytes:
         texts = variable.dtype != object or all(isinstance(one, str) for one in variable.values.flat)
         if variable.dtype.kind in "mM" or not texts:
             raise InputError(f"NetCDF cannot hold this: {name} is {variable.dtype}; expected arrays, numbers and texts")
-        if name in plain.coords and name not in plain.dims and " " in str(name):
+        if name in plain.coords and name not in plain.dims and str(name).split() != [name]:
             raise InputError(
                 f"NetCDF cannot hold this: the coordinate {name!r:.80} has a space in its name; expected none"
             )
