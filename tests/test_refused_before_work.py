@@ -8,6 +8,9 @@ import pytest
 
 import hexmj
 from hexmj.controllers.checked_plans import check_velocities
+from hexmj.controllers.leg_lost import LegLost
+from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
 from hexmj.physics.settling import check_adhesion
@@ -85,6 +88,14 @@ class Limited(Counts):
         return hexmj.draw_starts(1, 0, stride)
 
 
+@dataclass(frozen=True)
+class Still:
+    """A policy that offsets nothing."""
+
+    def __call__(self, felt: np.ndarray) -> np.ndarray:
+        return np.zeros((len(felt), 18))
+
+
 LIMITED = Limited()
 FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
 
@@ -100,6 +111,9 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         Biology(LIMITED, n_starts=2),
         Ablation({"limited": {"limited": LIMITED}}, **FAST, n_physical=1),
         Terrain(hexmj.ReadsLegs(LIMITED), **FAST),
+        Terrain(LegLost(LIMITED, 0), **FAST),
+        Terrain(PoorSenses(hexmj.ReadsLegs(LIMITED)), **FAST),
+        Terrain(WithOffsets(Still(), LIMITED), **FAST),
         League({"limited": Entrant(LIMITED)}, (0.1,), 2, 1, 1, accelerating=False),
         League({"limited": Entrant(LIMITED)}, (0.1,), 2, 1, 1, tried_at=0.2, accelerating=False),
         League({"limited": Entrant(LIMITED, ideal=True)}, (0.1, 0.3), 2, 1, 1),

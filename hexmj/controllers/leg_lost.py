@@ -5,6 +5,7 @@ A body that tips far enough onto it comes down on it.
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,11 @@ class LegLost:
     def name(self) -> str:
         """That of the controller that plans, and what is different."""
         return f"{self.controller.name}, leg {self.leg + 1} lost"
+
+    @property
+    def check_velocity(self) -> Any:
+        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
+        return getattr(self.controller, "check_velocity", None)
 
     def begin(
         self,

@@ -2,6 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,11 @@ class PoorSenses:
     def name(self) -> str:
         """That of the controller that plans, and what is different."""
         return f"{self.controller.name}, noise {self.noise:g}, delay {self.delay:g}"
+
+    @property
+    def check_velocity(self) -> Any:
+        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
+        return getattr(self.controller, "check_velocity", None)
 
     def begin(
         self,

@@ -7,7 +7,7 @@ upright, as fast as it is told and stands on the feet that it plans to stand on.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -60,7 +60,9 @@ def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
 
 
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
-    """The same from the observations of a vector environment of this body."""
+    """The same from the observations of a vector environment of this body; (`FELT`,) from those of a single one."""
+    if np.ndim(observations["orientation"]) == 1:
+        return felt_in({name: np.asarray(values)[None] for name, values in observations.items()}, body)[0]
     tilt = np.arcsin(np.clip(lean(observations["orientation"])[0], -1.0, 1.0))
     names = "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
     return felt(body, tilt, *(observations[name] for name in names))
@@ -78,6 +80,11 @@ class WithOffsets:
     """Under which it walks: of their V_p and path the feet are lifted and lowered, and offsets are those of their body.
     A walk whose own are others is refused."""
     name: str = field(default="learned")
+
+    @property
+    def check_velocity(self) -> Any:
+        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
+        return getattr(self.controller, "check_velocity", None)
 
     def begin(
         self,
