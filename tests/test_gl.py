@@ -47,6 +47,21 @@ assert walking.physics.render(48, 64, camera_id="side").std() > 5
 walking.physics.free()
 """
 
+THREADS = (
+    FRAME.partition("model =")[0]
+    + """
+from concurrent.futures import ThreadPoolExecutor
+model = compile_body(Conditions()).model
+
+def drawn(_):
+    with gl.renderer(model, 48, 64):
+        return True
+
+with ThreadPoolExecutor(4) as pool:
+    assert all(pool.map(drawn, range(40)))
+assert mujoco.rendering.classic.gl_context.GLContext is usual
+"""
+)
 
 TRITON = """
 import sys
@@ -101,7 +116,7 @@ def without_libraries(name: str) -> None:
 
 @pytest.mark.slow
 @drawing
-@pytest.mark.parametrize("script", [FRAME, ENVIRONMENT], ids=["film", "environment"])
+@pytest.mark.parametrize("script", [FRAME, THREADS, ENVIRONMENT], ids=["film", "threads", "environment"])
 def test_without_a_screen_frames_are_rendered_though_nobody_asked_for_egl(script):
     path = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(

@@ -14,6 +14,7 @@ from ctypes.util import find_library
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from hexmj.errors import RenderingError
@@ -33,6 +34,9 @@ _VAIN: list[str] = []
 
 _DRAWERS: set[int] = set()
 """The process that has drawn, if it has; a child that was forked since inherits it."""
+
+_SWAPPED = Lock()
+"""Held while MuJoCo's type of contexts is another one, by one thread at a time."""
 
 FORKED = (
     "this process was forked from one that had drawn, and its GL would wait for ever; expected one that is spawned, as"
@@ -73,11 +77,13 @@ def renderer(model: "mujoco.MjModel", height: int, width: int) -> "mujoco.Render
     from hexmj.rendering.renderer import Renderer
 
     check_not_forked()
-    usual, gl_context.GLContext = gl_context.GLContext, context_type()
-    try:
-        return Renderer(model, height, width)
-    finally:
-        gl_context.GLContext = usual
+    wanted = context_type()
+    with _SWAPPED:
+        usual, gl_context.GLContext = gl_context.GLContext, wanted
+        try:
+            return Renderer(model, height, width)
+        finally:
+            gl_context.GLContext = usual
 
 
 def context_type() -> Any:
