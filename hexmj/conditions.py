@@ -118,7 +118,7 @@ class Ground:
     """What lies ahead."""
 
     ground: GroundKind = "flat"
-    """What lies ahead: nothing, a step up, a gap, a hurdle, or rough ground."""
+    """What lies ahead: nothing, a step up, a gap, a hurdle, or rough ground, bumps that end on the plane."""
     ground_height: float = 3.0
     """Height of step, hurdle or the highest bump of rough ground [mm]; a gap is as deep as a leg is long."""
     ground_at: float = 50.0

@@ -320,6 +320,7 @@ def test_threads_change_no_bit(falling):
         ({"periods": 3}, "periods = 3"),
         ({"conditions": Conditions.of(vp=38.0)}, "vp = 38.0; expected more than 38 mm/s"),
         ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0"),
+        ({"conditions": Conditions.of(ground="rough")}, "ground = rough; expected flat"),
         ({"n_starts": 0}, "at least 1"),
     ],
 )

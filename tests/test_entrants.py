@@ -94,6 +94,7 @@ def test_controllers_of_files_have_short_names_and_all_different_ones(tmp_path: 
         (lambda: Metronome("tripod"), "wave = 'tripod'; valid names: wilson, graham"),  # pyright: ignore
         (lambda: PhaseOscillators(coupling=np.nan), "cpg-tripod: coupling = nan; expected a finite number"),
         (lambda: Evolved(theta=np.inf), "evolved: theta = inf; expected a finite number"),
+        (lambda: Evolved(tau=1100.0), "evolved: tau = 1100.0; expected -1000 to 1000"),
     ],
 )
 def test_entrants_and_rivals_that_make_no_sense_are_refused(given, said: str) -> None:

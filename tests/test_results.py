@@ -1,6 +1,8 @@
 """Results are the same after they were saved and loaded, and so is the figure that is drawn of them."""
 
 import io
+import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -236,6 +238,21 @@ def test_what_is_written_again_stays_as_private(tmp_path: Path):
         path.chmod(mode)
         hexmj.save(xr.Dataset({"one": 2.0}), path)
         assert path.stat().st_mode & 0o777 == mode
+
+
+def test_what_may_only_be_read_is_not_replaced(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Root may write everything."""
+    monkeypatch.setattr("os.access", lambda path, mode: bool(os.stat(path).st_mode & 0o222))
+    words = ("flss", "--velocities", "0.5", "--starts", "3", "--window", "start", "--out", tmp_path)
+    assert run(*words)[0] == 0
+    (kept := tmp_path / "flss.nc").chmod(0o444)
+    before = kept.read_bytes()
+    told = r"flss\.nc may only be read; expected a file that may be written"
+    with pytest.raises(InputError, match=told):
+        hexmj.save(xr.Dataset({"one": 2.0}), kept)
+    code, _, error = run(*words, "--seed", "1")
+    assert code == 2 and re.search(told, error)
+    assert kept.read_bytes() == before
 
 
 def test_a_notebook_is_shown_a_figure():

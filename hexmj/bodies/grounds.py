@@ -113,6 +113,11 @@ def _depth_in_bumps(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: 
     return depth
 
 
+def end_of_bumps(ground: Ground, lengths: Lengths) -> float:
+    """Where rough ground ends, and the plane follows, ahead of O at the start [mm]."""
+    return ground.ground_at + 2 * lengths.highest_bump + lengths.bump_spacing * (BUMPS[0] - 1)
+
+
 def _bumps(ground: Ground, lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
     along, across = BUMPS

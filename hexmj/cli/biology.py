@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import table
-from hexmj.conditions import Conditions
+from hexmj.conditions import Conditions, Ground
 from hexmj.storage.results import save_text
 from hexmj.studies.biology import study as biology
 from hexmj.studies.biology.figure import biology_figure
@@ -34,7 +34,7 @@ class Biology(StudyCommand):
     out: Path = Path("results/biology")
     walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "All walk so many periods.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), ["grasp"])
+    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), ["grasp", *vars(Ground())])
     outputs = Outputs("walking beside the animal", "biology.nc", {"biology.png": biology_figure}, others=(TABLE,))
 
     def study(self) -> biology.Biology:
@@ -56,11 +56,6 @@ class Biology(StudyCommand):
         yield f"starts with whole strides: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, window=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
-
-    def farthest(self) -> float:
-        """At the greatest speed [mm]."""
-        velocity = max(biology.SPEEDS) / self.conditions.time.vp
-        return float(velocity * self.periods * self.walks.stride.periods(velocity))
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The table as Markdown."""

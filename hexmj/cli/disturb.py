@@ -102,11 +102,8 @@ class Disturb(StudyCommand):
         }
         if lines := [line for strategy, line in told.items() if strategy in result.strategy.values]:
             yield "; ".join(lines)
-        yield self.conditions_line(physical=not self.kinematic)
-
-    def _not_reached(self) -> str:
-        """Nothing: a window begins with the disturbance, or later."""
-        return ""
+        walked = (result.velocity * (result.back + result.duration)).max()
+        yield self.conditions_line(physical=not self.kinematic, walked=float(walked))
 
 
 def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":

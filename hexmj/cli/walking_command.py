@@ -70,8 +70,9 @@ class WalkingCommand:
     def _searches(self) -> dict[str, list[int]]:
         return {what: seeds for name in self.names for what, seeds in seeds_of_searches(name).items()}
 
-    def conditions_line(self, physical: bool = True, varied: Collection[str] = ()) -> str:
-        """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`."""
+    def conditions_line(self, physical: bool = True, varied: Collection[str] = (), walked: float | None = None) -> str:
+        """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`; walks
+        come as far as the options tell, or as was `walked` at most [mm]."""
         line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
         if known := self.searched:
             tried = {seed for seeds in self._searches.values() for seed in seeds}
@@ -90,17 +91,23 @@ class WalkingCommand:
             told = {*TOLD, *unusual(values)} - {*varied}
             shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
-            line += "" if "ground_at" in varied else self._not_reached()
+            line += "" if "ground_at" in varied else self._ahead(self.farthest() if walked is None else walked)
         return line
 
-    def _not_reached(self) -> str:
-        """That no foot gets to what lies ahead, where even the farthest walk is too short."""
+    def _ahead(self, farthest: float) -> str:
+        """That no foot gets to what lies ahead, where even the farthest walk is too short, or some get past bumps."""
+        from hexmj.bodies.grounds import end_of_bumps
         from hexmj.studies.terrain.study import reach
 
         ground = self.conditions.ground
-        if ground.ground == "flat" or (farthest := self.farthest()) + reach(self.walks.stride)[0] > ground.ground_at:
+        if ground.ground == "flat":
             return ""
-        return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
+        foremost = farthest + reach(self.walks.stride)[0]
+        if not foremost > ground.ground_at:
+            return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
+        if ground.ground == "rough" and foremost > (end := end_of_bumps(ground, self.conditions.body.lengths)):
+            return f"; the bumps end {end:g} mm ahead, and the plane follows"
+        return ""
 
     def farthest(self) -> float:
         """How far is walked at most [mm], infinitely where nobody knows."""

@@ -75,6 +75,8 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         if real.exists() and not (real.is_file() or real.is_dir()):
             raise InputError(f"{path} is a pipe or a device; expected a file, or nothing yet")
+        if real.exists() and not os.access(real, os.W_OK):
+            raise InputError(f"{path} may only be read; expected a file that may be written, or nothing yet")
         path.parent.mkdir(parents=True, exist_ok=True)
         with among_writers(real.parent):
             yield part

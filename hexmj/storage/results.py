@@ -74,12 +74,15 @@ def results_folder(path: Path, names: Sequence[str]) -> Path:
             with suppress(FileNotFoundError):
                 os.lstat(nearest / name)
         try_writing(nearest)
-        taken = [name for name in names if (path / name).exists() and not (path / name).is_file()]
+        there = [name for name in names if (path / name).exists()]
+        taken = [name for name in there if not (path / name).is_file()]
     except OSError as error:
         raise InputError(f"--out {path} cannot be written to: {error.strerror}; expected a folder that can") from None
     if taken:
         what = "folder" if (path / taken[0]).is_dir() else "pipe or a device"
         raise InputError(f"--out {path}: {taken[0]} is a {what} there; expected a file or nothing")
+    if kept := [name for name in there if not os.access(path / name, os.W_OK)]:
+        raise InputError(f"--out {path}: {kept[0]} may only be read; expected a file that may be written, or nothing")
     remove_leftovers(path)
     return path
 

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
 from hexmj.storage.files import read_toml
 
@@ -34,6 +35,10 @@ GAIN = 8.0
 
 TAU = 2.0
 """Unit of the time constant [time units]; a swing from PEP_0 to AEP_0 takes 20."""
+
+
+LONGEST = 1000
+"""Greatest log2 of the time constant; beyond it, numbers of double precision end."""
 
 
 class Potentials(NamedTuple):
@@ -65,7 +70,10 @@ class Evolved(Lifted):
     """Weight of the output of the contralateral leg."""
     name: str = "evolved"
 
-    __post_init__ = check_numbers
+    def __post_init__(self) -> None:
+        check_numbers(self)
+        if not abs(self.tau) <= LONGEST:
+            raise InputError(f"{self.name}: tau = {self.tau}; expected {-LONGEST} to {LONGEST}")
 
     mirrored = True
 
@@ -76,7 +84,8 @@ class Evolved(Lifted):
     def lifts(self, state: Potentials, legs: Legs) -> tuple[Potentials, np.ndarray]:
         """The equation, solved exactly for outputs and inputs that last for the step."""
         before = state.y
-        sent = 1.0 / (1.0 + np.exp(-GAIN * (before + self.theta)))
+        with np.errstate(over="ignore"):  # where nothing is sent
+            sent = 1.0 / (1.0 + np.exp(-GAIN * (before + self.theta)))
         told = (
             self.own * sent
             + self.behind * from_neighbour(N2, sent)

@@ -40,6 +40,10 @@ class Biology(SameStarts):
         vp = self.conditions.time.vp
         if not max(SPEEDS) < vp:
             raise InputError(f"vp = {vp}; expected more than {max(SPEEDS):g} mm/s, the fastest walk that is compared")
+        if (kind := self.conditions.ground.ground) != "flat":
+            raise InputError(
+                f"ground = {kind}; expected flat: the last strides are measured, far beyond what lies ahead"
+            )
         if self.conditions.contact.grasp:
             raise InputError(f"grasp = {self.conditions.contact.grasp}; expected 0, since adhesion is no ground force")
 
