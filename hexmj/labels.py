@@ -28,6 +28,11 @@ def columns_of(values: Any) -> list[Any]:
     return [*columns] if isinstance(columns, Iterable) else []
 
 
+def rows_of(values: Any) -> Sequence[Any]:
+    """The values of a list, tuple or the like, each of which may have labels of its own; nothing for other values."""
+    return values if isinstance(values, Sequence) else ()
+
+
 def falling(labels: Sequence[Any]) -> bool:
     """Whether labels are whole numbers that do not rise."""
     return all(isinstance(one, Integral) for one in labels) and list(labels) != sorted({*labels})
@@ -40,7 +45,7 @@ def check_labels(values: Any, names: Sequence[str], name: str) -> None:
     Raises:
         InputError: they are such.
     """
-    for one in (values, *(values if isinstance(values, Sequence) else ())):
+    for one in (values, *rows_of(values)):
         *others, last = labels_of(one) or [[]]
         for labels in (*others, last):
             named = not {*map(str, labels)}.isdisjoint(names)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.errors import InputError
-from hexmj.labels import columns_of, falling, labels_of
+from hexmj.labels import columns_of, falling, labels_of, rows_of
 
 LEGS = ("L1", "L2", "L3", "R1", "R2", "R3")
 """Names by index: side, then segment from front (1) to rear (3)."""
@@ -90,10 +90,12 @@ def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
     Raises:
         InputError: labels of other legs, of one twice, or that could be of two axes.
     """
-    several: Iterable[Any] = values if type(values) in (list, tuple) else ()
-    if any(hasattr(one, "iloc") or _is_of_xarray(one) or columns_of(one) for one in several):
-        return [in_order(one, name, behind) for one in several], []
+    rows = rows_of(values)
+    if any(hasattr(one, "iloc") or _is_of_xarray(one) or columns_of(one) for one in rows):
+        return [in_order(one, name, behind) for one in rows], []
     labels = [] if behind else columns_of(values)
+    if hasattr(values, "_fields") and not _name_legs(labels):  # a row whose names tell something else
+        labels = []
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
         on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
         values = values.T if on_its_side and len(values) == len(LEGS) else values

@@ -75,9 +75,11 @@ def test_labelled_legs_may_come_in_any_order():
     ):
         with pytest.raises(hexmj.InputError, match=r"^starts (have|of) .*; expected "):
             walk(given)
-    assert np.array_equal(walk([*labelled.sel(leg=shuffled)]).x, walk(starts).x)
+    for kind in (list, deque):
+        assert np.array_equal(walk(kind(labelled.sel(leg=shuffled))).x, walk(starts).x)
     assert np.array_equal(walk(Unlabelled(starts)).x, walk(starts).x)
-    assert np.array_equal(walk([*table[shuffled].itertuples(index=False)]).x, walk(starts).x)
+    for rows in (table[shuffled], pd.DataFrame(starts)):
+        assert np.array_equal(walk([*rows.itertuples(index=False)]).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 

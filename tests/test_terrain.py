@@ -288,7 +288,9 @@ def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
 def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
     body = replace(STICK_INSECT, lengths=replace(STICK_INSECT.lengths, ground_reach=60.0))
     ahead = Conditions.of(ground=ground, ground_at=46.0, **size)
-    with pytest.raises(InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected a window in which no"):
+    with pytest.raises(
+        InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected shorter walks, in which no"
+    ):
         physical_walk(draw_starts(1, 3), PRESETS["own-0.3"], 0.3, 700.0, conditions=replace(ahead, body=body))
 
 

@@ -91,10 +91,10 @@ class WalkingCommand:
             told = {*TOLD, *unusual(values)} - {*varied}
             shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
-            line += "" if "ground_at" in varied else self._ahead(self.farthest() if walked is None else walked)
+            line += "" if "ground_at" in varied else self._ahead(walked)
         return line
 
-    def _ahead(self, farthest: float) -> str:
+    def _ahead(self, walked: float | None) -> str:
         """That no foot gets to what lies ahead, where even the farthest walk is too short, or some get past bumps."""
         from hexmj.bodies.grounds import end_of_bumps
         from hexmj.studies.terrain.study import reach
@@ -102,6 +102,7 @@ class WalkingCommand:
         ground = self.conditions.ground
         if ground.ground == "flat":
             return ""
+        farthest = self.farthest() if walked is None else walked
         foremost = farthest + reach(self.walks.stride)[0]
         if not foremost > ground.ground_at:
             return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"

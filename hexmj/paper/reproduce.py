@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from hexmj.checks import path_of
 from hexmj.controllers.cruse1998.readings import named_reading
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TABLES = ("claims.md", "claims.json")
+DRAWN: dict[str, dict[str, Any]] = {".pdf": {"metadata": {"CreationDate": None}}, ".png": {"dpi": 200}}
 KEPT = "measurements"
 
 
@@ -59,6 +60,8 @@ def reproduce(
         raise InputError("reading 'printed' beside itself; expected others, beside which it stands anyway")
     readings = {name: named_reading(name) for name in beside}
     results_folder(out := path_of(out), TABLES)
+    if not only:
+        results_folder(out / "figures", [name + end for name in FIGURES for end in (*DRAWN, ".nc")])
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
     with shown(how.get("progress"), "reproducing") as progress:
         part = how | {"progress": part_of(progress, 1 / (1 + len(readings)))}
@@ -104,6 +107,5 @@ def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]"
 
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:
     """Write a figure as PDF and PNG, and its data as NetCDF, under `path` with these endings."""
-    options = {".pdf": {"metadata": {"CreationDate": None}}, ".png": {"dpi": 200}}
-    files = [results.save_figure(figure, path.with_name(path.name + end), **how) for end, how in options.items()]
+    files = [results.save_figure(figure, path.with_name(path.name + end), **how) for end, how in DRAWN.items()]
     return [*files, save_dataset(data, path.with_name(path.name + ".nc"))]

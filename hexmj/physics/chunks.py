@@ -130,7 +130,7 @@ class Insects:
             x, y, _ = feet[row, substep].mean(axis=0).round().tolist()
             raise InputError(
                 f"start {ids[row]} walks off the {conditions.ground.ground} at x = {x:g} mm, y = {y:g} mm;"
-                " expected a window in which no start leaves it"
+                " expected shorter walks, in which no start leaves it"
             )
 
     def _show(self, orders: Orders) -> Shown:

@@ -1,6 +1,7 @@
 """Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, fields
 from functools import cache
 from pathlib import Path
@@ -39,16 +40,25 @@ def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
     """
     rules = {key: table[key] for key in ("order", "reading") if key in table}
     weights = _weights({key: value for key, value in table.items() if key not in rules}, where)
-    try:
+    with _of(where):
         reading = named_reading(rules.get("reading", "printed"))
         return Cruse1998(weights, rules.get("order", "printed"), name, reading)
+
+
+@contextmanager
+def _of(where: str) -> Iterator[None]:
+    """Say of which file a sentence is."""
+    try:
+        yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
 def _weights(table: dict[str, Any], where: str) -> AnyWeights:
     if list(table) == ["symmetric"]:
-        return Symmetric(**_numbers(table["symmetric"], [f.name for f in fields(Symmetric)], f"{where} [symmetric]"))
+        told = _numbers(table["symmetric"], [f.name for f in fields(Symmetric)], where := f"{where} [symmetric]")
+        with _of(where):
+            return Symmetric(**told)
     if list(table) != ["weights"] or not isinstance(weights := table["weights"], dict):
         raise InputError(
             f"{where} holds {', '.join(table) or 'nothing'}; expected one table, [symmetric] or [weights.*],"
@@ -61,7 +71,8 @@ def _weights(table: dict[str, Any], where: str) -> AnyWeights:
         keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
         given = _numbers(entries, list(keys), f"{where} [weights.{kind}]")
         numbers |= {(kind, keys[key]): value for key, value in given.items()}
-    return Weights.of(numbers)
+    with _of(where):
+        return Weights.of(numbers)
 
 
 def network_toml(network: Cruse1998) -> str:
