@@ -20,7 +20,7 @@ from hexmj.physics.settling import Settled, Settling
 from hexmj.studies.biology.animals import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, timing
 from hexmj.studies.biology.figure import biology_figure
 from hexmj.studies.biology.names import SEGMENTS, UNITS
-from hexmj.studies.biology.quantities import quantities
+from hexmj.studies.biology.quantities import _course, quantities
 from hexmj.studies.biology.strides import Strides, last_strides, onsets, rows_of_a_hop, strides_between
 from hexmj.studies.biology.study import MEASURED, Biology
 from hexmj.studies.biology.table import rows
@@ -308,6 +308,15 @@ def test_a_row_without_walks_has_no_number(falling):
     for name in ("mean", "low", "high"):
         nothing[name][:] = np.nan
     assert {ours for _, ours, *_ in rows(nothing)} == {"-"}
+
+
+def test_a_course_does_not_hang_on_where_its_strides_begin(walking):
+    strides = next(iter(walking[0].values()))
+    for by in (1, 501):
+        later = replace(strides, standing=np.roll(strides.standing, by, axis=0))
+        for leg in range(6):
+            torque = strides.torques[:, 3 * leg + 1]
+            assert_allclose(_course(np.roll(torque, by), later, leg), _course(torque, strides, leg), atol=1e-9)
 
 
 def test_threads_change_no_bit(falling):

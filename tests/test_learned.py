@@ -157,6 +157,10 @@ def test_a_policy_feels_the_same_in_a_walk_as_in_the_environment(example, monkey
     observed = walking.reset(seed=0)[0]
     here = felt_in({name: values[None] for name, values in observed.items()})
     assert here.shape == (1, FELT) and np.array_equal(felt_in(observed), here[0])
+    with pytest.raises(hexmj.InputError, match=r"^observations of .*; expected contact, too$"):
+        felt_in({name: values for name, values in observed.items() if name != "contact"})
+    with pytest.raises(hexmj.InputError, match=r"^observations = .*; expected a dict$"):
+        felt_in(np.zeros(38))  # pyright: ignore
     np.testing.assert_allclose(next(one for told, one in felt if told), here, rtol=0, atol=1e-9)
     for _ in range(99):
         action = controller.policy(felt_in({name: values[None] for name, values in observed.items()}))[0]

@@ -219,6 +219,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
             lambda told: Variants({"ldvs": [LDVS]}, (0.3,), conditions=told),
             lambda told: Ablation({"ldvs": {"ldvs": LDVS}}, conditions=told),
             lambda told: LiveWalk(LDVS, 0.3, STARTS[0], told),
+            lambda told: LiveWalk(LDVS, 0.3, STARTS[0]).begin(conditions=told),
         )
     ),
     (lambda: hexmj.NetworkForm("ldvs").vector("x"), "controller = 'x'; expected a controller"),  # pyright: ignore

@@ -6,6 +6,7 @@ trained there walks wherever a controller does, in the league too.  On paper nob
 upright, as fast as it is told and stands on the feet that it plans to stand on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from hexmj.bodies.description import Body
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.checks import numbers, short
+from hexmj.checks import numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
@@ -30,6 +31,9 @@ CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
 
 FELT = 38
 """Numbers that are felt."""
+
+SEEN = "orientation", "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
+"""Observations of an environment, of which it is made."""
 
 MOST = 10.0
 """Greatest number that is felt, in usual sizes; beyond it nothing is told apart."""
@@ -60,12 +64,21 @@ def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
 
 
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
-    """The same from the observations of a vector environment of this body; (`FELT`,) from those of a single one."""
-    if np.ndim(observations["orientation"]) == 1:
-        return felt_in({name: np.asarray(values)[None] for name, values in observations.items()}, body)[0]
-    tilt = np.arcsin(np.clip(lean(observations["orientation"])[0], -1.0, 1.0))
-    names = "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
-    return felt(body, tilt, *(observations[name] for name in names))
+    """The same from the observations of a vector environment of this body; (`FELT`,) from those of a single one.
+
+    Raises:
+        InputError: other observations than its dictionary.
+    """
+    told: dict[str, np.ndarray] = {}
+    for name in SEEN:
+        if name not in typed("observations", observations, Mapping):
+            raise InputError(f"observations of {', '.join(map(str, observations)):.200}; expected {name}, too")
+        told[name] = np.asarray(observations[name])
+    if single := told["orientation"].ndim == 1:
+        told = {name: values[None] for name, values in told.items()}
+    orientation, *others = told.values()
+    seen = felt(body, np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
+    return seen[0] if single else seen
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hexmj.storage.literal import literal
 if TYPE_CHECKING:
     import xarray as xr
 
-TEXTS = ("study", "model", "over", "reference", "title")
+TEXTS = ("study", "model", "over", "reference", "title", "body", "ground")
 """Attributes whose texts are never JSON, whatever they look like."""
 
 

@@ -95,7 +95,6 @@ class LiveWalk:
         self.controller, self.velocity = controller, typed("velocity", velocity, float)
         self.start = numbers("start", in_order(start))
         self.conditions = given("conditions", conditions, Conditions)
-        check_obeyed(self.conditions)
         self.stride = given("stride", stride, Stride)
         self.begin()
 
@@ -107,6 +106,7 @@ class LiveWalk:
         """
         start = self.start if start is None else numbers("start", in_order(start))
         wanted: Conditions = typed("conditions", self.conditions if conditions is None else conditions, Conditions)
+        check_obeyed(wanted)
         settled = settle(start[np.newaxis], wanted, self.stride, threads=1)
         plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)

@@ -117,8 +117,9 @@ def _torques(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
 
 def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
     """Of a leg's torque, (row,), at each percent of its stance, (101,), as a force plate would show it: positive where
-    it carries the body, in the mean over whole stances; NaN without one."""
-    seen = np.convolve(torque, np.ones(n := round(PLATE / strides.step)) / n, "same")
+    it carries the body, in the mean over whole stances; NaN without one.  The strides follow one another in a ring."""
+    around = np.pad(torque, n := round(PLATE / strides.step), mode="wrap")
+    seen = np.convolve(around, np.ones(n) / n, "same")[n:-n]
     percent, stances = np.linspace(0.0, 1.0, 101), [seen[rows] for rows in strides.stances(leg)]
     courses = [np.interp(percent, np.linspace(0.0, 1.0, len(one)), one) for one in stances]
     mean = np.mean(courses, axis=0) if courses else np.full(101, np.nan)
