@@ -14,7 +14,7 @@ import numpy as np
 from hexmj.cli import command_words
 from hexmj.cli.loaded import check_loaded
 from hexmj.errors import InputError
-from hexmj.storage.files import DIGEST, STAMP, WRITTEN, digest_of, read_text
+from hexmj.storage.files import DIGEST, STAMP, WRITTEN, digest_of, is_as_written, read_text
 from hexmj.storage.literal import literal
 from hexmj.storage.results import json_text, save_text
 from hexmj.sweeps.code import code
@@ -74,7 +74,7 @@ def save_manifest(command: Any, settings: dict[str, Any], written: Iterable[Path
     for file in (written := [*written]):
         if not file.is_file():
             raise InputError(f"{file} was removed or renamed while the command ran; expected it to stay")
-        if digest_of(file) != WRITTEN[file.absolute()][:DIGEST]:
+        if not is_as_written(file):
             raise InputError(f"{file} was written by something else while the command ran; expected it to stay")
     typed = command_words.command()
     own = {str(file): one for file, one in command_words.own().items()}

@@ -31,6 +31,9 @@ SEARCHED = "searched"
 WRITTEN: dict[Path, str] = {}
 """File -> SHA-256 of what this process wrote to it last, whatever another one has put there since."""
 
+_STAMPS: dict[Path, tuple[int, ...]] = {}
+"""The same file -> what the system told of it then."""
+
 _DIGESTS: dict[tuple[int, ...], str] = {}
 """A file by device, inode, size and times of its last changes -> digest."""
 
@@ -85,6 +88,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
             if real.exists():
                 shutil.copymode(real, part)  # as whoever shares it, or does not, has set it
+            _STAMPS[path.absolute()] = _stamp(part)
             os.replace(part, real)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
@@ -189,6 +193,21 @@ def digest_of(path: Path) -> str:
             if time.time_ns() - max(now.st_mtime_ns, now.st_ctime_ns) > SETTLED:
                 _DIGESTS[known] = found
     return found
+
+
+def is_as_written(path: Path) -> bool:
+    """Whether a file is as this process wrote it last; it is read only if something else has touched it since.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    there = path.absolute()
+    return _stamp(path) == _STAMPS[there] or digest_of(path) == WRITTEN[there][:DIGEST]
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    now = os.stat(path)
+    return now.st_dev, now.st_ino, now.st_size, now.st_mtime_ns
 
 
 def digest(content: bytes) -> str:
