@@ -21,7 +21,7 @@ from hexmj.cli.flss import Flss
 from hexmj.cli.manifest import save_manifest
 from hexmj.errors import InputError
 from hexmj.replay.film.encoder import encoder
-from hexmj.storage.files import replacing, write_whole
+from hexmj.storage.files import is_as_written, replacing, write_whole
 from hexmj.storage.results import save_dataset, save_figure, save_text
 from hexmj.sweeps import Cell, KeptValues, run
 from small_cells import squares
@@ -101,6 +101,12 @@ def test_a_manifest_names_nothing_that_is_gone(tmp_path):
     write_whole(tmp_path / "ours.nc", b"ours").write_bytes(b"another command's")
     with pytest.raises(InputError, match=r"ours\.nc was written by something else while the command ran; expected it"):
         save_manifest(Flss(), {}, [tmp_path / "ours.nc"], tmp_path / "manifest.json")
+
+
+def test_what_a_command_alone_has_written_is_not_read_again(tmp_path, monkeypatch):
+    """Else cells of the code that calls commands would count it as what that reads."""
+    monkeypatch.setattr("hexmj.storage.files.digest_of", None)
+    assert is_as_written(write_whole(tmp_path / "ours.nc", b"ours"))
 
 
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):

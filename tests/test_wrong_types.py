@@ -22,7 +22,6 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.protocol import settings_of
 from hexmj.environments import dm
-from hexmj.environments.task import Task
 from hexmj.gaits import gait, limit_gait
 from hexmj.measures.compare import Comparison
 from hexmj.measures.physical import physical_outcomes
@@ -31,12 +30,6 @@ from hexmj.paper.reproduce import measure
 from hexmj.phases import circular_mean, circular_range, unrolled, wilson_phase
 from hexmj.physics.settling import settle
 from hexmj.search import samples, stages
-from hexmj.studies.ablation.study import Ablation
-from hexmj.studies.biology.study import Biology
-from hexmj.studies.league.entrants_by_name import entrants
-from hexmj.studies.league.study import League
-from hexmj.studies.variants.study import Variants
-from hexmj.view.live import LiveWalk
 from hexmj.walks import one_start, part_of
 
 anything: Any = hexmj
@@ -204,33 +197,11 @@ BAD: list[tuple[Callable[[], Any], str]] = [
         (lambda key=key: hexmj.Weights.of({key: 1.0}), f"{key} has no weight; expected one of p1, p2, ")  # pyright: ignore
         for key in (("p9", (0, 1)), ("p1", (6, 1)), ("p1", (-6, -5)))
     ),
-    *(
-        (
-            lambda walks=walks: walks(hexmj.Conditions.of(ground_height=6.0)),
-            "ground_height = 6.0 with ground = flat; expected",
-        )
-        for walks in (
-            lambda told: hexmj.compare(hexmj.LDVS, 0.3, n_starts=1, window=1.0, conditions=told),
-            lambda told: hexmj.physical_walk(STARTS[:1], hexmj.LDVS, 0.3, 1.0, conditions=told),
-            lambda told: dm.load(conditions=told),
-            lambda told: Task(conditions=told),
-            lambda told: Biology(hexmj.LDVS, conditions=told),
-            lambda told: hexmj.Problem(hexmj.NetworkForm(), 0.3, 0.3, conditions=told),
-            lambda told: Variants({"ldvs": [LDVS]}, (0.3,), conditions=told),
-            lambda told: Ablation({"ldvs": {"ldvs": LDVS}}, conditions=told),
-            lambda told: LiveWalk(LDVS, 0.3, STARTS[0], told),
-            lambda told: LiveWalk(LDVS, 0.3, STARTS[0]).begin(conditions=told),
-        )
-    ),
     (lambda: hexmj.NetworkForm("ldvs").vector("x"), "controller = 'x'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Weights.of({("p1", (0, 1)): "a"}), "p1 (0, 1) = 'a'; expected a number"),  # pyright: ignore
     (lambda: hexmj.Weights.of([1]), "numbers = [1]; expected a dict"),  # pyright: ignore
     (lambda: hexmj.LDVS.weights.to_vector(7), "size = 7; expected 9 or 10"),  # pyright: ignore
     (lambda: LDVS.weights.to_vector(np.array([9, 10])), "size = array([ 9, 10]); expected a whole number"),
-    (
-        lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions.of(ground_at=60.0)),
-        "ground_at = 60.0; expected 50.0, since trials have their own",
-    ),
     (lambda: general(hexmj.LDVS.weights).to_vector(10), "size = 10; expected 48 or 58"),  # pyright: ignore
     (lambda: hexmj.Weights.from_vector(["0"] * 58), "weights = ['0', '0', "),  # pyright: ignore
     (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore

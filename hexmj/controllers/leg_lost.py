@@ -5,12 +5,11 @@ A body that tips far enough onto it comes down on it.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from hexmj.checks import check_types, whole
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type, limits_within
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
@@ -42,10 +41,7 @@ class LegLost:
         """That of the controller that plans, and what is different."""
         return f"{self.controller.name}, leg {self.leg + 1} lost"
 
-    @property
-    def check_velocity(self) -> Any:
-        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
-        return getattr(self.controller, "check_velocity", None)
+    check_velocity = property(limits_within)
 
     def begin(
         self,

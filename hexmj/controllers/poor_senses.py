@@ -2,12 +2,11 @@
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from hexmj.checks import check_types
-from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, check_controller_type
+from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, check_controller_type, limits_within
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
@@ -41,10 +40,7 @@ class PoorSenses:
         """That of the controller that plans, and what is different."""
         return f"{self.controller.name}, noise {self.noise:g}, delay {self.delay:g}"
 
-    @property
-    def check_velocity(self) -> Any:
-        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
-        return getattr(self.controller, "check_velocity", None)
+    check_velocity = property(limits_within)
 
     def begin(
         self,

@@ -129,6 +129,11 @@ class KnowsItsLimits(Protocol):
         ...
 
 
+def limits_within(wrapper: Any) -> Any:
+    """`KnowsItsLimits.check_velocity` of the controller around which another one is; None where that knows of none."""
+    return getattr(wrapper.controller, "check_velocity", None)
+
+
 @runtime_checkable
 class FastLosses(Plan, Protocol):
     """A plan with a faster way to its first losses of static stability than being advanced."""

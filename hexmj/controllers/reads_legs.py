@@ -13,7 +13,6 @@ its servo.  `docs/feedback.md` tells what else was tried.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     check_controller_type,
     claims_mirrored,
+    limits_within,
 )
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
@@ -54,10 +54,7 @@ class ReadsLegs:
         """As the controller that plans."""
         return claims_mirrored(self.controller)
 
-    @property
-    def check_velocity(self) -> Any:
-        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
-        return getattr(self.controller, "check_velocity", None)
+    check_velocity = property(limits_within)
 
     def begin(
         self,

@@ -8,7 +8,7 @@ upright, as fast as it is told and stands on the feet that it plans to stand on.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.checks import numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, limits_within
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import check_made_for
@@ -94,10 +94,7 @@ class WithOffsets:
     A walk whose own are others is refused."""
     name: str = field(default="learned")
 
-    @property
-    def check_velocity(self) -> Any:
-        """As of the controller that plans, see `protocol.KnowsItsLimits`; None where it knows of none."""
-        return getattr(self.controller, "check_velocity", None)
+    check_velocity = property(limits_within)
 
     def begin(
         self,

@@ -31,7 +31,7 @@ SEARCHED = "searched"
 WRITTEN: dict[Path, str] = {}
 """File -> SHA-256 of what this process wrote to it last, whatever another one has put there since."""
 
-_STAMPS: dict[Path, tuple[int, ...]] = {}
+_STATES: dict[Path, tuple[int, ...]] = {}
 """The same file -> what the system told of it then."""
 
 _DIGESTS: dict[tuple[int, ...], str] = {}
@@ -88,7 +88,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
             if real.exists():
                 shutil.copymode(real, part)  # as whoever shares it, or does not, has set it
-            _STAMPS[path.absolute()] = _stamp(part)
+            _STATES[path.absolute()] = state_of(part)
             os.replace(part, real)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
@@ -202,12 +202,15 @@ def is_as_written(path: Path) -> bool:
         InputError: it cannot be read.
     """
     there = path.absolute()
-    return _stamp(path) == _STAMPS[there] or digest_of(path) == WRITTEN[there][:DIGEST]
+    return state_of(path) == _STATES[there] or digest_of(path) == WRITTEN[there][:DIGEST]
 
 
-def _stamp(path: Path) -> tuple[int, ...]:
-    now = os.stat(path)
-    return now.st_dev, now.st_ino, now.st_size, now.st_mtime_ns
+def state_of(path: Path | str) -> tuple[int, ...]:
+    """What tells whether a file has changed, without opening it; nothing of one that is not there."""
+    with suppress(OSError):
+        told = os.stat(path)
+        return told.st_dev, told.st_ino, told.st_size, told.st_mtime_ns
+    return ()
 
 
 def digest(content: bytes) -> str:

@@ -18,6 +18,7 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
+from hexmj.storage.files import state_of
 from hexmj.user_code.sources_as_run import (
     SCRIPTS,
     installed_package,
@@ -130,7 +131,7 @@ def doubt(sources: set[str]) -> str:
 def seen(files: Iterable[str]) -> None:
     """Note how some files are that code may open where nobody hears it."""
     for file in files:
-        _AT_FIRST.setdefault(file, _stamp(file))
+        _AT_FIRST.setdefault(file, state_of(file))
 
 
 def heard(files: set[str]) -> set[str]:
@@ -140,13 +141,13 @@ def heard(files: set[str]) -> set[str]:
 
 def remembered(file: str) -> bool:
     """Whether this program has opened a file itself, and it is as it was then."""
-    return file in _AT_FIRST and _AT_FIRST[file] == _stamp(file)
+    return file in _AT_FIRST and _AT_FIRST[file] == state_of(file)
 
 
 def changed(files: Iterable[Path | str]) -> list[str]:
     """Those of some files that have changed since they were first opened, as which the code may remember them."""
     paths = {path for file in files for path in (spelled(file), os.path.realpath(file))}
-    return sorted(file for file in paths & _AT_FIRST.keys() if _AT_FIRST[file] != _stamp(file))
+    return sorted(file for file in paths & _AT_FIRST.keys() if _AT_FIRST[file] != state_of(file))
 
 
 def spelled(file: str | Path) -> str:
@@ -241,14 +242,6 @@ _is_code_of_users = cache(is_users)
 @cache
 def _is_of_python(by: str) -> bool:
     return by.startswith(_PYTHONS) and not is_installed(by)
-
-
-def _stamp(file: str) -> tuple[int, ...]:
-    """What tells whether a file has changed; nothing of one that is not there."""
-    with suppress(OSError):
-        told = os.stat(file)
-        return told.st_size, told.st_mtime_ns, told.st_ino
-    return ()
 
 
 def _is_data(file: str) -> bool:
