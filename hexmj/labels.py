@@ -21,10 +21,12 @@ def labels_of(values: Any) -> list[list[Any]]:
 
 
 def columns_of(values: Any) -> list[Any]:
-    """Names of a table's columns, of one without an index, too, as of polars, or of a named row's numbers; nothing for
-    other values."""
-    row = isinstance(values, tuple) and all(map(np.isscalar, values))
-    columns = getattr(values, "_fields" if row else "columns", ())
+    """Names of a table's columns, of one without an index, too, as of polars, or of a named row's numbers, of which
+    `_0`, `_1`, ... tell only places; nothing for other values."""
+    if isinstance(values, tuple) and not any(map(np.ndim, values)):
+        names = getattr(values, "_fields", ())
+        return [int(name[1:]) if name[0] == "_" and name[1:].isdecimal() else name for name in names]
+    columns = getattr(values, "columns", ())
     return [*columns] if isinstance(columns, Iterable) else []
 
 

@@ -94,8 +94,6 @@ def ordered(values: Any, name: str, behind: int = 0) -> tuple[Any, list[str]]:
     if any(hasattr(one, "iloc") or _is_of_xarray(one) or columns_of(one) for one in rows):
         return [in_order(one, name, behind) for one in rows], []
     labels = [] if behind else columns_of(values)
-    if hasattr(values, "_fields") and not _name_legs(labels):  # a row whose names tell something else
-        labels = []
     if hasattr(values, "iloc") and values.ndim > behind:  # of pandas
         on_its_side = not behind and values.ndim == 2 and _name_legs(values.index) and not _name_legs(labels)
         values = values.T if on_its_side and len(values) == len(LEGS) else values

@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -107,6 +108,16 @@ def test_what_a_command_alone_has_written_is_not_read_again(tmp_path, monkeypatc
     """Else cells of the code that calls commands would count it as what that reads."""
     monkeypatch.setattr("hexmj.storage.files.digest_of", None)
     assert is_as_written(write_whole(tmp_path / "ours.nc", b"ours"))
+
+
+def test_another_content_is_told_whatever_its_time(tmp_path):
+    file = write_whole(tmp_path / "ours.nc", b"ours")
+    before = file.stat()
+    time.sleep(0.05)
+    with file.open("r+b") as edited:
+        edited.write(b"else")
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert not is_as_written(file)
 
 
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):

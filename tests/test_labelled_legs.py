@@ -80,6 +80,12 @@ def test_labelled_legs_may_come_in_any_order():
     assert np.array_equal(walk(Unlabelled(starts)).x, walk(starts).x)
     for rows in (table[shuffled], pd.DataFrame(starts)):
         assert np.array_equal(walk([*rows.itertuples(index=False)]).x, walk(starts).x)
+    named = [*table[shuffled].itertuples(index=False)]
+    assert np.array_equal(walk([type(row)(*map(np.array, row)) for row in named]).x, walk(starts).x)
+    elsewhere = table.rename(columns=lambda leg: f"tip_{leg}")
+    for given in (elsewhere, [*elsewhere.itertuples(index=False)]):
+        with pytest.raises(hexmj.InputError, match=r"^starts of the legs tip_L1, .*; expected L1, L2, L3, R1, R2, R3$"):
+            walk(given)
     with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
         walk(sparse.coo_array(starts))
 

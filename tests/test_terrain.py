@@ -256,6 +256,11 @@ def test_what_makes_no_sense_is_refused(wrong, said):
         Terrain(LDVS, **{"n_starts": 2, "velocities": (0.6,)} | wrong)
 
 
+def test_sizes_that_differ_at_all_are_two_obstacles():
+    terrain = Terrain(LDVS, grounds=("step",), heights=(0.3, 0.1 * 3), n_starts=2, velocities=(0.6,))
+    assert [*terrain.obstacles] == ["flat", "step 0.3 mm", "step 0.30000000000000004 mm"]
+
+
 @pytest.mark.parametrize("option", ["window", "acceleration", "initial-velocity", "ground", "ground-height", "grasp"])
 def test_the_command_offers_no_option_that_it_does_not_obey(run, tmp_path, option):
     code, _, error = run("terrain", f"--{option}", 1, "--out", tmp_path / "out")

@@ -32,8 +32,15 @@ CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
 FELT = 38
 """Numbers that are felt."""
 
-SEEN = "orientation", "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
-"""Observations of an environment, of which it is made."""
+SEEN = {
+    "orientation": (4,),
+    "velocity": (3,),
+    "angular_velocity": (3,),
+    "contact": (6,),
+    "planned_stance": (6,),
+    "planned_tips": (6, 3),
+}
+"""Observations of an environment, of which it is made, by their shapes for one insect."""
 
 MOST = 10.0
 """Greatest number that is felt, in usual sizes; beyond it nothing is told apart."""
@@ -67,18 +74,18 @@ def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> n
     """The same from the observations of a vector environment of this body; (`FELT`,) from those of a single one.
 
     Raises:
-        InputError: other observations than its dictionary.
+        InputError: other observations than its dictionary, or of other shapes.
     """
-    told: dict[str, np.ndarray] = {}
-    for name in SEEN:
-        if name not in typed("observations", observations, Mapping):
-            raise InputError(f"observations of {', '.join(map(str, observations)):.200}; expected {name}, too")
-        told[name] = np.asarray(observations[name])
-    if single := told["orientation"].ndim == 1:
-        told = {name: values[None] for name, values in told.items()}
-    orientation, *others = told.values()
-    seen = felt(body, np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
-    return seen[0] if single else seen
+    if missing := [name for name in SEEN if name not in typed("observations", observations, Mapping)]:
+        raise InputError(f"observations of {', '.join(map(str, observations)):.200}; expected {missing[0]}, too")
+    told = {name: np.asarray(observations[name]) for name in SEEN}
+    several = told["orientation"].shape[:-1][:1]
+    for name, shape in SEEN.items():
+        if told[name].shape != several + shape:
+            raise InputError(f"{name} of the shape {told[name].shape}; expected {several + shape}")
+    orientation, *others = told.values() if several else (values[None] for values in told.values())
+    seen = felt(typed("body", body, Body), np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
+    return seen if several else seen[0]
 
 
 @dataclass(frozen=True)

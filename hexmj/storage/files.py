@@ -88,8 +88,9 @@ def replacing(path: Path) -> Iterator[Path]:
                 WRITTEN[path.absolute()] = hashlib.file_digest(file, "sha256").hexdigest()
             if real.exists():
                 shutil.copymode(real, part)  # as whoever shares it, or does not, has set it
-            _STATES[path.absolute()] = state_of(part)
+            ours = state_of(part)
             os.replace(part, real)
+            _STATES[path.absolute()] = (*ours, *_stamp(real)[-1:])
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:
@@ -202,7 +203,14 @@ def is_as_written(path: Path) -> bool:
         InputError: it cannot be read.
     """
     there = path.absolute()
-    return state_of(path) == _STATES[there] or digest_of(path) == WRITTEN[there][:DIGEST]
+    return _stamp(path) == _STATES[there] or digest_of(path) == WRITTEN[there][:DIGEST]
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    """`state_of` a file, and when anything of it has changed, as its name."""
+    with suppress(OSError):
+        return *state_of(path), os.stat(path).st_ctime_ns
+    return ()
 
 
 def state_of(path: Path | str) -> tuple[int, ...]:

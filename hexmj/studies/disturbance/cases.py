@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+import numpy as np
+
 from hexmj.errors import InputError
 
 Kind = Literal["halt", "leg", "push"]
@@ -38,7 +40,9 @@ class Case:
     @property
     def disturbance(self) -> str:
         """Its name: undisturbed, halt, leg, push 20."""
-        return self.kind if self.kind != "push" else f"push {self.impulse:.15g}" if self.impulse else NO_DISTURBANCE
+        if self.kind != "push":
+            return self.kind
+        return f"push {np.format_float_positional(self.impulse, trim='-')}" if self.impulse else NO_DISTURBANCE
 
 
 def every_case(
