@@ -42,6 +42,14 @@ def install(folder: Path, name: str, version: str, files: dict[str, str], more: 
     (told / "RECORD").write_text("".join(rows))
 
 
+def test_what_is_installed_while_a_program_runs_is_found(tmp_path, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    install(tmp_path, "first_one", "1.0", {"first_module.py": ""})
+    assert packages.version("first_module").startswith("1.0@")
+    install(tmp_path, "second_one", "2.0", {"second_module.py": ""})
+    assert packages.version("second_module").startswith("2.0@")
+
+
 INSTALLED = """
 from pathlib import Path
 import hexmj

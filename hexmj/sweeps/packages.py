@@ -2,9 +2,10 @@
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import Distribution, PackageNotFoundError, packages_distributions, requires
 from importlib.util import find_spec
@@ -16,7 +17,7 @@ from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
 from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import canonicalize_name
 
-from hexmj.storage.files import digest, digest_of
+from hexmj.storage.files import digest, digest_of, state_of
 from hexmj.sweeps.plain_settings import PACKAGE
 from hexmj.user_code.sources_as_run import is_installed
 
@@ -80,7 +81,14 @@ def _distributions(module: str) -> list[Distribution]:
     try:
         return [Distribution.from_name(NAMES.get(module, module))]
     except PackageNotFoundError:
-        return [Distribution.from_name(one) for one in {*packages_distributions().get(module, ())}]
+        by_module = _by_module(tuple(state_of(one or ".") for one in sys.path))
+        return [Distribution.from_name(one) for one in {*by_module.get(module, ())}]
+
+
+@lru_cache(1)
+def _by_module(_: tuple[object, ...]) -> Mapping[str, list[str]]:
+    """Names of distributions, for folders that are as they are; to look through all that is installed takes seconds."""
+    return packages_distributions()
 
 
 def _requirements(distribution: Distribution) -> Iterator[Requirement]:
