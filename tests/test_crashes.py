@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from small_cells import ENVIRONMENT, moves, numbers, squares
 from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
 from tests.soak.faults import KINDS
+from tiers import few_of
 
 pytestmark = pytest.mark.slow
 
@@ -35,8 +37,10 @@ def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
     brought_up.close()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("job", ["sweep", "search"])
+@pytest.mark.parametrize(
+    ("job", "kind"),
+    few_of(product(["sweep", "search"], KINDS), *product(["sweep"], KINDS), ("search", "torn"), ("search", "kill")),
+)
 def test_every_write_in_turn(nursery: Nursery, job: str, kind: str) -> None:
     points = nursery.points(job, kind)
     assert len(points) > (3 if kind == "short" else 12)
@@ -55,7 +59,7 @@ def test_some_writes_of_physical_walks(nursery: Nursery, job: str, kind: str) ->
 KILLS = {"sweep on processes": 9, "physical on processes": 5, "physical search": 5, "command on processes": 1}
 
 
-@pytest.mark.parametrize("job", KILLS)
+@pytest.mark.parametrize("job", few_of(KILLS, "sweep on processes", "physical on processes", "physical search"))
 def test_kills_at_random_moments(nursery: Nursery, job: str) -> None:
     moments = np.random.default_rng([1998, len(job)]).uniform(0, nursery.unbroken(job).lived, KILLS[job]).tolist()
     broken = {moment: nursery.broken(job, {"moment": moment}) for moment in moments}

@@ -150,7 +150,7 @@ def test_example(example, folder):
 
 
 def test_the_servo_hexapod_from_fewer_starts(tmp_path):
-    small = "import servo_hexapod; servo_hexapod.main(n_starts=4)"
+    small = "import servo_hexapod; servo_hexapod.main(n_starts=2)"
     paths = os.pathsep.join([str(ROOT), str(ROOT / "examples"), os.environ.get("PYTHONPATH", "")])
     subprocess.run([sys.executable, "-c", small], cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, check=True)
 

@@ -9,7 +9,7 @@ from tests.soak.walks import tried
 
 pytestmark = pytest.mark.slow
 
-INPUTS = 60
+INPUTS = 40
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -76,7 +76,8 @@ def read_module(name: str, file: Path) -> Module:
     if not ours:
         imports += tuple(wanted for one in ast.walk(tree) for wanted in _called(one, package))
     bound = {as_name: wanted for one in _statements(tree, types=True) for as_name, wanted in _imports(one, package)}
-    named = texts(tree)
+    names_data = not ours or any(end.encode() in held for end in _DATA_OF_OURS)
+    named = texts(tree) if names_data else []
     there = named_there(named, (file.parent, _ASSETS)) if ours else []
     data = sorted(one for one in there if one.name.endswith(_DATA_OF_OURS) and one.is_file())
     return Module(digest(held), data, [] if ours else named, of_package, imports, bound)
