@@ -7,7 +7,7 @@ from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.sweeps import conduct
 
 folder = Path("results/converge/walks")  # keeps finished walks, where `hexmj converge` keeps them
-study = StaticLimit(hexmj.LDVS, velocity=0.5, vps=(400.0, 100.0, 25.0), n_starts=20, window="start")
+study = StaticLimit(hexmj.LDVS, velocity=0.5, vps=(400.0, 100.0, 25.0), n_starts=12, window="start")
 result = conduct(study, folder)
 print("legs' mass  V_p [mm/s]  kinematic  physical  agreement  margins apart [mm]  centre of mass from O [mm]")
 for mass in result.leg_mass.values:

@@ -7,7 +7,7 @@ from hexmj.studies.stability_map.study import StabilityMap
 from hexmj.sweeps import conduct
 
 folder = Path("results/map/walks")  # keeps finished walks, where `hexmj map` keeps them
-study = StabilityMap(hexmj.LDVS, "vp", values=[20.0, 320.0], velocities=[0.5], n_starts=30)
+study = StabilityMap(hexmj.LDVS, "vp", values=[20.0, 320.0], velocities=[0.5], n_starts=20)
 result = conduct(study, folder)
 for vp in result.value.values:
     one = result.sel(value=vp, velocity=0.5)
