@@ -23,8 +23,8 @@ def labels_of(values: Any) -> list[list[Any]]:
 def columns_of(values: Any) -> list[Any]:
     """Names of a table's columns, of one without an index, too, as of polars, or of a named row's numbers, of which
     `_0`, `_1`, ... tell only places; nothing for other values."""
-    if isinstance(values, tuple) and not any(map(np.ndim, values)):
-        names = getattr(values, "_fields", ())
+    names = getattr(values, "_fields", ()) if isinstance(values, tuple) else ()
+    if names and not any(isinstance(one, Sequence) or getattr(one, "ndim", 0) for one in values):
         return [int(name[1:]) if name[0] == "_" and name[1:].isdecimal() else name for name in names]
     columns = getattr(values, "columns", ())
     return [*columns] if isinstance(columns, Iterable) else []

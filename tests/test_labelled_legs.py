@@ -86,8 +86,9 @@ def test_labelled_legs_may_come_in_any_order():
     for given in (elsewhere, [*elsewhere.itertuples(index=False)]):
         with pytest.raises(hexmj.InputError, match=r"^starts of the legs tip_L1, .*; expected L1, L2, L3, R1, R2, R3$"):
             walk(given)
-    with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
-        walk(sparse.coo_array(starts))
+    for given in (sparse.coo_array(starts), ([[1.0], [1.0, 2.0]],)):
+        with pytest.raises(hexmj.InputError, match=r"^starts = .*; expected numbers$"):
+            walk(given)
 
 
 def test_labelled_weights_stand_in_order():
