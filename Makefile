@@ -12,7 +12,7 @@
 PYTHON ?= python3
 INSTALL = -m pip --disable-pip-version-check --quiet install --no-compile
 PROJECT = .venv/bin/python $(INSTALL) --constraint constraints.txt --editable
-TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist worksteal
+TWO_AT_ONCE = -p no:benchmark --numprocesses 2 --dist loadfile
 GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)

@@ -102,12 +102,13 @@ def test_what_cannot_be_asked_is_not_known(result) -> None:
 
 
 @pytest.mark.slow
-def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, result) -> None:
-    alone = replace(league, entrants={"wilson": league.entrants["wilson"]}, velocities=(0.6,))
-    other = alone.result([cell.compute(threads=1) for cell in alone.cells()])
-    result = result.sel(velocity=[0.6])
-    for name in ("kinematic", "measured", "physical", "fell", "cost", "torque", "slip", "stable", "ipsilateral"):
-        assert np.array_equal(other[name].sel(entrant="wilson"), result[name].sel(entrant="wilson"), equal_nan=True)
+def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, data) -> None:
+    """But for those of disturbances, which look long for starts that keep stability until then."""
+    alone = replace(league, entrants={"wilson": league.entrants["wilson"]}, velocities=(0.6,)).named_cells()
+    asked = {name: cell for name, cell in alone.items() if name[1] not in ("halt", "leg", "push")}
+    assert len(asked) > 10
+    for name, cell in asked.items():
+        assert cell.compute(threads=1).equals(data[name]), name
 
 
 def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:

@@ -57,13 +57,13 @@ def test_both_measures_beside_ldvs(own):
     papers = hexmj.flss(hexmj.LDVS, [0.1, 0.4], n_starts=200)
     assert (table.flss <= papers.flss).all()
     assert table.flss[1] < papers.flss[1] - 0.1
-    both = hexmj.compare({"own": own, "ldvs": hexmj.LDVS}, [0.4], n_starts=6, window=80.0)
+    both = hexmj.compare({"own": own, "ldvs": hexmj.LDVS}, [0.4], n_starts=12, window=80.0)
     kinematic, physical = both.kinematic.values[:, 0], both.physical.values[:, 0]
     assert kinematic[0] <= kinematic[1]
     assert physical[0] <= physical[1]
     assert both.tracking.sel(controller="own").max() < 3.0
     assert both.speed.sel(controller="own").min() > 0.8
-    alone = hexmj.physical_flss(own, [0.4], n_starts=6, window=80.0)
+    alone = hexmj.physical_flss(own, [0.4], n_starts=12, window=80.0)
     assert alone.flss.item() == physical[0]
     assert hexmj.settings(alone)["controllers"][own.name]["name"] == own.name
 
