@@ -129,6 +129,24 @@ def test_steps_are_in_units_of_the_parameters():
     np.testing.assert_allclose(np.max(tried, axis=0), 0.1 * unit * ~BINARY, atol=1e-12)
 
 
+def test_the_simplex_does_not_depend_on_the_units_of_the_parameters():
+    """Though it ends where its corners are close to one another, and what it walks in costs steps of a frequency."""
+
+    def tried(unit: np.ndarray) -> np.ndarray:
+        seen = []
+
+        def cost(vectors: np.ndarray) -> np.ndarray:
+            seen.extend(vectors / unit)
+            return np.round(((vectors / unit - 0.4) ** 2).sum(axis=1), 2)
+
+        refine(unit * 1.0, ~BINARY, cost, 400, unit)
+        return np.array(seen)
+
+    ones = tried(np.ones(6))
+    assert 30 < len(ones) < 400
+    assert np.array_equal(tried(np.exp2([0.0, -20, -40, 7, 3, 60])), ones)
+
+
 @pytest.mark.parametrize("algorithm", [Evolution, CovarianceAdaptation])
 @pytest.mark.parametrize("cost", [mixed_sphere, narrow_valley])
 def test_both_algorithms_and_the_simplex_find_a_known_minimum(algorithm, cost):

@@ -202,21 +202,22 @@ def refine(
     """Downhill simplex from `start` over its `free` parameters; the best vector and its cost.
 
     The first simplex is long enough to leave the steps of a frequency: each edge is a tenth of the
-    parameter and 0.1 of its `unit`, see `Domain`.
+    parameter and 0.1 of its `unit`, see `Domain`.  Corners of the last one are within some 1e-4 of it and cost the same.
     """
     from scipy.optimize import minimize
 
     tried = []
+    scale = np.exp2(np.floor(np.log2(np.broadcast_to(unit, start.shape))))[free]  # by a power of 2 no number is rounded
 
     def cost(x: np.ndarray) -> float:
         vector = start.copy()
-        vector[free] = x
+        vector[free] = x * scale
         tried.append((vector, costs(vector[None])[0]))
         return tried[-1][1]
 
     x, edge = start[free], (0.1 * np.abs(start) + 0.1 * unit)[free]
-    simplex = np.vstack([x, x + np.diag(edge)])
-    minimize(cost, x, method="Nelder-Mead", options={"maxfev": budget, "initial_simplex": simplex, "fatol": 1e-9})
+    how = {"maxfev": budget, "initial_simplex": np.vstack([x, x + np.diag(edge)]) / scale}
+    minimize(cost, x / scale, method="Nelder-Mead", options=how | {"xatol": 1e-4, "fatol": 1e-9})
     return _least(tried)
 
 
