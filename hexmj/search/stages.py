@@ -202,7 +202,7 @@ def refine(
     """Downhill simplex from `start` over its `free` parameters; the best vector and its cost.
 
     The first simplex is long enough to leave the steps of a frequency: each edge is a tenth of the
-    parameter and 0.1 of its `unit`, see `Domain`.  Corners of the last one are within some 1e-4 of it and cost the same.
+    parameter and 0.1 of its `unit`, see `Domain`.  Corners of the last are within some 1e-4 of it and cost the same.
     """
     from scipy.optimize import minimize
 
