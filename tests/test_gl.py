@@ -154,6 +154,16 @@ def test_without_the_libraries_it_is_said_what_brings_them(environment):
     assert "libEGL.so.1: cannot open shared object file); on Debian and Ubuntu" in str(gl.missing())
 
 
+@pytest.mark.parametrize("wish", [None, "egl"])
+@pytest.mark.skipif(sys.platform != "linux", reason="EGL")
+def test_another_platform_of_opengl_is_told(environment, wish):
+    if wish:
+        environment.setenv("MUJOCO_GL", wish)
+    environment.setenv("PYOPENGL_PLATFORM", "glx")
+    told = "Nothing can be rendered here (PYOPENGL_PLATFORM = glx); expected egl, or leave it unset."
+    assert gl.missing() == told
+
+
 @pytest.mark.parametrize(
     ("wish", "left"),
     [(None, None), ("egl", None), ("glfw", "glfw"), ("off", "off"), ("osmesa", "disable"), ("nonsense", "disable")],

@@ -175,7 +175,10 @@ def walking() -> str:
 CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "install hexmj into a fresh environment (make test, make compare), Python 3.11 or newer"),
     "threads": (threads, "give --threads with the number of cores that are granted"),
-    "rendering": (rendering, f"install {PACKAGES} and leave MUJOCO_GL unset, or set it to egl; only films need it"),
+    "rendering": (
+        rendering,
+        f"install {PACKAGES} and leave MUJOCO_GL and PYOPENGL_PLATFORM unset, or set both to egl; only films need it",
+    ),
     "films": (films, "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg with H.264; only films need it"),
     "compiled code": (compiled, "leave NUMBA_DISABLE_JIT unset, and set NUMBA_CACHE_DIR to a folder that is writable"),
     "walking": (walking, "mend what else is WRONG, or reinstall mujoco and numba; if it stays, report it"),

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hexmj.checks import typed
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.stability import stability_margin
 from hexmj.walks import Walk
@@ -19,8 +20,12 @@ FLSS at V_p = 20 mm/s within 0.04, see `docs/static_limit.md`."""
 
 
 def grounded(walk: PhysicalWalk, share: float = GROUNDED) -> Walk:
-    """The measured walk, in which feet that hover by less than a share of the standing height stand, too."""
-    near = walk.height <= share * walk.conditions.path.standing_height
+    """The measured walk, in which feet that hover by less than a share of the standing height stand, too.
+
+    Raises:
+        InputError: it is no physical walk.
+    """
+    near = typed("walk", walk, PhysicalWalk).height <= share * walk.conditions.path.standing_height
     return replace(walk.measured, stance=walk.measured.stance | near)
 
 
@@ -28,8 +33,11 @@ def centre_of_pressure(walk: PhysicalWalk) -> np.ndarray:
     """Where the ground pushes feet up, seen from the centre of mass, (step, start, 2) [mm]; NaN where it pushes none.
 
     A foot that pulls, and is held by adhesion, counts nothing.
+
+    Raises:
+        InputError: it is no physical walk.
     """
-    pushed = np.maximum(walk.load, 0.0)
+    pushed = np.maximum(typed("walk", walk, PhysicalWalk).load, 0.0)
     with np.errstate(invalid="ignore"):
         share = pushed / pushed.sum(axis=-1, keepdims=True)
     return (share[..., None] * walk.measured.feet).sum(axis=-2)

@@ -135,6 +135,11 @@ def missing() -> str | None:
     """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
     if told := vain_wish():
         return _sentence(told)
+    wish = os.environ.get("MUJOCO_GL", "").lower().strip()
+    wish = wish or ("" if sys.platform != "linux" or any(map(os.environ.get, WISHES)) else "egl")
+    platform = os.environ.get("PYOPENGL_PLATFORM")
+    if platform and wish in ("egl", "osmesa") and platform != wish:
+        return f"Nothing can be rendered here (PYOPENGL_PLATFORM = {platform:.80}); expected {wish}, or leave it unset."
     try:
         check_not_forked()
         import mujoco

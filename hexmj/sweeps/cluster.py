@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
+from threading import Event, Thread
 from typing import Any
 
 from hexmj.errors import InputError, without_extra
@@ -13,6 +14,9 @@ from hexmj.storage.literal import literal
 
 PATIENCE = 10.0
 """How long an answer of the scheduler is waited for [s]."""
+
+EVERY = 2.0
+"""How often it is asked whether anybody is at work [s]."""
 
 
 @contextmanager
@@ -33,7 +37,8 @@ def workers_of(address: str) -> Iterator[Executor]:
     with _quiet():
         if not _found(address)["workers"]:
             print(f"hexmj: the scheduler at {address} has no workers yet; cells wait for them", file=sys.stderr)
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client, over = Client(address, timeout=PATIENCE, set_as_default=False), Event()
+        Thread(target=_watch, args=(client, address, over), daemon=True).start()
         try:
             yield client.get_executor(pure=False)
         except KilledWorker as error:
@@ -42,8 +47,21 @@ def workers_of(address: str) -> Iterator[Executor]:
                 " is finished is kept: start again, with more memory for each worker if theirs was full"
             ) from None
         finally:
+            over.set()
             with suppress(Exception):  # of a scheduler that is gone
                 client.close(timeout=PATIENCE)
+
+
+def _watch(client: Any, address: str, over: Event) -> None:
+    """Say so whenever the last worker has gone away while cells wait."""
+    some = False
+    while not over.wait(EVERY):
+        with suppress(Exception):  # of a scheduler that is gone, which the cells tell
+            before, some = some, bool(client.nthreads())
+            if before and not some and any(one.status == "pending" for one in [*client.futures.values()]):
+                print(
+                    f"hexmj: the scheduler at {address} has no workers left; cells wait for new ones", file=sys.stderr
+                )
 
 
 def has_given_up(executor: Executor) -> bool:

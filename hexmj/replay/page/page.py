@@ -27,7 +27,7 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
 
     Args:
         recordings: one or two.
-        path: of the page, an HTML file; it appears whole or not at all.
+        path: of the page, an HTML file; it appears whole or not at all, and its folder is made.
         body: the description of what was recorded.
 
     Returns:
