@@ -1,6 +1,7 @@
 """Labels of xarray, pandas or another table along the axes of values that are read by their places."""
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from numbers import Integral
 from typing import Any
 
@@ -24,10 +25,16 @@ def columns_of(values: Any) -> list[Any]:
     """Names of a table's columns, of one without an index, too, as of polars, or of a named row's numbers, of which
     `_0`, `_1`, ... tell only places; nothing for other values."""
     names = getattr(values, "_fields", ()) if isinstance(values, tuple) else ()
-    if names and not any(isinstance(one, Sequence) or getattr(one, "ndim", 0) for one in values):
+    if names and all(map(_is_single, values)):
         return [int(name[1:]) if name[0] == "_" and name[1:].isdecimal() else name for name in names]
     columns = getattr(values, "columns", ())
     return [*columns] if isinstance(columns, Iterable) else []
+
+
+def _is_single(value: Any) -> bool:
+    with suppress(ValueError):  # of rows of different lengths
+        return np.ndim(value) == 0
+    return False
 
 
 def rows_of(values: Any) -> Sequence[Any]:

@@ -35,7 +35,7 @@ NAMES = ("wilson", "ldvs", "graham-ideal")
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(takes_part, (0.3, 0.6), 12, 2, 2, window=20.0, accelerating=False, periods=12, seed=0)
+    return League(takes_part, (0.3, 0.6), 12, 2, 2, window=40.0, accelerating=False, periods=12, seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +51,12 @@ def result(league: League, data) -> xr.Dataset:
 
 @pytest.mark.thorough
 def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
-    table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=20.0)
+    table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=40.0)
     assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)
     assert np.array_equal(result.kinematic_low.sel(entrant="ldvs"), table.low)
-    j_n, _ = flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=12, window=20.0)
+    j_n, _ = flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=12, window=40.0)
     assert result.range.sel(entrant="ldvs") == j_n
-    falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, window=20.0)
+    falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, window=40.0)
     assert np.array_equal(result.physical.sel(entrant="wilson"), falls.flss)
 
 
@@ -83,7 +83,7 @@ def test_differences_are_those_on_the_same_starts(result) -> None:
     assert not result.kinematic_above.sel(entrant="ldvs").any()
     starts, v = hexmj.draw_starts(12, 0), 0.3
     lost, of_ldvs = (
-        np.isfinite(first_loss(starts, one, v, 20.0)) for one in (hexmj.load_controller("wilson"), hexmj.LDVS)
+        np.isfinite(first_loss(starts, one, v, 40.0)) for one in (hexmj.load_controller("wilson"), hexmj.LDVS)
     )
     one = result.sel(entrant="wilson", velocity=v)
     ends = [one[f"kinematic_above{end}"].item() for end in ("", "_low", "_high")]

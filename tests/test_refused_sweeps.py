@@ -94,7 +94,10 @@ def shut() -> Executor:
         (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
         (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a dict"),  # pyright: ignore
         (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
-        (lambda: Cell("odd", max, {}), "settings of odd: no signature found for builtin <built-in function max>"),
+        (
+            lambda: Cell("odd", max, {}),
+            "the function of odd: no signature found for builtin <built-in function max>; expected one",
+        ),
         (lambda: Cell("odd", odd, {}, work=-1), "work = -1.0 of odd; expected a finite number above 0"),
         (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore
         (lambda: over_axes({"a": 2}, 3 * [xr.Dataset()]), "the data of 3 cells along {'a': 2}; expected 2"),

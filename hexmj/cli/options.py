@@ -75,8 +75,8 @@ class Controlled:
     """How the controllers plan that are named."""
 
     order: str | None = None
-    """Order of updates of the 1998 network: 'printed' (Eq. 6 to the letter, unless given), 'undelayed' or
-    'sequential'."""
+    """Order of updates of the 1998 network: 'printed' (Eq. 6 to the letter), 'undelayed' or 'sequential'; that of the
+    set unless given."""
     reading: str | None = None
     """Reading of the 1998 paper: 'printed', or 'lasting', in which an anterior leg acts by mechanism 3 while it
     protracts, too; that of the set unless given."""

@@ -7,14 +7,15 @@ upright, as fast as it is told and stands on the feet that it plans to stand on.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from hexmj.bodies.description import Body
 from hexmj.bodies.stick_insect import STICK_INSECT
-from hexmj.checks import numbers, short, typed
+from hexmj.checks import NO_ARRAY, numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, limits_within
@@ -78,7 +79,7 @@ def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> n
     """
     if missing := [name for name in SEEN if name not in typed("observations", observations, Mapping)]:
         raise InputError(f"observations of {', '.join(map(str, observations)):.200}; expected {missing[0]}, too")
-    told = {name: np.asarray(observations[name]) for name in SEEN}
+    told = {name: _observed(name, observations[name]) for name in SEEN}
     several = told["orientation"].shape[:-1][:1]
     for name, shape in SEEN.items():
         if told[name].shape != several + shape:
@@ -86,6 +87,14 @@ def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> n
     orientation, *others = told.values() if several else (values[None] for values in told.values())
     seen = felt(typed("body", body, Body), np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
     return seen if several else seen[0]
+
+
+def _observed(name: str, values: Any) -> np.ndarray:
+    with suppress(*NO_ARRAY):
+        array = np.asarray(values)
+        if array.dtype.kind in "biuf":
+            return array
+    raise InputError(f"{name} = {short(values)}; expected numbers")
 
 
 @dataclass(frozen=True)

@@ -207,7 +207,7 @@ def refine(
     from scipy.optimize import minimize
 
     tried = []
-    scale = np.exp2(np.floor(np.log2(np.broadcast_to(unit, start.shape))))[free]  # by a power of 2 no number is rounded
+    scale = np.ldexp(1.0, np.frexp(np.broadcast_to(unit, start.shape))[1] - 1)[free]  # powers of 2 round no number
 
     def cost(x: np.ndarray) -> float:
         vector = start.copy()

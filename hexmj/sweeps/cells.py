@@ -59,7 +59,9 @@ class Cell:
             raise InputError(f"setting {taken[0]!r} of {self.name}; expected it to be left to the sweep")
         try:
             signature(self.function).bind_partial(**self.settings)
-        except (TypeError, ValueError) as error:
+        except ValueError as error:
+            raise InputError(f"the function of {self.name}: {error}; expected one that is written in Python") from None
+        except TypeError as error:
             raise InputError(f"settings of {self.name}: {error}; expected arguments of its function") from None
 
     def compute(self, *first: Any, **execution: Any) -> Any:

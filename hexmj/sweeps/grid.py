@@ -155,6 +155,8 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
 
     for name, size in typed("sizes", sizes, Mapping).items():
         whole(f"size of {name}", size, 1)
+        if any(name in one.dims for one in data):
+            raise InputError(f"axis {name!r} of cells, whose data have one of that name; expected another name")
     if (count := math.prod(sizes.values())) != len(data):
         raise InputError(f"the data of {len(data)} cells along {dict(sizes)}; expected {count}")
     rows = list(data)
