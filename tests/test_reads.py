@@ -1,6 +1,7 @@
 """What a cell's code reads beyond what the cell's name tells is kept with it: with other files it is another cell."""
 
 import _ctypes
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -112,6 +113,15 @@ def test_what_it_remembers_of_an_earlier_call_is_not_forgotten(computed: Callabl
     for calls in (2, 3):
         with pytest.warns(UserWarning, match="one.gain has changed since it was opened first"):
             assert computed(gain) == (1.0, calls)
+
+
+def test_an_edit_with_its_time_set_back_is_noticed(computed: Callable[..., tuple[float, int]]) -> None:
+    gain, before = 'remembered(f"{at}/gain")', os.stat("one/gain")
+    assert computed(gain) == (1.0, 1)
+    Path("one/gain").write_text("7.0")
+    os.utime("one/gain", ns=(before.st_atime_ns, before.st_mtime_ns))
+    with pytest.warns(UserWarning, match="one.gain has changed since it was opened first"):
+        assert computed(gain) == (1.0, 2)
 
 
 def test_what_it_remembers_of_a_file_that_a_field_names_is_not_kept_once_that_has_changed(

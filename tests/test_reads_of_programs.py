@@ -168,12 +168,14 @@ def test_what_a_script_loads_its_own_controllers_may_use(tmp_path: Path, name: s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("executor", ["None", "ProcessPoolExecutor(1, get_context('spawn'))"])
+@pytest.mark.parametrize("executor", ["nullcontext()", "ProcessPoolExecutor(1, get_context('spawn'))"])
 def test_a_controller_that_a_script_loads_is_no_reason_to_refuse_its_own(tmp_path: Path, executor: str) -> None:
     script = f"import hexmj\n{NEW}BASE = hexmj.load_controller('other.py:Other')\n"
     script += f"def cell():\n    return xr.Dataset({{'gain': BASE.gain}})\n{SWEEPS}"
-    script = script.replace('Path("kept")', f'Path("kept"), executor={executor}')
-    pools = "from concurrent.futures import ProcessPoolExecutor\nfrom multiprocessing import get_context\n"
+    script = script.replace("    print", f"    with {executor} as executor:\n        print")
+    script = script.replace('Path("kept")', 'Path("kept"), executor=executor')
+    pools = "from concurrent.futures import ProcessPoolExecutor\nfrom contextlib import nullcontext\n"
+    pools += "from multiprocessing import get_context\n"
     assert sweep(tmp_path, script=pools + script, other=OTHER) == (2.0, 1, "")
 
 

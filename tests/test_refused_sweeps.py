@@ -102,6 +102,10 @@ def shut() -> Executor:
         (lambda: Cell("odd", 3, {}), "function = 3; expected a function"),  # pyright: ignore
         (lambda: over_axes({"a": 2}, 3 * [xr.Dataset()]), "the data of 3 cells along {'a': 2}; expected 2"),
         (lambda: over_axes({}, []), "the data of 0 cells along {}; expected 1"),
+        (
+            lambda: over_axes({"a": 1}, [xr.Dataset(coords={"a": [1]})]),
+            "axis 'a' of cells, whose data have one of that",
+        ),
     ],
 )
 def test_sweeps_of_what_is_none_are_refused_in_one_sentence(ask: Callable[[], object], sentence: str) -> None:

@@ -90,7 +90,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 shutil.copymode(real, part)  # as whoever shares it, or does not, has set it
             ours = state_of(part)
             os.replace(part, real)
-            _STATES[path.absolute()] = (*ours, *_stamp(real)[-1:])
+            _STATES[path.absolute()] = (*ours[:-1], *state_of(real)[-1:])  # which the new name has set
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
     finally:
@@ -203,21 +203,14 @@ def is_as_written(path: Path) -> bool:
         InputError: it cannot be read.
     """
     there = path.absolute()
-    return _stamp(path) == _STATES[there] or digest_of(path) == WRITTEN[there][:DIGEST]
-
-
-def _stamp(path: Path) -> tuple[int, ...]:
-    """`state_of` a file, and when anything of it has changed, as its name."""
-    with suppress(OSError):
-        return *state_of(path), os.stat(path).st_ctime_ns
-    return ()
+    return state_of(path) == _STATES[there] or digest_of(path) == WRITTEN[there][:DIGEST]
 
 
 def state_of(path: Path | str) -> tuple[int, ...]:
     """What tells whether a file has changed, without opening it; nothing of one that is not there."""
     with suppress(OSError):
         told = os.stat(path)
-        return told.st_dev, told.st_ino, told.st_size, told.st_mtime_ns
+        return told.st_dev, told.st_ino, told.st_size, told.st_mtime_ns, told.st_ctime_ns
     return ()
 
 
