@@ -65,7 +65,7 @@ def _panel(axes: "Axes", one: "xr.Dataset") -> None:
                 own = next(STYLES[begin] for begin in STYLES if variant.startswith(begin))
                 style = {"markeredgecolor": "white", "markersize": 7.5, "alpha": 0.9} | own
             axes.plot(here.flss.sel(variant=variant), row, **style)
-        axes.plot(here["mean"], row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
+        axes.plot(here.flss.mean(), row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
     tidy(axes)
     axes.grid(visible=False, axis="y")
     axes.set(xlim=(0.0, min(1.02, 1.05 * one.flss.max().item() + 1e-3)), xlabel="FLSS")
