@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 from typing import Any, cast
 
 import pytest
@@ -23,7 +23,6 @@ from hexmj.errors import InputError
 from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import flss
 from hexmj.sweeps import Cell, run
-from hexmj.sweeps import cluster as cluster_module
 from hexmj.sweeps.cluster import workers_of
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, counted_cells, odd_cells
@@ -260,26 +259,6 @@ def test_a_command_that_loses_its_scheduler_or_is_stopped_keeps_what_is_finished
     with xr.open_dataset(out / "flss.nc", engine="h5netcdf") as found:
         whole = flss(LDVS, [0.7], n_starts=20_000, window="start")
         assert all(found[name].equals(whole[name]) for name in whole.variables)
-
-
-def test_it_is_said_that_the_last_worker_has_gone_while_cells_wait(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(cluster_module, "EVERY", 0.01)
-    over, seen = threading.Event(), iter([{}, {"a": 1}, {"a": 1}, {}, {}, {"a": 1}, {}])
-
-    class Client:
-        futures = MappingProxyType({"cell": SimpleNamespace(status="pending")})
-
-        def nthreads(self) -> dict[str, int]:
-            if (now := next(seen, None)) is not None:
-                return now
-            over.set()
-            raise OSError
-
-    cluster_module._watch(Client(), "tcp://there:1", over)
-    said = "hexmj: the scheduler at tcp://there:1 has no workers left; cells wait for new ones\n"
-    assert capsys.readouterr().err == 2 * said
 
 
 # Workers that are not as they should be

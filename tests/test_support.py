@@ -63,7 +63,7 @@ def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_
     """Adhesion pulls feet and ground together, and carries nothing."""
     starts, weight = draw_starts(6, 0), STICK_INSECT.mass * 9810.0
     far = []
-    for grasp in (0.0, 5.0):
+    for grasp in (0.0, 1.0, 5.0):
         conditions = Conditions.of(vp=20.0, grasp=grasp)
         assert_allclose(settle(starts, conditions).load.sum(axis=1), weight, rtol=0.01)
         walk = physical_walk(starts, LDVS, 0.3, 60.0, conditions=conditions)

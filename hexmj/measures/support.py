@@ -47,6 +47,9 @@ def pressure_margin(walk: PhysicalWalk) -> np.ndarray:
     """Distance of the centre of pressure from the nearest edge of the polygon of the feet at the ground, (step, start).
 
     It never lies outside, and on the edge over which the body tips; NaN [mm] where the ground pushes no foot up.
+
+    Raises:
+        InputError: it is no physical walk.
     """
     support, centre = grounded(walk), centre_of_pressure(walk)
     known = np.isfinite(centre[..., 0])

@@ -94,7 +94,7 @@ def context_type() -> Any:
     """
     import_what_clashes()
     _DRAWERS.add(os.getpid())
-    if sys.platform != "linux" or any(os.environ.get(name) for name in WISHES):
+    if not _unasked():
         import mujoco
 
         return mujoco.GLContext
@@ -109,7 +109,7 @@ def drop_vain_wish() -> None:
 
     For a program of our own only, before MuJoCo is imported; `missing` then says what to install.
     """
-    wish = os.environ.get("MUJOCO_GL", "").lower().strip()
+    wish = _wish()
     if sys.platform != "linux" or wish in ("", *SURE, *NONE):
         return
     if wish == "egl":
@@ -126,20 +126,27 @@ def vain_wish() -> str | None:
     """What is asked for that draws nothing; None if something is, or anything will do."""
     if _VAIN:
         return f"MUJOCO_GL = {_VAIN[0]:.80} is not there; expected one of egl, glfw and osmesa that is"
-    if os.environ.get("MUJOCO_GL", "").lower().strip() in NONE:
+    if (wish := "egl" if _unasked() else _wish()) in NONE:
         return "MUJOCO_GL asks for nothing"
+    platform = os.environ.get("PYOPENGL_PLATFORM") or wish
+    if wish in ("egl", "osmesa") and platform != wish:
+        return f"PYOPENGL_PLATFORM = {platform:.80}; expected {wish}, or none"
     return None
+
+
+def _wish() -> str:
+    return os.environ.get("MUJOCO_GL", "").lower().strip()
+
+
+def _unasked() -> bool:
+    """Whether nobody has asked for a GL, and there is no screen: then EGL is taken."""
+    return sys.platform == "linux" and not any(map(os.environ.get, WISHES))
 
 
 def missing() -> str | None:
     """Why nothing can be rendered here and what brings rendering, in one sentence; None if it works."""
     if told := vain_wish():
         return _sentence(told)
-    wish = os.environ.get("MUJOCO_GL", "").lower().strip()
-    wish = wish or ("" if sys.platform != "linux" or any(map(os.environ.get, WISHES)) else "egl")
-    platform = os.environ.get("PYOPENGL_PLATFORM")
-    if platform and wish in ("egl", "osmesa") and platform != wish:
-        return f"Nothing can be rendered here (PYOPENGL_PLATFORM = {platform:.80}); expected {wish}, or leave it unset."
     try:
         check_not_forked()
         import mujoco

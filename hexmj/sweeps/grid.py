@@ -150,6 +150,9 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
         sizes: axis -> how many cells lie along it; the last one runs fastest, as `itertools.product` has it.
         data: of all cells.
         concat: options of `xarray.concat`.
+
+    Raises:
+        InputError: sizes that are none, an axis that the data have themselves, or data of another number of cells.
     """
     import xarray as xr
 

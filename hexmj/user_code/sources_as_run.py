@@ -115,7 +115,8 @@ def _note(file: Any, runs: CodeType | None = None) -> None:
 
 
 def _size_and_time(file: str) -> tuple[int, ...]:
-    """What tells whether a file is another one; nothing of one that is not there."""
+    """What tells whether a file is another one; nothing of one that is not there.  When its name or rights changed does
+    not count: installers link the files of one environment into another."""
     with suppress(OSError, ValueError):
         told = os.stat(file)
         return told.st_size, told.st_mtime_ns

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-
 from hexmj.errors import InputError
 
 Kind = Literal["halt", "leg", "push"]
@@ -42,7 +40,7 @@ class Case:
         """Its name: undisturbed, halt, leg, push 20."""
         if self.kind != "push":
             return self.kind
-        return f"push {np.format_float_positional(self.impulse, trim='-')}" if self.impulse else NO_DISTURBANCE
+        return f"push {float(self.impulse)}".removesuffix(".0") if self.impulse else NO_DISTURBANCE
 
 
 def every_case(

@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError, check_distinct
@@ -97,8 +95,8 @@ class Terrain(SameStarts):
         for ground in self.grounds:
             name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
             for size in sizes:
-                obstacle = f"{ground} {np.format_float_positional(size, trim='-')} mm"
-                named[obstacle] = self.conditions.but(ground=ground, **{name: size})
+                told = f"{ground} {float(size)}".removesuffix(".0")
+                named[f"{told} mm"] = self.conditions.but(ground=ground, **{name: size})
         return named
 
     @property
