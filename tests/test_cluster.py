@@ -275,7 +275,9 @@ def test_workers_with_other_code_are_refused(tmp_path: Path) -> None:
     with scheduler(tmp_path) as (address, _), workers(address, tmp_path, {"PYTHONPATH": paths}):
         for folder in (tmp_path / "kept", None):
             with (
-                pytest.raises(InputError, match=r"a worker on \S+ has another hexmj.timing of sources than the sender"),
+                pytest.raises(
+                    InputError, match=r"a worker on \S+ lacks or has another hexmj.timing of sources than the sender"
+                ),
                 workers_of(address) as executor,
             ):
                 flss(LDVS, [0.7], n_starts=10, window="start", folder=folder, executor=executor)

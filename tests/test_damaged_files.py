@@ -289,6 +289,8 @@ def test_a_damaged_state_is_not_replayed(tmp_path):
         path.write_bytes(content)
         with pytest.raises(InputError, match=r"state\.npz is damaged"):
             replay(path)
+    with pytest.raises(InputError, match=r"a\.nc is no state that a simulation left; expected a file of arrays, \.npz"):
+        replay(save_dataset(xr.Dataset(), tmp_path / "a.nc"))
 
 
 def test_names_are_shown_as_they_are(run, tmp_path, monkeypatch):

@@ -178,7 +178,7 @@ def test_a_worker_that_reads_another_file_than_the_sender_is_refused(
     monkeypatch.setattr(cells, "_held", lambda file: really(file) if threading.get_ident() == here else "another")
     with (
         ThreadPoolExecutor(1) as pool,
-        pytest.raises(InputError, match=r"worker has another .*one.gain than the sender"),
+        pytest.raises(InputError, match=r"worker lacks or has another .*one.gain than the sender"),
     ):
         computed('remembered(at + "/gain") + 1.0', executor=pool)
 

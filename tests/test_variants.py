@@ -164,6 +164,14 @@ def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
         conduct(Variants(SETS, **others), folder)
 
 
+def test_the_figure_tells_what_was_counted_as_far_as_it_is_known(result):
+    assert variants_figure(result).get_suptitle().startswith("Kinematic FLSS with")
+    falls = result.assign_attrs(conditions=json.dumps({"vp": 80.0}))
+    assert variants_figure(falls).get_suptitle().startswith("Physical FLSS with")
+    del falls.attrs["conditions"]
+    assert variants_figure(falls).get_suptitle().startswith("FLSS with")
+
+
 def test_the_figure_shows_every_set_and_velocity(result):
     figure = variants_figure(result)
     assert [axes.get_title() for axes in figure.axes] == ["V = 0.5", "V = 0.7"]

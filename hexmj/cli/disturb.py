@@ -16,7 +16,7 @@ from hexmj.measures.captions import starts_in_words
 from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.disturbance.frequencies import MEASURES
-from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks
+from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks, strategies_in_words
 from hexmj.timing import Acceleration
 
 if TYPE_CHECKING:
@@ -96,12 +96,8 @@ class Disturb(StudyCommand):
         if {*result.strategy.values} - {"none"}:
             yield "takes off: how much lower than without a strategy, on the same starts"
         yield f"{self.controlled.controller(self.model).name}; {starts}, the first of {', '.join(found)}"
-        told = {
-            "slow_down": f"slow down to V = {self.initial_velocity:g}, then a = {self.recovery:g}",
-            "grasp": f"grasp {self.adhesion:g}",
-        }
-        if lines := [line for strategy, line in told.items() if strategy in result.strategy.values]:
-            yield "; ".join(lines)
+        if told := strategies_in_words(result):
+            yield told
         walked = (result.velocity * (result.back + result.duration)).max()
         yield self.conditions_line(physical=not self.kinematic, walked=float(walked))
 

@@ -6,6 +6,7 @@
 import io
 import json
 import sys
+import zipfile
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,8 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
     """A written state, the body with its conditions, time step and contacts, and its data in that state."""
     if (content := read_sealed(Path(path))) is None:
         raise InputError(f"{path} is damaged, or no state that a simulation left; expected one of this version")
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise InputError(f"{path} is no state that a simulation left; expected a file of arrays, .npz")
     try:
         with np.load(io.BytesIO(content)) as file:
             saved = dict(file)

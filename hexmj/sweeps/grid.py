@@ -206,7 +206,7 @@ def _made_by_a_worker(
     if its_record != record:
         other = difference(record, its_record)
         raise InputError(
-            f"{cell.name}: {here} has another {other} than the sender; start the worker again, in the same folder"
+            f"{cell.name}: {here} lacks or has another {other} than the sender; start it again, in the same folder"
         )
     if mark and not mark.exists():
         raise InputError(f"{cell.name}: {here} does not see the folder {mark.parent}; expected it to be shared")
@@ -262,7 +262,7 @@ def _by_others(executor: Executor, parcels: Mapping[int, _Parcel], folder: Path 
                     data, read, not_kept = future.result()
                     if other := [file for file in read if remembered(file) and not holds(file, read[file])]:
                         raise InputError(
-                            f"a worker has another {other[0]} than the sender; start it again, where it has the same"
+                            f"a worker lacks or has another {other[0]} than the sender; start it where it has the same"
                         )
                 except BaseException:
                     also_read(set(), FAILED, by_a_cell)

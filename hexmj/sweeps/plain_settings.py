@@ -79,7 +79,7 @@ def plain(value: Any, folders: Sequence[Path] = (), exact: bool = False) -> Any:
         return {PATH: name} if exact else name
     raise InputError(
         f"{short(value)} is no setting; expected a number, text, path of a file, frozen dataclass, named tuple,"
-        " member of an enumeration, or a tuple, dict or array of these; numbers are float64, int64 or bool"
+        " member of an enumeration, or a tuple, array or dict by text of these; numbers are float64, int64 or bool"
     )
 
 

@@ -8,6 +8,7 @@ from hexmj.measures.captions import caption_of_at_least
 from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import frequency_curve, tidy, velocity_ticks
 from hexmj.studies.disturbance.cases import NO_DISTURBANCE
+from hexmj.studies.disturbance.study import strategies_in_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +70,8 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(one[f"{measure}_reached"].min()) for measure in measures)
     figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
-    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption_of_at_least(least, result))
+    told = "; ".join(filter(None, [caption_of_at_least(least, result), strategies_in_words(result)]))
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", told)
     return figure
 
 

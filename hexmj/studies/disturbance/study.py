@@ -15,6 +15,7 @@ from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed
 from hexmj.starts import checked_list
+from hexmj.storage.attributes import settings
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.disturbance.frequencies import with_flss_after
@@ -135,3 +136,14 @@ class DisturbedWalks(SameStarts):
         drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
         own = {"recovery": asdict(self.recovery), "adhesion": self.adhesion, "physical": self.physical}
         return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=GRID, **own)
+
+
+def strategies_in_words(result: "xr.Dataset") -> str:
+    """To which velocity and how fast the strategies of `DisturbedWalks` slow down, and how they grasp, as far as there
+    are such and the result's settings, which joining may drop, tell of them."""
+    told, words = settings(result), []
+    if "slow_down" in result.strategy.values and "recovery" in told:
+        words.append("slow down to V = {start:g}, then a = {rate:g}".format(**told["recovery"]))
+    if "grasp" in result.strategy.values and "adhesion" in told:
+        words.append(f"grasp {told['adhesion']:g}")
+    return "; ".join(words)

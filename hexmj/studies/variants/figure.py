@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 from hexmj.measures.captions import caption, starts_in_words
 from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import tidy
+from hexmj.storage.attributes import settings
 from hexmj.storage.literal import in_figure
 from hexmj.studies.variants.study import notes
 
@@ -44,13 +45,24 @@ def variants_figure(result: "xr.Dataset") -> "Picture":
     for panel in panels[result.sizes["velocity"] :]:
         panel.set_visible(False)
     dots: dict[str, Any] = {"linestyle": "none", "markersize": 6, "color": "0.1"}
-    marks = {"usual": {"marker": "D", "markerfacecolor": "white"}, "mean": {"marker": "|", "markersize": 13}}
+    marks = {
+        "usual": {"marker": "D", "markerfacecolor": "white"},
+        "mean of those shown": {"marker": "|", "markersize": 13},
+    }
     handles = [Line2D([], [], label=name, **dots | mark) for name, mark in (marks | STYLES).items()]
     figure.legend(handles=handles, frameon=False, fontsize=9, loc="outside right center")
     told = f"{starts_in_words(result.attrs['n_starts'])}; {caption(result)}"
-    head(figure, "FLSS with one constant or rule changed at a time", told)
+    head(figure, f"{_measure(result)} with one constant or rule changed at a time", told)
     figure.supxlabel("\n".join(map(in_figure, notes(result))), fontsize=9)
     return figure
+
+
+def _measure(result: "xr.Dataset") -> str:
+    """What was counted, as far as the result's settings, which joining may drop, tell of it."""
+    told = settings(result)
+    if "conditions" not in told:
+        return "FLSS"
+    return "Kinematic FLSS" if told["conditions"] is None else "Physical FLSS"
 
 
 def _panel(axes: "Axes", one: "xr.Dataset") -> None:
