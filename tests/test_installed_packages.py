@@ -9,7 +9,7 @@ import sys
 from hashlib import sha256
 from importlib import metadata
 from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.metadata import packages_distributions
+from importlib.metadata import distributions, packages_distributions
 from pathlib import Path
 
 import numpy as np
@@ -305,3 +305,9 @@ def test_an_installed_helper_of_no_package_counts_by_its_files(tmp_path: Path, n
         file.write_text(text)
         found.append(version_of_my_helper(tmp_path / "mine.py", folder)[0])
     assert found[0] != found[1] and all(one.startswith("unknown@") for one in found)
+
+
+def test_the_name_of_a_distribution_is_read_as_it_is_parsed():
+    found = [*distributions()]
+    assert len(found) > 50
+    assert [packages._name(one) for one in found] == [one.name for one in found]

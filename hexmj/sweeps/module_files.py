@@ -1,5 +1,6 @@
 """Where the sources of modules lie, found without running them."""
 
+import os
 import sys
 import sysconfig
 from importlib.machinery import all_suffixes
@@ -9,16 +10,14 @@ from pathlib import Path
 from hexmj.user_code.sources_as_run import is_installed
 
 _STANDARD = sysconfig.get_path("stdlib")
-_FILES: dict[str, Path] = {}
+_FILES: dict[str, Path | None] = {}
 
 
 def file_of(module: str) -> Path | None:
     """The file of a module, found without running anything; None of what has none yet or is Python's own."""
     if module not in _FILES and (file := _found(module)):
-        _FILES[module] = file
-    file = _FILES.get(module)
-    of_python = file and file.is_relative_to(_STANDARD) and not is_installed(file)
-    return None if of_python else file
+        _FILES[module] = None if file.is_relative_to(_STANDARD) and not is_installed(file) else file
+    return _FILES.get(module)
 
 
 def _found(module: str) -> Path | None:
@@ -29,10 +28,11 @@ def _found(module: str) -> Path | None:
     if spec is None or not inner:
         return Path(spec.origin) if spec and spec.has_location and spec.origin else None
     for folder in spec.submodule_search_locations or ():
-        stem = Path(folder, *inner)
-        for file in (*(stem.with_name(stem.name + ending) for ending in all_suffixes()), stem / "__init__.py"):
-            if file.is_file():
-                return file
+        if os.path.isdir(os.path.join(folder, *inner[:-1])):  # most names that are asked for are in no package
+            stem = os.path.join(folder, *inner)
+            for file in (*(stem + ending for ending in all_suffixes()), os.path.join(stem, "__init__.py")):
+                if os.path.isfile(file):
+                    return Path(file)
     return None
 
 

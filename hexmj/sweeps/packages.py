@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -98,7 +99,13 @@ def _requirements(distribution: Distribution) -> Iterator[Requirement]:
 
 
 def _is_required(distribution: Distribution) -> bool:
-    return canonicalize_name(str(distribution.name)) in _required()  # none where its metadata are not there
+    return canonicalize_name(_name(distribution)) in _required()  # none where its metadata are not there
+
+
+def _name(distribution: Distribution) -> str:
+    """Its `name`, for which all of its description would be parsed, twenty times as long."""
+    found = re.search(r"^Name: *(\S+) *$", distribution.read_text("METADATA") or "", re.MULTILINE)
+    return found[1] if found else str(distribution.name)
 
 
 def _files(distribution: Distribution) -> str:

@@ -197,7 +197,10 @@ class Symmetric:
             "p34": (self.p34_i, 0.0),
             "p4": (self.p4_i, 0.0),
         }
-        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in _in_vector(58)})
+        matrices = {kind: np.zeros((6, 6)) for kind in sides}
+        for kind, (d, e) in _in_vector(58):
+            matrices[kind][d, e] = sides[kind][abs(d - e) == 3]
+        return Weights(**matrices)
 
 
 AnyWeights = Symmetric | Weights
