@@ -58,7 +58,7 @@ def drawn(_):
         return True
 
 with ThreadPoolExecutor(4) as pool:
-    assert all(pool.map(drawn, range(24)))
+    assert all(pool.map(drawn, range(12)))
 assert mujoco.rendering.classic.gl_context.GLContext is usual
 """
 )

@@ -39,7 +39,7 @@ OWN = {
 STRIDE = hexmj.Stride()
 
 
-@pytest.fixture(scope="module", params=OWN)
+@pytest.fixture(scope="module", params=few_of(OWN, "feeler"))
 def own(request):
     """A controller from a file outside the package."""
     return hexmj.load_controller(OWN[request.param])

@@ -10,6 +10,7 @@ from hexmj.controllers.checked_plans import advanced, said
 from hexmj.controllers.protocol import SteerablePlan, is_steerable
 from hexmj.controllers.trial import Trial, every_other, mixed, same
 from hexmj.errors import InputError
+from hexmj.legs import LEGS
 from hexmj.timing import AT_SPEED, commanded_velocities
 from hexmj.walks import PlannedWalk, of_starts
 
@@ -109,4 +110,5 @@ def _is_where(plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray, when:
             raise InputError(f"{name} has the shape {shape} {when}; expected {expected.shape}")
         if (bad := np.argwhere((found := np.asarray(getattr(plan, name))) != expected)).size:
             at = tuple(bad[0])
-            raise InputError(f"{name} of start {at[0]}, leg {at[1]} is {found[at]!s} {when}; expected {expected[at]!s}")
+            leg = LEGS[at[1]]
+            raise InputError(f"{name} of start {at[0]}, leg {leg} is {found[at]!s} {when}; expected {expected[at]!s}")

@@ -17,12 +17,12 @@ from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import check_draw, draw_starts
-from hexmj.storage.attributes import attributes
+from hexmj.storage.attributes import attributes, settings
 from hexmj.storage.mjcf import content
 from hexmj.sweeps import Cell, over_axes
 from hexmj.sweeps.plain_settings import plain
 from hexmj.timing import Acceleration, Stride
-from hexmj.variants import instead, naming, variants, varied
+from hexmj.variants import UNREACHED, instead, naming, variants, varied
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,8 +145,9 @@ class Variants:
 
 
 def notes(result: "xr.Dataset") -> list[str]:
-    """Sentences on the rows of a result whose name says what a set has anyway."""
-    told = []
+    """Sentences on variants that are left out, and on the rows of a result whose name says what a set has anyway."""
+    walked = settings(result).get("conditions") is not None
+    told = [f"without {', '.join(sorted(UNREACHED))}: legs of the stick insect do not reach it"] if walked else []
     for variant in result.variant.values:
         row = result.instead.sel(variant=variant)
         for default in sorted({*row.values.ravel().tolist()} - {""}):
