@@ -9,6 +9,7 @@ import pytest
 
 from drawing import drawing
 from hexmj.rendering import gl
+from tiers import few_of
 
 KEPT = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
 
@@ -93,7 +94,7 @@ def test_a_child_that_was_forked_after_something_was_drawn_draws_nothing():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("draws", [FRAME, ENVIRONMENT], ids=["frame", "dm_env"])
+@pytest.mark.parametrize("draws", few_of([FRAME, ENVIRONMENT], FRAME), ids=["frame", "dm_env"])
 @drawing
 def test_triton_is_there_before_a_context(draws, tmp_path):
     """Imported later it would end the process."""

@@ -344,7 +344,8 @@ def test_a_name_that_would_not_come_back_is_refused(old: str, tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("form", few_of(["svg", "png", "pdf"], "svg"))
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
-    words = ["compare", "--starts", "2", "--window", "10", "--no-video", "--format", form, "--out", str(tmp_path)]
+    words = ["compare", "--velocities", "0.5", "--starts", "2", "--window", "10", "--no-video", "--format", form]
+    words += ["--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)
     drawn = tmp_path / f"comparison.{form}"
     assert drawn.read_bytes()[:5] == {"png": b"\x89PNG\r", "pdf": b"%PDF-", "svg": b"<?xml"}[form]
