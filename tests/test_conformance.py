@@ -47,7 +47,13 @@ def test_who_refuses_some_walks_is_held_to_the_laws_in_the_others():
     for velocities in ([0.3, 0.4], [0.05, 0.02], [0.0, 0.1]):
         check_controller(COARSE, stride, velocities)
     many = [n / 40 for n in range(17)]
-    for velocities, said in (([], "a list"), ([1.0], "V < 1"), ([0.4], "2 to 16"), (many, "2 to 16")):
+    for velocities, said in (
+        ([], "a list"),
+        ([1.0], "V < 1"),
+        ([0.4], "2 to 16"),
+        (many, "2 to 16"),
+        ([0.5, 0.9999], "V and a step"),
+    ):
         with pytest.raises(InputError, match=said):
             check_controller(COARSE, stride, velocities)
 

@@ -22,7 +22,7 @@ from hexmj.controllers.trial import DIVIDED, N_STARTS, STEPS, Trial, same
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_list, draw_starts
-from hexmj.timing import Acceleration, Stride, commanded_velocities
+from hexmj.timing import Acceleration, Stride, check_reached, commanded_velocities
 from hexmj.walks import PLANNED, joined, of_starts
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
@@ -87,6 +87,7 @@ def findings(
     if not 2 <= len(asked[0]) <= N_STARTS:
         told = f"velocities = {short(asked[0].tolist())}; expected 2 to {N_STARTS} of them"
         raise InputError(f"{told}, so that walks accelerate between them")
+    check_reached(*asked, ACCELERATION)
     trials = [*_trials(controller, *asked)]  # pyright: ignore[reportArgumentType]
     for name, (law, looked_at) in LAWS.items():
         wrong = next(filter(None, (_wrong(law, trial) for trial in trials)), None)
