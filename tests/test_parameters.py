@@ -137,7 +137,7 @@ def test_names_of_controllers(tmp_path):
 def test_weights_off_the_neighbour_sets():
     p1 = np.zeros((6, 6))
     p1[0, 5] = 1.0
-    with pytest.raises(InputError, match="p1 of leg 1 from leg 6"):
+    with pytest.raises(InputError, match="p1 of leg L1 from leg R3"):
         Weights(p1, *(np.zeros((6, 6)) for _ in range(6)))
     with pytest.raises(InputError, match=r"p1 has shape \(5, 6\); expected \(6, 6\)"):
         Weights(np.zeros((5, 6)), *(np.zeros((6, 6)) for _ in range(6)))

@@ -15,7 +15,7 @@ import numpy as np
 from hexmj.checks import check_types, numbers, short, typed, whole
 from hexmj.errors import InputError
 from hexmj.labels import check_labels
-from hexmj.legs import N1, N2, N3, N4, check_order
+from hexmj.legs import LEGS, N1, N2, N3, N4, check_order
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
@@ -75,7 +75,7 @@ class Weights:
             allowed = np.zeros((6, 6), dtype=bool)
             allowed[tuple(np.transpose(pairs(kind)))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
-                d, e = stray[0] + 1
+                d, e = (LEGS[leg] for leg in stray[0])
                 raise InputError(f"{kind} of leg {d} from leg {e} is not 0, but leg {e} is no neighbour there")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
                 raise InputError(f"{kind} is binary in the paper: expected only 0 or 1")
