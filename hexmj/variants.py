@@ -31,7 +31,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Name -> which fields of a `Stride` [mm, time units], a network or its reading it changes, to what; see `varied`."""
 
 UNREACHED = {"AEP0 11"}
-"""Variants that the legs of the stick insect do not reach."""
+"""Variants that legs of the stick insect do not reach on their usual lines, left out of all physical walks."""
 
 INNER = ("controller", "reading")
 """Fields that are varied within: what reads the legs, and how the paper is read."""

@@ -168,7 +168,10 @@ def test_the_figure_tells_what_was_counted_as_far_as_it_is_known(result):
     assert variants_figure(result).get_suptitle().startswith("Kinematic FLSS with")
     falls = result.assign_attrs(conditions=json.dumps({"vp": 80.0}))
     assert variants_figure(falls).get_suptitle().startswith("Physical FLSS with")
-    assert "without AEP0 11: legs of the stick insect do not reach it" in variants_figure(falls).get_supxlabel()
+    assert (
+        "without AEP0 11, which the stick insect's legs do not reach on their usual lines"
+        in variants_figure(falls).get_supxlabel()
+    )
     del falls.attrs["conditions"]
     assert variants_figure(falls).get_suptitle().startswith("FLSS with")
 
@@ -187,7 +190,7 @@ def test_the_insect_walks_the_variants_that_its_legs_reach():
     few: dict[str, Any] = {"velocities": (0.7,), "n_starts": 2, "window": 20.0}
     walked = conduct(Variants({"ldvs": (LDVS,)}, conditions=Conditions.of(vp=200.0), **few))
     assert walked.variant.values.tolist() == variants(physical=True)
-    assert notes(walked)[0] == "without AEP0 11: legs of the stick insect do not reach it"
+    assert notes(walked)[0] == "without AEP0 11, which the stick insect's legs do not reach on their usual lines"
     alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, window=20.0, conditions=Conditions.of(vp=200.0))
     assert walked.flss.sel(variant="usual").item() == alone.flss.item()
 

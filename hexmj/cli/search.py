@@ -51,7 +51,7 @@ class Search(WalkingCommand):
     """Minimise falls of the insect in MuJoCo instead of losses of the planned polygon."""
     over: Literal["usual", "mean", "worst"] = "usual"
     """Minimise the FLSS as given (usual), or its mean or worst over variants of constants and rules that the paper does
-    not print (`hexmj variants`); what is so anyway is as usually instead."""
+    not print (`hexmj variants`; in physics without AEP0 11); what is so anyway is as usually instead."""
     ties: Literal["equal", "later"] = "equal"
     """Of candidates that lose equally many starts none is better (equal), or that which loses them later."""
     algorithm: Literal["evolution", "cmaes"] = "evolution"

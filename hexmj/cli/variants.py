@@ -37,7 +37,7 @@ class Variants(StudyCommand):
     velocities: Sequence[float] = study.Variants.velocities
     """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
     physical: bool = False
-    """Count falls of the insect in MuJoCo instead of losses of the planned polygon."""
+    """Count falls of the insect in MuJoCo instead of losses of the planned polygon, without the variant AEP0 11."""
     starts: int | None = None
     """Number of random starts, the same for every set, variant and velocity; 2000 unless given, 50 if physical."""
     out: Path = Path("results/variants")

@@ -47,7 +47,7 @@ class Variants:
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11."""
     conditions: Conditions | None = None
-    """Of physical walks, whose falls are counted; without it losses on paper are."""
+    """Of physical walks, whose falls are counted, without the variants of `UNREACHED`; None counts losses on paper."""
 
     def __post_init__(self) -> None:
         check_types(self)
@@ -147,7 +147,10 @@ class Variants:
 def notes(result: "xr.Dataset") -> list[str]:
     """Sentences on variants that are left out, and on the rows of a result whose name says what a set has anyway."""
     walked = settings(result).get("conditions") is not None
-    told = [f"without {', '.join(sorted(UNREACHED))}: legs of the stick insect do not reach it"] if walked else []
+    left_out = (
+        f"without {', '.join(sorted(UNREACHED))}, which the stick insect's legs do not reach on their usual lines"
+    )
+    told = [left_out] if walked else []
     for variant in result.variant.values:
         row = result.instead.sel(variant=variant)
         for default in sorted({*row.values.ravel().tolist()} - {""}):
