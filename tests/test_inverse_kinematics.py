@@ -40,7 +40,7 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return any_hexapod(tmp_path_factory.mktemp("body"), *request.param)
 
 
-def step_range(count: int = 61) -> np.ndarray:
+def step_range(count: int = 41) -> np.ndarray:
     """All tips that a walk may ask for, (x * z, leg, axis) [mm]: standing heights 8 to 14, lifts of 12, a sag of 1."""
     x, z = (grid.ravel()[:, None] for grid in np.meshgrid(np.linspace(-20.2, 10.2, count), np.linspace(-14, 5, count)))
     return ORIGIN + np.stack(np.broadcast_arrays(x, 0.0, z + np.zeros(6)), axis=-1)
@@ -63,8 +63,8 @@ def test_it_is_the_closed_form_over_the_whole_step_range(closed: ThreeHinges, nu
 def test_it_reaches_what_the_closed_form_reaches(closed: ThreeHinges, numeric: HingeChains):
     """And besides only tips beyond the thorax-coxa axis, which belong to another protraction in the closed form."""
     rng = np.random.default_rng(1998)
-    around = ORIGIN + rng.uniform([-25, -10, -15], [15, 10, 10], (10_000, 6, 3))
-    within = closed.forward(random_joints(numeric, 10_000))
+    around = ORIGIN + rng.uniform([-25, -10, -15], [15, 10, 10], (6_000, 6, 3))
+    within = closed.forward(random_joints(numeric, 6_000))
     for tips in (around, within):
         wanted, reachable = closed.inverse(tips)
         found, reached = numeric.inverse(tips)

@@ -21,10 +21,8 @@ from hexmj.environments.learned import FELT, MOST, TILT, TIPS, VELOCITY, OffsetP
 from hexmj.errors import InputError
 from hexmj.user_code.loaded import importable
 from hexmj.view.live import LiveWalk
-from tiers import few_of
 
 ROOT = Path(__file__).parents[1]
-CMA = "train_cma", "REFLEXES"
 
 
 @pytest.fixture
@@ -141,8 +139,8 @@ def test_it_obeys_the_laws_of_controllers(example):
     check_controller(some_reflexes(example("train_cma")))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "learned"), few_of([CMA, ("train_ppo", "RIGHTING")], CMA))
+@pytest.mark.thorough
+@pytest.mark.parametrize(("name", "learned"), [("train_cma", "REFLEXES"), ("train_ppo", "RIGHTING")])
 def test_what_was_learned_obeys_them_too(example, name, learned):
     check_controller(vars(example(name))[learned])
 

@@ -9,7 +9,7 @@ from tests.soak.walks import tried
 
 pytestmark = pytest.mark.slow
 
-INPUTS = 40
+INPUTS = 30
 
 
 @pytest.mark.parametrize("kind", KINDS)
