@@ -50,7 +50,7 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     size=st.sampled_from([1, 2, LANES - 1, LANES, LANES + 3]),
