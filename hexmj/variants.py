@@ -40,7 +40,7 @@ Part = TypeVar("Part")
 
 
 def variants(physical: bool = False) -> list[str]:
-    """The names of `VARIANTS`, or of those that the insect can walk."""
+    """The names of `VARIANTS`, or of those that are walked in physics, without `UNREACHED`."""
     return [name for name in VARIANTS if not (physical and name in UNREACHED)]
 
 

@@ -18,7 +18,8 @@ class CheckController:
     name: Positional[ControllerName]
     velocities: Sequence[float] = VELOCITIES
     """V_r at which it is asked for plans, two or more, each 0 <= V < 1; those at which it can plan. It is asked to
-    accelerate to them from 0.1, too, or from the least of them where all are above that, or none is."""
+    accelerate to them from 0.1, too, or from the least of them where all are above that, or none is; V and a step of
+    that acceleration, 0.005 dt, are below 1 together."""
     dt: float = Stride.dt
     """Time step of the plans, of which 600 are looked at [time units]."""
     json: bool = False

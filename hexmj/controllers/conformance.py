@@ -60,7 +60,8 @@ def check_controller(
     """Hold a controller to the laws of its protocol; takes a second or a few.
 
     It has to plan with the stride, and at each of the velocities V_r, 0 <= V < 1, fractions of V_p, and to accelerate
-    to them from 0.1, or from the least of them where all are above that, or none is.
+    to them from 0.1, or from the least of them where all are above that, or none is; V and a step of that acceleration,
+    0.005 dt, are below 1 together.
 
     Raises:
         InputError: no controller, or velocities that make no sense.

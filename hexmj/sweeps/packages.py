@@ -103,7 +103,7 @@ def _is_required(distribution: Distribution) -> bool:
 
 
 def _name(distribution: Distribution) -> str:
-    """Its `name`, for which all of its description would be parsed, twenty times as long."""
+    """Its `name`, for which all of its description would be parsed, a dozen times as long."""
     found = re.search(r"^Name: *(\S+) *$", distribution.read_text("METADATA") or "", re.MULTILINE)
     return found[1] if found else str(distribution.name)
 

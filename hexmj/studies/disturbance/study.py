@@ -139,8 +139,13 @@ class DisturbedWalks(SameStarts):
 
 
 def strategies_in_words(result: "xr.Dataset") -> str:
-    """To which velocity and how fast the strategies of `DisturbedWalks` slow down, and how they grasp, as far as there
-    are such and the result's settings, which joining may drop, tell of them."""
+    """How the strategies of `DisturbedWalks` slow down, to V_r as a fraction of V_p and then with an acceleration per
+    time unit, and grasp, in multiples of the insect's weight; as far as there are such, and the result's settings,
+    which joining may drop, tell of them.
+
+    Raises:
+        InputError: it is no dataset.
+    """
     told, words = settings(result), []
     if "slow_down" in result.strategy.values and "recovery" in told:
         words.append("slow down to V = {start:g}, then a = {rate:g}".format(**told["recovery"]))

@@ -146,11 +146,10 @@ class Variants:
 
 def notes(result: "xr.Dataset") -> list[str]:
     """Sentences on variants that are left out, and on the rows of a result whose name says what a set has anyway."""
-    walked = settings(result).get("conditions") is not None
-    left_out = (
-        f"without {', '.join(sorted(UNREACHED))}, which the stick insect's legs do not reach on their usual lines"
-    )
-    told = [left_out] if walked else []
+    told = []
+    if settings(result).get("conditions") is not None:
+        names = ", ".join(sorted(UNREACHED))
+        told.append(f"without {names}, which the stick insect's legs do not reach on their usual lines")
     for variant in result.variant.values:
         row = result.instead.sel(variant=variant)
         for default in sorted({*row.values.ravel().tolist()} - {""}):
