@@ -43,6 +43,7 @@ def test_a_cell_refuses_what_no_name_can_tell() -> None:
         Cell("a", lambda: xr.Dataset(), {}).record()
 
 
+@pytest.mark.slow
 def test_what_was_typed_in_cannot_be_kept(tmp_path: Path) -> None:
     typed = "import xarray; from hexmj.sweeps import *; from pathlib import Path\n"
     typed += "def f(): return xarray.Dataset()\nrun([Cell('a', f, {})]); run([Cell('a', f, {})], Path('kept'))"

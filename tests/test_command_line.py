@@ -47,6 +47,7 @@ def test_version_is_one_line(run):
     assert hexmj.__version__ == version("hexmj")
 
 
+@pytest.mark.slow
 def test_standard_output_is_one_json_object_and_nothing_else(tmp_path):
     words = ["flss", "--velocities", "0.1", "0.5", "--starts", "500", "--window", "start", "--json"]
     done = subprocess.run([sys.executable, "-m", "hexmj", *words], capture_output=True, text=True, check=True)
@@ -165,6 +166,7 @@ def test_the_last_line_tells_so_of_who_stands(run, tmp_path):
     assert "; nobody gets to what lies ahead: 0 mm are walked at most" in " ".join(out.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("at", "told"), [(50, False), (1000, True)])
 def test_the_last_line_tells_so_of_disturbed_walks(run, tmp_path, at, told):
     """They end some time after the disturbance, which comes when it comes."""

@@ -9,6 +9,7 @@ import pytest
 from hexmj.cli.commands import COMMANDS
 
 
+@pytest.mark.slow
 def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
     code, script, _ = run("--completion", "bash")
     assert code == 0

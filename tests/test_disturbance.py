@@ -58,6 +58,7 @@ def same(one, other):
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("velocity", "x", "stance"))
 
 
+@pytest.mark.slow
 def test_the_leg_that_is_stopped_is_one_that_protracts_as_the_legs_are_told():
     """Where none does, the next one that does."""
     stopped = Disturbance("leg", np.array([4, 4, 4]), np.array([1, 4, 5]))

@@ -201,6 +201,7 @@ def test_any_weights_can_be_disturbed():
     assert "V_p" in caption(result.assign_attrs(physical=1))
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_object_and_refuses_with_exit_code_2(tmp_path, run):
     words = ["disturb", "--kinematic", "--velocities", 0.5, "--starts", 20, "--out", tmp_path / "out"]
     code, text, _ = run(*words, "--strategies", "slow_down", "--json")

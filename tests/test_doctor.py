@@ -132,6 +132,7 @@ def test_what_was_left_out_is_no_failure(run, monkeypatch):
     assert out.startswith("note   films: ") and out.endswith('pip install ".[film]"\n')
 
 
+@pytest.mark.slow
 @drawing
 def test_what_can_be_kept_nowhere_hides_no_other_check():
     """As where numba finds no folder that it may write to."""

@@ -131,6 +131,7 @@ def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duratio
     return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), push=pushed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("push", few_of([40.0, 80.0], 80.0))
 def test_an_insect_tipped_over_by_a_push_fell(push: float):
     found = outcomes(Conditions(), 0.5, push, duration=120.0)
@@ -138,6 +139,7 @@ def test_an_insect_tipped_over_by_a_push_fell(push: float):
     assert (found.tilt > pi / 2).any()
 
 
+@pytest.mark.slow
 def test_an_insect_that_tumbles_down_fell():
     """Into a gap; some land on their backs."""
     found = outcomes(Conditions.of(ground="gap", standing_height=12.0, ground_at=45.0), 0.7, duration=150.0)

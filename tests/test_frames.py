@@ -27,6 +27,7 @@ def test_frames_that_nobody_closes_are_freed_when_they_are_dropped():
     assert renderer() is None
 
 
+@pytest.mark.slow
 @drawing
 def test_who_goes_takes_nothing_with_it_that_others_draw_with():
     one, other, third = (gymnasium.make("hexmj/StickInsect-v0", render_mode="rgb_array") for _ in range(3))

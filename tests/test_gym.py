@@ -56,6 +56,7 @@ def test_it_passes_gymnasiums_checks(name):
     check_mujoco_reset_state(made(name))
 
 
+@pytest.mark.slow
 @drawing
 def test_it_is_rendered():
     check_env(made("hexmj/StickInsectTips-v0"))

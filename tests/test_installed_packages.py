@@ -42,6 +42,7 @@ def install(folder: Path, name: str, version: str, files: dict[str, str], more: 
     (told / "RECORD").write_text("".join(rows))
 
 
+@pytest.mark.slow
 def test_what_is_installed_while_a_program_runs_is_found(tmp_path, monkeypatch) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     install(tmp_path, "first_one", "1.0", {"first_module.py": ""})
@@ -147,6 +148,7 @@ def test_an_installed_helper_that_requires_this_package_may_use_all_of_it(
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_what_an_installed_helper_requires_and_is_installed_to_be_edited_counts_by_its_sources(tmp_path: Path) -> None:
     """But not by what is installed within its folder."""
     (source := tmp_path / "my project").mkdir()

@@ -64,6 +64,7 @@ def test_helpers_that_stand_below_count_too(tmp_path):
     assert ran(tmp_path) == [6.0]
 
 
+@pytest.mark.slow
 def test_a_function_may_call_itself(tmp_path):
     text = "from hexmj.jitted import jitted\n@jitted\ndef outer(n):\n    return 1 if n < 2 else n * outer(n - 1)\n"
     (tmp_path / "outer.py").write_text(text + "print(outer(5))\n")
@@ -91,6 +92,7 @@ DAMAGED = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damaged", few_of(DAMAGED, DAMAGED[0]))
 def test_code_that_is_another_or_damaged_is_compiled_anew(tmp_path, damaged):
     """An index is renewed before its code: where the disk is full then, it names the code from before the edit."""
@@ -107,6 +109,7 @@ def test_code_that_is_another_or_damaged_is_compiled_anew(tmp_path, damaged):
     assert ran(tmp_path) == [56.0, 1.0]
 
 
+@pytest.mark.slow
 def test_code_of_other_types_is_compiled_anew(tmp_path):
     """As two processes leave it that compile for other types at once."""
     text = "import numpy as np\nfrom hexmj.jitted import jitted\n@jitted\ndef outer(x):\n    return x + 1.0\n"

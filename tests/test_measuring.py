@@ -51,6 +51,7 @@ def test_a_gap_of_whole_physics_steps_lasts_for_all_of_them(conditions, substeps
     assert standing[0, :, 0].sum() == 1 + substeps
 
 
+@pytest.mark.slow
 def test_adhesion_is_no_load_where_a_foot_touches():
     """Below 0 where it holds a foot that pulls, and the foot stands; above the ground it holds nothing."""
     settled = settle(draw_starts(1, 0), Conditions.of(grasp=1.0))

@@ -97,6 +97,7 @@ def test_the_guide_is_enough(tmp_path):
     subprocess.run([sys.executable, "-m", "pytest", "-q", "test_mine.py"], cwd=tmp_path, check=True)
 
 
+@pytest.mark.slow
 def test_oscillators_reach_the_tripod():
     found = limit_gait(hexmj.load_controller(OWN["tripod"]), 0.5, n_starts=20, stride=STRIDE, periods=CYCLES + 10)
     assert found.periodic.all()

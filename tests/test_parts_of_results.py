@@ -121,6 +121,7 @@ def test_ranks_over_all_velocities_are_not_drawn_of_a_part_of_them():
             hexmj.plot(made("league").isel(velocity=[1]), which)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "sentence"),
     [
@@ -137,6 +138,7 @@ def test_tables_of_a_part_of_a_league_are_refused_in_a_sentence(part: Callable, 
         league_markdown(part(made("league")))
 
 
+@pytest.mark.slow
 def test_the_table_of_insects_of_too_small_a_part_is_refused_in_a_sentence():
     with pytest.raises(InputError, match=r"^the table of insects cannot be made of this part of a result, "):
         biology_markdown(made("biology").isel(row=0))

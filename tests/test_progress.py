@@ -109,6 +109,7 @@ def test_a_terminal_is_told_of_compiling_while_nothing_is_done(monkeypatch):
     assert progress.FIRST in screen.text
 
 
+@pytest.mark.slow
 def test_a_command_without_a_terminal_prints_lines_on_standard_error():
     words = ["flss", "--starts", "2000", "--velocities", "0.5", "--json"]
     program = f"""

@@ -188,6 +188,7 @@ def test_a_controller_that_another_one_loads_by_name_is_noticed(tmp_path: Path) 
     assert (gain, kept) == (2.0, 0) and "other.py, of which" in complaint
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", few_of(["leg.xml", "models/leg.xml"], "leg.xml"))
 def test_an_mjcf_counts_that_a_text_names_with_what_it_includes(tmp_path: Path, where: str) -> None:
     """MuJoCo opens it where nobody hears it."""

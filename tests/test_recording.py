@@ -178,6 +178,7 @@ def test_a_leg_of_a_puppet_that_is_out_of_reach_keeps_its_angles():
         record_plan(walk(np.full((1, 6), -40.0), LDVS, 0.4, 1.0, stride=far), Conditions(), far)
 
 
+@pytest.mark.slow
 def test_files_that_are_no_recordings(walked, tmp_path):
     recording = record(walked)
     damaged = "is damaged, or was not written by hexmj.save_recording"

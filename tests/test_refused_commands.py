@@ -171,6 +171,7 @@ def test_bad_input_makes_no_folder(run, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_filmed_makes_no_folder(run, tmp_path):
     walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 1.0)
     hexmj.save_recording(hexmj.record(walked).assign_attrs(body="beetle"), tmp_path / "beetle.nc")

@@ -78,6 +78,7 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
         in_physics.unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
 
 
+@pytest.mark.slow
 def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
     one = League({"far": Entrant(Stretched())}, (0.5,), 6, 6, 1, window=10.0, accelerating=False, periods=12, seed=0)
     result = one.result([cell.compute(threads=1) for cell in one.cells()])

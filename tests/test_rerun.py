@@ -260,6 +260,7 @@ def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_pa
     assert run("rerun", "out")[0] == 0
 
 
+@pytest.mark.slow
 def test_a_file_that_was_edited_while_the_command_ran_counts_as_it_ran(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     edits = "from pathlib import Path\nPath('mine.py').write_text('')\n"

@@ -29,6 +29,7 @@ def test_two_tripods_move_in_anti_phase(velocity: float) -> None:
     assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", few_of([0.3, 0.7], 0.7))
 def test_a_single_oscillator_goes_round_in_the_time_of_a_stance_and_a_swing(velocity: float) -> None:
     stride, alone = Stride(dt=0.05), Righetti(coupling=0.0, push=0.0, near=0.0, sharpness=200.0)

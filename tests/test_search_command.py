@@ -31,6 +31,7 @@ def found_on(path: Path) -> dict[str, list[int]]:
     return searched_on(str(path), hexmj.load_controller(str(path)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
 def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, tmp_path, algorithm):
     words = [*SEARCH, "--algorithm", algorithm, "--out", tmp_path]
@@ -280,6 +281,7 @@ def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run
     assert found == replace(first, name="found")
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
     first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"

@@ -176,6 +176,7 @@ class Missing:
         Path("two/late").write_text("5.0")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_import", [False, True])
 @pytest.mark.usefixtures("computed")
 def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.MonkeyPatch, at_import: bool) -> None:

@@ -113,6 +113,7 @@ def test_feet_never_sink_in(name, monkeypatch):
     assert outcomes(settled, controller=controller).depth.max() > allowed(settled), "this test would notice nothing"
 
 
+@pytest.mark.slow
 def test_feet_never_sink_in_when_the_insect_is_pushed_off_them(monkeypatch):
     settled = settle(draw_starts(16, 4))
     assert (outcomes(settled, PUSH).depth <= allowed(settled)).all()

@@ -59,6 +59,7 @@ def test_at_rest_the_feet_press_below_the_centre_of_mass(resting):
     assert_allclose(walk_margin(grounded(resting)), walk_margin(resting.planned), atol=0.5)
 
 
+@pytest.mark.slow
 def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_they_grasp():
     """Adhesion pulls feet and ground together, and carries nothing."""
     starts, weight = draw_starts(6, 0), STICK_INSECT.mass * 9810.0

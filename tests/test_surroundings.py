@@ -82,6 +82,7 @@ def test_numbers_for_libraries_that_are_none(name: str, number: str):
     assert f"{name} = {number[:80]}; expected a whole number" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
     words = "render", "--window", "1", "--out", str(tmp_path / "film")
     done = done_with(words, PYGLFW_LIBRARY="/nonexistent", MUJOCO_GL="")

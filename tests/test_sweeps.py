@@ -37,6 +37,7 @@ def spawned() -> Iterator[Executor]:
         yield pool
 
 
+@pytest.mark.slow
 def test_the_bits_are_the_same_here_in_threads_in_processes_and_again(tmp_path: Path, spawned: Executor) -> None:
     direct = [odd_bits(seed) for seed in range(6)]
     cells = odd_cells()

@@ -43,6 +43,7 @@ def result(folder):
     return conduct(Variants(SETS, **SMALL), folder)
 
 
+@pytest.mark.slow
 def test_a_figure_tells_of_the_stride_what_is_not_usual(result):
     assert "lines of the tips" not in variants_figure(result).get_suptitle()
     other = conduct(Variants(SETS, **SMALL, stride=Stride(geometry=CENTRED, aep0=9.5)))
