@@ -101,6 +101,7 @@ run([Cell("late", late_cells.cell, {})], Path("kept"))
 """
 
 
+@pytest.mark.slow
 def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: Path) -> None:
     (tmp_path / "helper.py").write_text("GAIN = 1.0")
     (tmp_path / "late_cells.py").write_text(
@@ -122,6 +123,7 @@ run([Cell("late", late_cells.cell, {})], Path("kept"))
 """
 
 
+@pytest.mark.slow
 def test_a_module_that_is_found_only_as_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
     """No name that was made before can tell what it holds."""
     (tmp_path / "lib").mkdir()

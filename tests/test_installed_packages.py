@@ -208,6 +208,7 @@ print(float(run([Cell("gain", gain, {})], Path("kept"))[0].gain))
 """
 
 
+@pytest.mark.slow
 def test_data_that_it_reads_count(tmp_path: Path) -> None:
     (script := tmp_path / "site-packages" / "walker" / "go.py").parent.mkdir(parents=True)
     script.write_text(AS_A_SCRIPT)

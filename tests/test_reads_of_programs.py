@@ -143,6 +143,7 @@ def test_an_mjcf_that_changes_meanwhile_is_no_data_of_the_cell(tmp_path: Path) -
     assert (gain, kept) == (2.0, 0) and "leg.xml has changed since it was opened first" in complaint
 
 
+@pytest.mark.slow
 def test_a_module_that_is_found_by_a_computed_name_is_noticed(tmp_path: Path) -> None:
     mine = f"{NEW}import importlib\nGAIN = importlib.import_module('gaits.' + 'wave').GAIN\n{GAIN}"
     gain, kept, complaint = sweep(tmp_path, mine=mine, script=SCRIPT, gaits__wave="GAIN = 2.0")
@@ -179,6 +180,7 @@ def test_a_controller_that_a_script_loads_is_no_reason_to_refuse_its_own(tmp_pat
     assert sweep(tmp_path, script=pools + script, other=OTHER) == (2.0, 1, "")
 
 
+@pytest.mark.slow
 def test_a_controller_that_another_one_loads_by_name_is_noticed(tmp_path: Path) -> None:
     mine = f"{NEW}import hexmj\ndef cell():\n    gain = hexmj.load_controller('other.py:Other').gain\n"
     script = f"import hexmj\n{NEW}from mine import cell\nhexmj.load_controller('other.py:Other')\n{SWEEPS}"

@@ -51,6 +51,7 @@ def test_the_bits_are_the_same_here_in_threads_in_processes_and_again(tmp_path: 
     assert contents(tmp_path / "here") == contents(tmp_path / "threads") == contents(tmp_path / "processes")
 
 
+@pytest.mark.slow
 def test_a_users_object_travels_to_a_process_of_its_own(tmp_path: Path, spawned: Executor) -> None:
     (tmp_path / "mine.py").write_text(MINE)
     tripod = importable(tmp_path / "mine.py").Tripod(2.0)
