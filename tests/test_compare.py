@@ -1,5 +1,6 @@
 """The comparison as a sweep: it goes on where it was stopped, and its bits do not depend on who computes them."""
 
+import errno
 import json
 import os
 import subprocess
@@ -153,6 +154,19 @@ def test_a_name_that_the_results_need_is_refused(run, tmp_path, monkeypatch):
     assert code == 2 and "a controller has the name 'report'" in error
     code, _, error = run("compare", "--processes", 0, "--out", tmp_path / "out")
     assert code == 2 and "--processes = 0; expected at least 1" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_processes_for_which_the_system_has_nothing_left_are_a_sentence(run, tmp_path, monkeypatch):
+    """As their semaphores where /dev/shm is full, or cannot be written to."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", fail)
+    code, text, error = run("compare", "--processes", 2, "--out", tmp_path / "out")
+    told = "--processes = 2: the system has no semaphores for them (No space left on device); expected a shared memory"
+    assert (code, text) == (2, "") and told in error
     assert not (tmp_path / "out").exists()
 
 

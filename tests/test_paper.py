@@ -19,8 +19,8 @@ from hexmj.paper.obstacles import losses_after
 from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, RANGES, Protocol, cells
 from hexmj.paper.quantities import Weight
 from hexmj.paper.reproduce import measure, reproduce
-from hexmj.paper.rules import Band
-from hexmj.paper.table import NOT_SEARCHED, Row, claims_markdown, judge
+from hexmj.paper.rules import Answer, Band
+from hexmj.paper.table import NOT_SEARCHED, Row, claims_json, claims_markdown, judge
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import WINDOWS, Acceleration
@@ -280,6 +280,21 @@ def test_a_rows_command_tells_starts_and_readings():
     quick = claims_markdown([beside], asdict(replace(QUICK, seed=7)))
     assert f"`{claim.command} --quick --seed 7 --beside lasting`" in quick
     assert f"`{claim.command}`" in claims_markdown([Row(claim, {})], asdict(FULL))
+
+
+def test_other_readings_have_a_table_and_counts_of_their_own(run, tmp_path, monkeypatch):
+    """On a screen of 80 columns the cells of all in one would be as narrow as syllables."""
+    claim = next(claim for claim in CLAIMS if claim.key == "hws-late")
+    ours, lasting = (Answer(0.25, 0.2, 0.3, "V = 0.6", agrees) for agrees in (False, True))
+    row = Row(claim, dict.fromkeys(WINDOWS, ours), {"lasting": Row(claim, dict.fromkeys(WINDOWS, lasting))})
+    monkeypatch.setattr("hexmj.paper.reproduce.reproduce", lambda *_, **__: ([row], []))
+    code, text, _ = run("reproduce", "--only", claim.key, "--beside", "lasting", "--out", tmp_path)
+    of_ours, of_lasting = text.split("section")[1:]
+    assert code == 0 and "lasting" not in of_ours and "ours" not in of_lasting
+    assert of_lasting.splitlines()[0].split()[-4:] == ["lasting,", "walk", "lasting,", "start"]
+    assert of_lasting.splitlines()[2].count("agrees: 0.2500") == 2
+    told = "reading lasting, claims on FLSS and sets, window start: held out 1 agrees"
+    assert any(line.startswith(told) for line in claims_json([row], asdict(FULL))["summary"])
 
 
 @pytest.mark.thorough

@@ -11,6 +11,7 @@ from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, load_con
 from hexmj.bodies.stick_insect import STICK_INSECT
 from hexmj.stability import walk_margin
 from hexmj.studies.static_limit.distances import distances
+from hexmj.studies.static_limit.figure import static_limit_figure
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.sweeps import Cell, conduct
 
@@ -55,6 +56,21 @@ def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
     off = slower[1].margin_pressure.mean("start")
     assert (off.diff("vp") < 0).all()  # from fast to slow
     assert (off.sel(vp=25.0) < 0.5 * off.sel(vp=400.0)).all()
+
+
+@pytest.mark.slow
+def test_points_of_one_mass_stand_at_their_velocity(slower):
+    """Of several they stand beside each other."""
+    _, two = slower
+    assert points(static_limit_figure(two.isel(leg_mass=[0]))) == {(400.0, 100.0, 25.0)}
+    fastest = sorted(found[0] for found in points(static_limit_figure(two)))
+    assert fastest == pytest.approx([400.0 / 1.03, 400.0 * 1.03])
+
+
+def points(figure: Any) -> set[tuple[float, ...]]:
+    """The V_p of the points of each curve of frequencies, from fast to slow."""
+    curves = (one.lines[0].get_xdata() for one in figure.axes[0].containers)
+    return {tuple(sorted(curve.tolist(), reverse=True)) for curve in curves}
 
 
 def test_steps_on_no_foot_at_all_count_nowhere_and_warn_of_nothing():

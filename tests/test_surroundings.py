@@ -28,6 +28,19 @@ def done_with(words: tuple[str, ...], **around: str) -> subprocess.CompletedProc
     return done
 
 
+@pytest.mark.parametrize("word", ["doctor", "flss"])
+def test_where_nothing_tells_of_processes_a_sentence_does(run, monkeypatch, tmp_path: Path, word: str):
+    """Dask, which xarray imports, makes a traceback of it."""
+    pytest.importorskip("dask")
+    monkeypatch.setattr("hexmj.cli.surroundings.PROCESSES", tmp_path)
+    code, text, error = run(word)
+    assert (code, text) == (2, "")
+    assert (
+        error
+        == f"hexmj: {tmp_path} does not tell of this process; expected that it does, for Dask asks for its cores\n"
+    )
+
+
 @cache
 def flss_in(columns: str) -> str:
     """What `flss` prints in a terminal of so many columns."""

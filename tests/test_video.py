@@ -121,6 +121,15 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen
 
 
 @drawing
+def test_a_title_that_the_font_has_not_is_told(fallen, tmp_path):
+    boxes, plain = (fallen.assign_attrs(title=title) for title in ("三角 A 三", "Schräg, Ωmega"))
+    told = "^the film shows a box for each of 三角 in the title '三角 A 三'; its font has"
+    with pytest.warns(UserWarning, match=told) as warned:
+        render([boxes, plain, boxes], tmp_path / "film.mp4", Film(fps=5, width=320, height=240))
+    assert len(warned) == 1
+
+
+@drawing
 def test_a_film_of_a_part_shows_the_moments_that_it_tells(fallen, tmp_path):
     """Its frames are those of the whole film at these times."""
     film, part = Film(slow_motion=5.0, width=320, height=240), fallen.isel(step=slice(80, 160))  # from 0.1 to 0.2 s

@@ -34,7 +34,15 @@ class Reproduce:
         """Measure, judge, draw, and print the table."""
         from hexmj.paper.protocol import FULL, QUICK
         from hexmj.paper.reproduce import reproduce
-        from hexmj.paper.table import claims_json, heads, on_searched_starts, summary, summary_beside
+        from hexmj.paper.table import (
+            cells_beside,
+            claims_json,
+            heads,
+            heads_beside,
+            on_searched_starts,
+            summary,
+            summary_beside,
+        )
         from hexmj.pictures import as_shipped
 
         if self.only == ():
@@ -54,6 +62,8 @@ class Reproduce:
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return
-        claims = table(heads(rows), [row.cells for row in rows])
+        alone = [replace(row, beside={}) for row in rows]
+        others = [table(heads_beside(name), cells_beside(rows, name)) for name in beside]
         lines = *summary(rows), *on_searched_starts(self.seed), *summary_beside(rows)
-        show("The claims of the 1998 paper", claims, *lines, *map(str, files))
+        claims = table(heads(alone), [row.cells for row in alone])
+        show("The claims of the 1998 paper", claims, *others, *lines, *map(str, files))

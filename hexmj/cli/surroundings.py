@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +20,9 @@ GONE = "the current folder is no longer there; expected one that is"
 _NUMBERS = {"NUMBA_NUM_THREADS": (1, 2**31 - 1), "SOURCE_DATE_EPOCH": (0, 253_402_300_799)}
 """Variables of the environment -> least and most that libraries take: threads; seconds to the end of the year 9999."""
 
+PROCESSES = Path("/proc")
+"""Where Linux tells of processes; nothing is there elsewhere, where nobody asks for it."""
+
 _PACKAGE = Path(__file__).parents[1]
 _USUAL = warnings.formatwarning
 
@@ -28,10 +32,15 @@ def settle() -> None:
     figures and frames are drawn.
 
     Raises:
-        InputError: the current folder has gone, or one of the numbers is none.
+        InputError: the current folder has gone, Dask cannot ask for the number of cores, or one of the numbers is none.
     """
     if has_gone():
         raise InputError(GONE)
+    told = sys.platform != "linux" or (PROCESSES / str(os.getpid())).exists()
+    if not told and all(map(find_spec, ("dask", "psutil"))):
+        raise InputError(
+            f"{PROCESSES} does not tell of this process; expected that it does, for Dask asks for its cores"
+        )
     columns = shutil.get_terminal_size().columns
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))

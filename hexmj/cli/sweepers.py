@@ -48,7 +48,8 @@ class Sweepers:
         """The processes, a cluster's workers, or None where this process does the work.
 
         Raises:
-            InputError: no process, or too many, or a scheduler as well or that cannot be reached.
+            InputError: no process, too many, or more than the system takes, or a scheduler as well or that cannot be
+                reached.
         """
         if not 1 <= self.processes <= MOST_PROCESSES:
             raise InputError(f"--processes = {self.processes}; expected at least 1 and at most {MOST_PROCESSES}")
@@ -67,7 +68,11 @@ class Sweepers:
 
         with ExitStack() as ended:
             with stops_wait(), unheard_by_children(*STOPS):  # else semaphores might be left behind
-                pool = ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent)
+                try:
+                    pool = ProcessPoolExecutor(self.processes, get_context("spawn"), initializer=end_with_parent)
+                except OSError as error:
+                    told = f"--processes = {self.processes}: the system has no semaphores for them ({error.strerror})"
+                    raise InputError(f"{told}; expected a shared memory that takes some, or --processes 1") from None
                 executor = ended.enter_context(pool)
             try:
                 with unheard_by_children(*STOPS):

@@ -75,6 +75,16 @@ def heads(rows: Sequence[Row]) -> tuple[str, ...]:
     return "section", "the paper", "its value", "kind", *answers, "fits", "why"
 
 
+def heads_beside(reading: str) -> tuple[str, ...]:
+    """Of the columns of `cells_beside`."""
+    return "section", "the paper", "its value", *(f"{reading}, {window}" for window in WINDOWS)
+
+
+def cells_beside(rows: Sequence[Row], reading: str) -> list[tuple[str, ...]]:
+    """What `heads_beside` names, of each claim: our answers under another reading alone."""
+    return [(one.claim.section, one.claim.words, one.claim.value, *one.beside[reading].ours) for one in rows]
+
+
 def judge(claim: Claim, measured: Measured) -> Row:
     """Judge a claim over both windows, or once where no window is involved."""
     windows = WINDOWS if claim.rule.quantity.windowed else ("",)
@@ -128,7 +138,8 @@ def claims_json(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]
         how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": _command(row, settings)}
         beside = {name: _answers(other) for name, other in row.beside.items()}
         claims.append(told | {"ours": _answers(row), "beside": beside} | how)
-    return {"claims": claims, "summary": [*summary(rows), *on_searched_starts(settings["seed"])], "protocol": settings}
+    told = [*summary(rows), *on_searched_starts(settings["seed"]), *summary_beside(rows)]
+    return {"claims": claims, "summary": told, "protocol": settings}
 
 
 def summary_beside(rows: Sequence[Row]) -> list[str]:

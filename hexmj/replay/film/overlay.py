@@ -6,6 +6,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.ft2font import FT2Font
 from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
@@ -159,6 +160,12 @@ class Overlay:
         return max(1, round(size * self._scale))
 
 
+def lacking(title: str) -> str:
+    """The characters of a title, each once, for which a box stands, since the captions' font has none of them."""
+    known = FT2Font(_font_file(bold=True)).get_charmap()
+    return "".join(dict.fromkeys(one for one in title if ord(one) not in known))
+
+
 def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
     """As much of a text as fits into a width [pixels]."""
     if font.getlength(text) <= width:
@@ -211,5 +218,9 @@ def _mask(text: str, size: int, anchor: str, x: float, y: float, bold: bool) -> 
 
 @cache
 def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(_font_file(bold), size)
+
+
+def _font_file(bold: bool) -> Path:
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)
+    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name

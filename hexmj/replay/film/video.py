@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
+from warnings import warn
 
 import mujoco
 import numpy as np
@@ -20,7 +21,7 @@ from hexmj.rendering import gl
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.film import encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
-from hexmj.replay.film.overlay import Overlay
+from hexmj.replay.film.overlay import Overlay, lacking
 from hexmj.replay.take import Take, support_on_ground, takes_of
 from hexmj.storage.files import replacing
 
@@ -51,6 +52,9 @@ def render(
         progress: True shows a bar; or a function that is told the fraction done since it was last called.
         body: the description of what was recorded.
 
+    Warns:
+        UserWarning: of a title with characters that the captions' font, DejaVu Sans, lacks; boxes stand for them.
+
     Returns:
         The number of frames: the time from the first beginning to the last end, at `Film.fps`.
 
@@ -74,6 +78,12 @@ def render(
     begin, end = min(take.begin for take in takes), max(take.end for take in takes)
     frames = max(1, round((end - begin) * film.slow_motion * film.fps))
     overlays = [Overlay(take, film, begin, end) for take in takes]
+    for title in dict.fromkeys(take.title for take in takes):
+        if boxes := lacking(title):
+            warn(
+                f"the film shows a box for each of {boxes} in the title {title!r}; its font has none of them",
+                stacklevel=2,
+            )
     with shown(progress, "rendering") as told, replacing(path) as part:
         _write(takes, overlays, part, begin + np.arange(frames) / (film.fps * film.slow_motion), film, told)
     return frames

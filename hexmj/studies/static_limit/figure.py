@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hexmj.measures.captions import caption
 from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import MEASURE_COLOURS, frequency_curve, tidy
@@ -16,6 +18,9 @@ COLOURS = MEASURE_COLOURS | {"grounded": "#46a35e"}
 
 LINES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
 """Of the masses of the legs in turn."""
+
+BESIDE = 1.03
+"""By what factor of V_p points of the first and the last of several masses stand aside, so that all are seen."""
 
 MARKERS = {
     "measured": "s",
@@ -57,10 +62,12 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
     check_starts(result)
     figure = picture(9.6, 7.0)
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
-    lines: dict[float, Any] = dict(zip(result.leg_mass.values, LINES * len(result.leg_mass), strict=False))
-    for mass, line in lines.items():
-        one, first = result.sel(leg_mass=mass).sortby("vp"), mass == result.leg_mass[0]
-        _frequencies(axes["flss"], one, line, first)
+    masses = result.leg_mass.values
+    lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
+    shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else np.ones(1)
+    for (mass, line), shift in zip(lines.items(), shifts, strict=True):
+        one, first = result.sel(leg_mass=mass).sortby("vp"), mass == masses[0]
+        _frequencies(axes["flss"], one, line, shift, first)
         for panel, (_, curves) in PANELS.items():
             for name, (colour, label) in curves.items():
                 values = one[name] if panel == "agreement" else one[name].mean("start")
@@ -77,19 +84,18 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
             one.autoscale_view(scalex=False)
             one.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
         _v_axis(one, result)
-    masses = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
-    axes["drift"].legend(handles=masses, frameon=False, fontsize=9)
+    handles = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
+    axes["drift"].legend(handles=handles, frameon=False, fontsize=9)
     head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
     return figure
 
 
-def _frequencies(axes: "Axes", one: "xr.Dataset", line: Any, first: bool) -> None:
-    """The FLSS at one mass of the legs; the kinematic one, a band, depends on no mass and no V_p."""
+def _frequencies(axes: "Axes", one: "xr.Dataset", line: Any, shift: float, first: bool) -> None:
+    """The FLSS at one mass of the legs, at so many times its V_p; the kinematic one, a band, depends on neither."""
     if first:
         low, middle, high = (one[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
         axes.axhspan(low, high, color=MEASURE_COLOURS["kinematic"], alpha=0.15, linewidth=0)
         axes.axhline(middle, color=MEASURE_COLOURS["kinematic"], linewidth=1.6, label="kinematic")
-    shift = 0.97 if first else 1.03
     for measure in ("measured", "grounded", "physical"):
         style = {"linestyle": line, "color": COLOURS[measure], "marker": MARKERS[measure]}
         frequency_curve(axes, one.vp * shift, one, measure, label=measure if first else None, **style)
