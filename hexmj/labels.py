@@ -38,8 +38,9 @@ def _is_single(value: Any) -> bool:
 
 
 def rows_of(values: Any) -> Sequence[Any]:
-    """The values of a list, tuple or the like, each of which may have labels of its own; nothing for other values."""
-    return values if isinstance(values, Sequence) else ()
+    """The values of a list, tuple or the like, each of which may have labels of its own; nothing for other values, nor
+    for a memoryview, which Python calls a sequence whatever its axes."""
+    return values if isinstance(values, Sequence) and not isinstance(values, memoryview) else ()
 
 
 def falling(labels: Sequence[Any]) -> bool:

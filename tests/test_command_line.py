@@ -33,6 +33,12 @@ def test_every_command_has_help_with_units_and_defaults(run, command):
     assert "(default: 80.0)" in out
 
 
+@pytest.mark.parametrize(("command", "rivals"), [("league", True), ("variants", False)])
+def test_help_tells_of_rivals_where_they_are_taken(run, command, rivals):
+    """A rival has none of the constants of the 1998 network that vary."""
+    assert ("a rival (wilson" in " ".join(run(command, "--help")[1].replace("│", " ").split())) == rivals
+
+
 WALK = "compare", "flss", "walk", "render", "search", "converge", "terrain", "map", "disturb", "biology", "ablate"
 
 

@@ -1,5 +1,7 @@
 """Sources, and files of settings, that are edited while a program uses them: they count as they ran, or are refused."""
 
+import ast
+import gc
 import json
 import os
 import py_compile
@@ -7,7 +9,9 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from threading import Event
@@ -16,7 +20,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, KeptValues, module_sources
+from hexmj.sweeps import Cell, KeptValues, module_sources, packages
 from hexmj.sweeps.code import code
 from hexmj.user_code import parsing
 from hexmj.user_code.loaded import importable
@@ -37,7 +41,7 @@ def test_a_process_that_is_forked_while_a_source_is_parsed_parses_its_own() -> N
     begun = Event()
 
     def parses() -> None:
-        with parsing._alone():
+        with parsing.alone():
             begun.set()
             time.sleep(0.3)
 
@@ -53,6 +57,46 @@ def test_a_process_that_is_forked_while_a_source_is_parsed_parses_its_own() -> N
     child.join(20)
     child.kill()
     assert child.exitcode == 0
+
+
+@contextmanager
+def somebody_parses() -> Iterator[None]:
+    """A thread that reads literals all the while, and takes its turn amid what the collector calls, as in Dask's
+    workers."""
+    ended, limits, often = Event(), gc.get_threshold(), sys.getswitchinterval()
+
+    def calls(*_: object) -> None:
+        sum(range(30))
+
+    def reads() -> None:
+        while not ended.is_set():
+            with suppress(SystemError):  # Python 3.11's; nobody but who reads can help it
+                ast.literal_eval("[(1, 2), [3, (4, 5)]]")
+
+    gc.callbacks.append(calls)
+    gc.set_threshold(50)
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(1) as threads:
+            threads.submit(reads)
+            try:
+                yield
+            finally:
+                ended.set()
+    finally:
+        gc.callbacks.remove(calls)
+        gc.set_threshold(*limits)
+        sys.setswitchinterval(often)
+
+
+def test_what_others_parse_meanwhile_disturbs_nothing() -> None:
+    """Python 3.11 counts the depth of all that threads parse at once as that of one."""
+    source = (module_sources.PACKAGE / "sweeps" / "packages.py").read_bytes()
+    with somebody_parses():
+        for _ in range(50):
+            parsing.parsed(source)
+            packages._requirement('numpy>=1; python_version < "4" and (extra == "one" or extra == "two")')
+    assert gc.isenabled()
 
 
 USED = """

@@ -34,6 +34,7 @@ def test_labelled_legs_may_come_in_any_order():
     for given in (labelled.sel(leg=shuffled), labelled.T, table[shuffled], labelled.drop_vars("leg").T):
         assert np.array_equal(walk(given).x, walk(starts).x)
     assert not np.array_equal(walk(labelled.sel(leg=shuffled).to_numpy()).x, walk(starts).x)
+    assert np.array_equal(walk(starts.data).x, walk(starts).x)
     assert np.array_equal(walk(labelled.assign_coords(leg=range(6))).x, walk(starts).x)
     with pytest.raises(hexmj.InputError, match=r"^starts have the shape \(6,\)"):
         walk(labelled[0])

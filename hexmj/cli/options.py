@@ -15,11 +15,15 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, check_distinct
 from hexmj.timing import Acceleration, Stride
 
-CONTROLLER = (
+PRESET = (
     "a preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9, robust-0.1, robust-0.3, robust-0.7, lasting,"
-    " lasting-0.1 ... lasting-0.9), a rival (wilson, graham, ...; `hexmj league` lists all), a file of weights (TOML),"
-    " module:object, file.py:object or an entry point"
+    " lasting-0.1 ... lasting-0.9)"
 )
+OF_ONES_OWN = "a file of weights (TOML), module:object, file.py:object or an entry point"
+NETWORK = f"{PRESET}, {OF_ONES_OWN}"
+"""How sets of the 1998 network are named."""
+
+CONTROLLER = f"{PRESET}, a rival (wilson, graham, ...; `hexmj league` lists all), {OF_ONES_OWN}"
 """How controllers are named."""
 
 ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from hexmj.cli.options import CONTROLLER, Controlled, hiding
+from hexmj.cli.options import NETWORK, Controlled, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.controllers.cruse1998 import Cruse1998
@@ -32,7 +32,7 @@ class Variants(StudyCommand):
 
     models: Annotated[
         tuple[str, ...],
-        arg(help=f"Sets of the 1998 network, each {CONTROLLER}; own-V stands for own-0.1 at V = 0.1, and so on."),
+        arg(help=f"Sets of the 1998 network, each {NETWORK}; own-V stands for own-0.1 at V = 0.1, and so on."),
     ] = ("hws", "ldvs", "own", "own-V")
     velocities: Sequence[float] = study.Variants.velocities
     """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""

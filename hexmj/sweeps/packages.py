@@ -20,6 +20,7 @@ from packaging.utils import canonicalize_name
 
 from hexmj.storage.files import digest, digest_of, state_of
 from hexmj.sweeps.plain_settings import PACKAGE
+from hexmj.user_code.parsing import alone
 from hexmj.user_code.sources_as_run import is_installed
 
 NAMES = {"PIL": "pillow"}
@@ -95,7 +96,13 @@ def _by_module(_: tuple[object, ...]) -> Mapping[str, list[str]]:
 def _requirements(distribution: Distribution) -> Iterator[Requirement]:
     for one in distribution.requires or ():
         with suppress(InvalidRequirement):
-            yield Requirement(one)
+            yield _requirement(one)
+
+
+def _requirement(text: str) -> Requirement:
+    """What a distribution requires; Python parses the texts of its marker."""
+    with alone():
+        return Requirement(text)
 
 
 def _is_required(distribution: Distribution) -> bool:
@@ -167,4 +174,4 @@ def _required() -> set[str]:
     told = list[str]()
     with suppress(PackageNotFoundError):  # where it runs without having been installed
         told += requires("hexmj") or []
-    return {canonicalize_name(Requirement(one).name) for one in told} | {"hexmj", "llvmlite"}
+    return {canonicalize_name(_requirement(one).name) for one in told} | {"hexmj", "llvmlite"}

@@ -2,6 +2,7 @@
 that of one.  Nothing is told of their warnings, which whoever imports them hears."""
 
 import ast
+import gc
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -27,21 +28,29 @@ def parsed(source: bytes) -> ast.Module:
     Raises:
         SyntaxError: it is no Python; ValueError where it holds a null character.
     """
-    with _alone():
+    with alone():
         return ast.parse(source)
 
 
 def compiled(source: bytes, file: str) -> CodeType:
     """What Python runs of a file with this source; errors as of `parsed`."""
-    with _alone():
+    with alone():
         return compile(source, file, "exec", dont_inherit=True)
 
 
 @contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
+    """While the block runs, which parses, nothing of this package in other threads does, nor does the collector run:
+    amid what it calls, as in Dask's workers, others take their turn, who may parse."""
     with _ONE, catch_warnings():
         simplefilter("ignore")
-        yield
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            if collects:
+                gc.enable()
 
 
 def texts(tree: ast.AST) -> list[str]:
