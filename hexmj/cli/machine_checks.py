@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
 from typing import Any
 
+from hexmj.cli.surroundings import untold
 from hexmj.process.threads import cores
 from hexmj.rendering.gl import PACKAGES
 
@@ -96,7 +97,9 @@ def versions() -> str:
 
 
 def threads() -> str:
-    """A thread per core that this process may use finds a core free: no quota is smaller."""
+    """A thread per core that this process may use finds a core free: no quota is smaller, and Dask finds the cores."""
+    if told := untold():
+        raise Unfit(told)
     count, (share, period) = cores(), _quota()
     if share != "max" and int(share) < count * int(period):
         raise Unfit(f"{count} threads would share {int(share) / int(period):g} cores, which is all that are granted")
@@ -174,7 +177,7 @@ def walking() -> str:
 
 CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "install hexmj into a fresh environment (make test, make compare), Python 3.11 or newer"),
-    "threads": (threads, "give --threads with the number of cores that are granted"),
+    "threads": (threads, "mount /proc where it is not; give --threads with the number of cores that are granted"),
     "rendering": (
         rendering,
         f"install {PACKAGES} and leave MUJOCO_GL and PYOPENGL_PLATFORM unset, or set both to egl; only films need it",

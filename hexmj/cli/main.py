@@ -12,7 +12,7 @@ from typing import Any
 from hexmj.cli import answer_stream
 from hexmj.cli.command_words import checked, typed
 from hexmj.cli.commands import COMMANDS, GOES_ON, options_of
-from hexmj.cli.surroundings import GONE, has_gone, settle
+from hexmj.cli.surroundings import GONE, has_gone, settle, untold
 from hexmj.errors import InputError, RenderingError, SimulationError, is_of_numbas_cache
 from hexmj.process.signals import of_stop
 from hexmj.storage.literal import literal
@@ -23,6 +23,9 @@ NUMBA = (
 )
 
 MEMORY = "the memory does not suffice ({}); expected more of it, or fewer starts"
+
+DOCTOR = "doctor"
+"""Tells what is amiss by itself."""
 
 OUTPUT = "standard output"
 SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
@@ -41,6 +44,8 @@ def main() -> None:
             settle()
             with nullcontext() if sys.stdout else redirect_stdout(StringIO()):  # tyro asks it how wide it is
                 options = options_of(words := checked(sys.argv[1:]))
+            if {*words[:1]} & COMMANDS.keys() - {DOCTOR} and (told := untold()):
+                raise InputError(told)
             with typed(words), answer_stream.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()
         except BaseException as error:

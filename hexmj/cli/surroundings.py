@@ -32,15 +32,10 @@ def settle() -> None:
     figures and frames are drawn.
 
     Raises:
-        InputError: the current folder has gone, Dask cannot ask for the number of cores, or one of the numbers is none.
+        InputError: the current folder has gone, or one of the numbers is none.
     """
     if has_gone():
         raise InputError(GONE)
-    told = sys.platform != "linux" or (PROCESSES / str(os.getpid())).exists()
-    if not told and all(map(find_spec, ("dask", "psutil"))):
-        raise InputError(
-            f"{PROCESSES} does not tell of this process; expected that it does, for Dask asks for its cores"
-        )
     columns = shutil.get_terminal_size().columns
     if columns < NARROWEST or "COLUMNS" in os.environ:  # as 0, of which Python makes 80, and other libraries nothing
         os.environ["COLUMNS"] = str(max(columns, NARROWEST))
@@ -63,6 +58,14 @@ def has_gone() -> bool:
     except FileNotFoundError:
         return True
     return False
+
+
+def untold() -> str:
+    """In one sentence, that nothing tells of this process where Dask, which xarray imports, asks; else nothing."""
+    told = sys.platform != "linux" or (PROCESSES / str(os.getpid())).exists()
+    if told or not all(map(find_spec, ("dask", "psutil"))):
+        return ""
+    return f"{PROCESSES} does not tell of this process; expected that it does, for Dask asks for its cores"
 
 
 def _spare_glfw_its_programs() -> None:
