@@ -145,6 +145,8 @@ def test_tables_and_figure_show_every_entrant(result) -> None:
         assert {row[0] for row in table.rows} == {*NAMES, "still"}
         assert all(len(row) == len(table.head) for row in table.rows)
         assert f"### {table.title}" in text
+        assert ("FLSS of" in table.title) == table.title.endswith("; graham-ideal from one start")
+    assert "graham-ideal from one start" in league_figure(result).get_supxlabel()
     assert "nan" not in text
     for draw in (league_figure, walks_figure):
         names = [label.get_text() for label in draw(result).axes[0].get_yticklabels()]

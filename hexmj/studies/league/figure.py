@@ -7,7 +7,7 @@ import numpy as np
 
 from hexmj.measures.captions import caption, starts_in_words
 from hexmj.storage.literal import in_figure
-from hexmj.studies.league.table import MEASURES, by_rank, place
+from hexmj.studies.league.table import MEASURES, by_rank, from_one, place
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,7 +70,7 @@ def league_figure(result: "xr.Dataset") -> "Picture":
     figure.colorbar(images[0], ax=axes[:3], **how).set_label("share of the starts", fontsize=9)
     _dots(axes[3], shown)
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
-    _head(figure, heading, result, _nothing(panels), _missing(shown))
+    _head(figure, heading, result, in_figure(from_one(shown)), _nothing(panels), _missing(shown))
     return figure
 
 

@@ -66,6 +66,12 @@ def by_rank(result: "xr.Dataset") -> "xr.Dataset":
     return result.isel(entrant=np.lexsort((losses, falls, unranked))).transpose("entrant", ...)
 
 
+def from_one(result: "xr.Dataset") -> str:
+    """Who walks from one start, the ideal one, where others walk from more; nothing where nobody does."""
+    alone = (result.kinematic_starts == 1).all("velocity").values
+    return f"{', '.join(result.entrant.values[alone])} from one start" if alone.any() and not alone.all() else ""
+
+
 def frequency(one: "xr.Dataset", name: str) -> str:
     """A frequency with its interval; "-" where it is not known."""
     middle, low, high = (one[name + end].item() for end in ("", "_low", "_high"))
@@ -111,6 +117,7 @@ def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
     reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
     told = f"{title} of {starts_in_words(starts)}"
     told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
+    told += f"; {alone}" if (alone := from_one(shown)) else ""
     return Table(told, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
 
