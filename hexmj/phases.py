@@ -27,11 +27,14 @@ IPSILATERAL, CONTRALATERAL = slice(0, 4), slice(4, 7)
 NEAR = 0.05
 """Phases that differ by no more than this count as equal where a gait is named."""
 
+ROUNDING = 1e-12
+"""Directions whose mean is no longer than this, as a fraction of the circle's radius, balance."""
+
 GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "other"]
 
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Mean direction of phases on the circle [0, 1).
+    """Mean direction of phases on the circle [0, 1); NaN where they balance, such as 0 and 0.5, and have none.
 
     Raises:
         InputError: no numbers, none at all, or no such axis.
@@ -41,8 +44,10 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
         raise InputError(f"axis = {axis}; expected one of the {angle.ndim} of phase")
     if not (angle.size if axis is None else angle.shape[axis]):
         raise InputError(f"phase = {short(phase)}; expected at least one")
-    mean = np.arctan2(np.sin(angle).mean(axis), np.cos(angle).mean(axis)) / (2.0 * np.pi)
-    return mean % 1.0 % 1.0  # the first remainder of -1e-17 is 1.0
+    across, along = np.sin(angle).mean(axis), np.cos(angle).mean(axis)
+    mean = np.arctan2(across, along) / (2.0 * np.pi)
+    balance = np.hypot(across, along) < ROUNDING
+    return np.where(balance, np.nan, mean % 1.0 % 1.0)[()]  # the first remainder of -1e-17 is 1.0
 
 
 def circular_range(phase: ArrayLike) -> np.ndarray:
@@ -59,7 +64,8 @@ def circular_range(phase: ArrayLike) -> np.ndarray:
 
 
 def unrolled(phase: ArrayLike) -> np.ndarray:
-    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN.
+    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN, and
+    so do phases that have no such direction.
 
     Raises:
         InputError: no numbers.

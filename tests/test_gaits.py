@@ -310,6 +310,10 @@ def test_axes_that_are_not_there_have_no_mean(wrong):
 
 def test_circular_statistics_across_zero():
     assert circle(circular_mean([0.95, 0.05]), 0.0) < 1e-12
+    balanced = [[0.0, 0.5], [0.1, 0.6], [0.05, 0.55], [0.25, 0.75]]
+    assert np.isnan(circular_mean(balanced, axis=1)).all() and np.isnan(circular_mean(np.arange(3) / 3))
+    assert circle(circular_mean([0.0, 0.5 - 1e-9]), 0.25) < 1e-6
+    assert unrolled(np.array([0.1, 0.6])).tolist() == [0.1, 0.6]
     assert circular_mean([0.95, 0.05]) < 1.0
 
 

@@ -31,6 +31,18 @@ MARKERS = {
 }
 """Of what is told in the legends."""
 
+ABOVE: dict[str, Any] = {
+    "loc": "lower left",
+    "bbox_to_anchor": (0.0, 1.0),
+    "frameon": False,
+    "fontsize": 8,
+    "handlelength": 1.6,
+    "handletextpad": 0.5,
+    "columnspacing": 1.2,
+    "ncols": 2,
+}
+"""Where a legend lies on no point."""
+
 PANELS = {  # label of the axis, then for each curve its colour and name
     "agreement": (
         "starts whose answer is the kinematic one",
@@ -60,7 +72,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
     from hexmj.pictures import head, picture
 
     check_starts(result)
-    figure = picture(9.6, 7.0)
+    figure = picture(9.6, 7.6)
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
     masses = result.leg_mass.values
     lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
@@ -85,7 +97,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
             one.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
         _v_axis(one, result)
     handles = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
-    axes["drift"].legend(handles=handles, frameon=False, fontsize=9)
+    axes["drift"].legend(handles=handles, **ABOVE)
     head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
     return figure
 
@@ -108,4 +120,4 @@ def _v_axis(axes: "Axes", result: "xr.Dataset") -> None:
     axes.set_xlim(0.85 * result.vp.values.min(), result.vp.values.max() / 0.85)
     tidy(axes)
     if axes.get_legend_handles_labels()[1]:
-        axes.legend(frameon=False, fontsize=9)
+        axes.legend(**ABOVE)
