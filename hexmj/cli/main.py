@@ -44,7 +44,7 @@ def main() -> None:
             settle()
             with nullcontext() if sys.stdout else redirect_stdout(StringIO()):  # tyro asks it how wide it is
                 options = options_of(words := checked(sys.argv[1:]))
-            if {*words[:1]} & COMMANDS.keys() - {DOCTOR} and (told := untold()):
+            if words[0] in COMMANDS and words[0] != DOCTOR and (told := untold()):
                 raise InputError(told)
             with typed(words), answer_stream.alone() if getattr(options, "json", False) else nullcontext():
                 options.run()

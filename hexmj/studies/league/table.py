@@ -67,7 +67,8 @@ def by_rank(result: "xr.Dataset") -> "xr.Dataset":
 
 
 def from_one(result: "xr.Dataset") -> str:
-    """Who walks from one start, the ideal one, where others walk from more; nothing where nobody does."""
+    """In words, who of a result of `League` walks from one start, the ideal one, where others walk from more; nothing
+    where nobody does."""
     alone = (result.kinematic_starts == 1).all("velocity").values
     return f"{', '.join(result.entrant.values[alone])} from one start" if alone.any() and not alone.all() else ""
 

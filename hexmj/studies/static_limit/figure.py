@@ -76,7 +76,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Picture":
     axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
     masses = result.leg_mass.values
     lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
-    shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else np.ones(1)
+    shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else np.ones(len(masses))
     for (mass, line), shift in zip(lines.items(), shifts, strict=True):
         one, first = result.sel(leg_mass=mass).sortby("vp"), mass == masses[0]
         _frequencies(axes["flss"], one, line, shift, first)
