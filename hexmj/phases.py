@@ -34,8 +34,8 @@ GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "othe
 
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Mean direction of phases on the circle [0, 1), along an axis, or of all; NaN where they balance, such as 0 and 0.5,
-    and have none.
+    """Mean direction of phases on the circle [0, 1), along an axis or of all; NaN where they balance, such as 0 and
+    0.5, and have none.
 
     Raises:
         InputError: no numbers, none at all, or no such axis.
