@@ -224,7 +224,8 @@ def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path, 
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", few_of(["ldvs", "lasting-0.3"], "lasting-0.3"))
 def test_a_search_begins_with_a_set_whose_candidates_read_the_legs(run, tmp_path, begin):
-    words = ["--begin", begin, "--form", "mirrored", "--physical", "--feedback", "--window", 5, "--starts", 2]
+    words = ["--begin", begin, "--form", "mirrored", "--physical", "--feedback", "--velocity", 0.9]
+    words += ["--window", 5, "--starts", 2]
     words += ["--budget", 2, "--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]
     assert run("search", *words)[0] == 0
 

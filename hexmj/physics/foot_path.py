@@ -28,7 +28,7 @@ class TipTargets:
 
     def __init__(self, starts: np.ndarray, conditions: Conditions, stride: Stride) -> None:
         """All feet stand at the starts, (start, leg) [mm]."""
-        self._x = np.array(starts)
+        self._x = np.array(starts, order="C")
         self._y = np.tile(stride.geometry.y, (len(starts), 1))
         self._stance = np.ones(starts.shape, dtype=bool)
         self._lift, self._height = np.zeros(starts.shape), np.zeros(starts.shape)
@@ -44,7 +44,8 @@ class TipTargets:
         """
         m, path = self._substeps, self._conditions.path
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
-        wanted = plan.x, plan.y, plan.stance, plan.aep, plan.height
+        planned = plan.x, plan.y, plan.stance, plan.aep, plan.height
+        wanted = tuple(map(np.ascontiguousarray, planned))  # of one layout, for it would be compiled for each
         last = self._x, self._y, self._stance, self._lift, self._height
         _follow(wanted, ids, last, m, self._rates, (path.step_height, path.standing_height), self._origin, tips)
         for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
