@@ -189,6 +189,28 @@ def test_the_last_line_tells_of_bumps_that_end(run, window, told):
     assert told in " ".join(out.split()) and ("bumps" in out) == bool(told)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("length", "told"), [(80, ""), (150, "; the bumps end 264 mm ahead, and the plane follows")])
+def test_the_last_line_tells_of_bumps_that_end_before_other_obstacles(run, tmp_path, length, told):
+    """All walk until they are past the longest gap, 15 mm behind which their front feet come 38 mm farther."""
+    words = [
+        "terrain",
+        "--grounds",
+        "rough",
+        "gap",
+        "--heights",
+        0.2,
+        "--velocities",
+        0.5,
+        "--grasps",
+        0,
+        "--starts",
+        1,
+    ]
+    out = run(*words, "--lengths", length, "--out", tmp_path)[1]
+    assert told in " ".join(out.split()) and ("bumps" in out) == bool(told)
+
+
 @pytest.mark.thorough
 def test_sets_of_each_velocity_are_named_where_their_starts_are_known(run, tmp_path):
     words = ["variants", "--models", "lasting-V", "--velocities", 0.3, 0.5, "--starts", 2, "--window", 3]

@@ -83,8 +83,15 @@ class Terrain(StudyCommand):
             " 95 % intervals; who falls on the way to it does not count"
         )
         yield _table(result, self.conditions.body.trunk)
-        walks = replace(self.walks, window=f"{result.attrs['distance']:g} / V")
-        yield replace(self, walks=walks).conditions_line(varied=VARIED)
+        distance = result.attrs["distance"]
+        walked = {"walks": replace(self.walks, window=f"{distance:g} / V"), "conditions": self._on_the_roughest}
+        yield replace(self, **walked).conditions_line(varied=VARIED, walked=distance)
+
+    @property
+    def _on_the_roughest(self) -> Conditions:
+        """With the ground, where one is rough, whose bumps some walks may get past."""
+        ground = {"ground": "rough", "ground_height": max(self.heights)} if "rough" in self.grounds else {}
+        return replace(self.conditions, ground=replace(self.conditions.ground, **ground))
 
 
 def _table(result: "xr.Dataset", trunk: tuple[str, ...]) -> "Table":
