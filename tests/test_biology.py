@@ -358,6 +358,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     table = (tmp_path / "biology.md").read_text()
     assert "starts with whole strides: 2 of 2 at" in text and "Starts with whole strides: 2 of 2 at" in table
     assert answer["walked"][0] == 2
+    assert "| verdict on the mean |" in table
     assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
     assert table.count("\n| ") >= len(ANIMALS)
     assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)

@@ -67,7 +67,7 @@ class Animal:
     """The body or V_p was chosen by it, so agreement says nothing."""
 
     def verdict(self, value: float) -> Verdict:
-        """Of a value of ours, NaN where it was measured in no start."""
+        """Of a value of ours, NaN where it was measured in no start; its interval has no say."""
         if math.isnan(self.low) or math.isnan(value):
             return "no figure found" if math.isnan(self.low) else "none measured"
         return "below" if value < self.low else "above" if value > self.high else "within"

@@ -12,7 +12,7 @@ from hexmj.studies.biology.study import walked_in_words
 if TYPE_CHECKING:
     import xarray as xr
 
-HEADS = ("quantity", "ours (95 %)", "insects", "verdict", "source")
+HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
 
 
 def rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
