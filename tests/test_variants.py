@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -182,6 +183,19 @@ def test_the_figure_shows_every_set_and_velocity(result):
     assert [axes.get_title() for axes in figure.axes] == ["V = 0.5", "V = 0.7"]
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(SETS)
     assert all(name == "usual" or any(name.startswith(begin) for begin in STYLES) for name in VARIANTS)
+
+
+@pytest.mark.parametrize("times", [0.0, 1.0])
+def test_marks_are_whole_in_the_figure_where_nobody_or_everybody_loses(result, times):
+    figure = variants_figure(result.assign(flss=times * (result.flss / result.flss.max()).round()))
+    figure.savefig(BytesIO())
+    for axes in figure.axes:
+        left, right = axes.bbox.intervalx
+        for mark in axes.lines:
+            if mark.get_marker() not in ("|", "None"):
+                at = axes.transData.transform(mark.get_xydata())[:, 0]
+                half = mark.get_markersize() / 2 * figure.dpi / 72
+                assert left < at.min() - half and at.max() + half < right
 
 
 @pytest.mark.thorough

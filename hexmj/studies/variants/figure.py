@@ -80,6 +80,8 @@ def _panel(axes: "Axes", one: "xr.Dataset") -> None:
         axes.plot(here.flss.mean(), row, marker="|", color="0.1", markersize=17, markeredgewidth=2.2, zorder=5)
     tidy(axes)
     axes.grid(visible=False, axis="y")
-    axes.set(xlim=(0.0, min(1.02, 1.05 * one.flss.max().item() + 1e-3)), xlabel="FLSS")
+    most = one.flss.max().item()
+    beyond = 0.04 * most + 1e-3
+    axes.set(xlim=(-beyond, most + beyond), xlabel="FLSS")
     axes.set_yticks(range(len(names)), [in_figure(name) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
