@@ -20,6 +20,7 @@ from hexmj.controllers.cruse1998.weights import general
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.2, 0.6])
 def test_the_peers_give_our_answers(velocity):
     starts = draw_starts(150, 3)

@@ -49,6 +49,7 @@ def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:
     assert disturbed_figure(result).get_suptitle().endswith("; frequencies of at least 1 of them")
 
 
+@pytest.mark.slow
 def test_a_map_tells_how_many_starts_stand_at_every_value() -> None:
     """Of twelve starts one falls at rest where the centre of mass lies 15 mm ahead."""
     study = StabilityMap(LDVS, "centre_of_mass", (0.0, 15.0), (0.3,), n_starts=12, window=20.0)

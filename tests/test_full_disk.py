@@ -144,6 +144,7 @@ def test_evaluations_go_on_wherever_the_disk_was_full(tmp_path, room):
 WALK = ("walk", "--window", "40", "--velocity", "0.5", "--out")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 def test_every_file_of_a_command_may_be_the_one_that_does_not_fit(run, tmp_path, monkeypatch, call):
     """In turn: the n-th is refused, so those before it are there and whole."""

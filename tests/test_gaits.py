@@ -229,6 +229,7 @@ def test_early_falls_do_not_count_against_the_limit_regime():
     assert not gait(Walk(walked.time, walked.velocity, x, walked.y, walked.stance)).stable[0]
 
 
+@pytest.mark.slow
 def test_uncoordinated_legs_keep_the_phases_of_their_start():
     """Alone, a leg at x is raised after (x - PEP_0) / V, and its period is (AEP_0 - PEP_0)(1 + 1 / V)."""
     v, starts = 0.4, draw_starts(30, seed=2)

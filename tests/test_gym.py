@@ -88,6 +88,7 @@ def test_one_thread_draws_all_frames():
     walking.close()
 
 
+@pytest.mark.slow
 @drawing
 @pytest.mark.parametrize("kind", [StickInsect, StickInsects])
 def test_what_is_drawn_was_compiled_at_first(kind, tmp_path):

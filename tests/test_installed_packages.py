@@ -23,6 +23,7 @@ from hexmj.sweeps.packages import NAMES
 from small_cells import WITHOUT_DASK
 
 
+@pytest.mark.slow
 def test_modules_of_another_name_than_their_distribution_are_told_by_its_version() -> None:
     for module, name in NAMES.items():
         assert packages_distributions()[module] == [name]

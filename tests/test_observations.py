@@ -39,6 +39,7 @@ def test_clearance_at_home_is_that_of_the_metathorax():
     assert seen(walking)["clearance"] == pytest.approx(10.4 - 2.0 - 1.6)
 
 
+@pytest.mark.slow
 def test_no_foot_in_contact_has_a_margin_of_its_own():
     """It lies below every margin that one foot in contact can have, at any reach of the legs."""
     walking = dm.load()

@@ -242,6 +242,7 @@ def test_heights_are_honoured(unchanged):
     assert up == pytest.approx(np.where(walked.planned.stance[:, 0], foot, foot + 5.0))
 
 
+@pytest.mark.slow
 def test_a_posture_of_ones_own_is_honoured():
     """All feet reach 2 mm deeper: the body stands 2 mm higher."""
     walked, _ = walked_by(lambda walk, done: {"height": np.where(walk.stance[0], -2.0 * min(1.0, done / 200), 8.0)})

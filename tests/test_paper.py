@@ -89,6 +89,7 @@ def test_lost_after_is_the_end_of_the_walk():
     assert 0 < ours[0].sum() < ours[1].sum() < 70
 
 
+@pytest.mark.slow
 def test_a_stopped_run_goes_on_and_ends_the_same(tmp_path):
     class Stop(Exception):
         pass

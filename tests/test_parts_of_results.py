@@ -227,6 +227,7 @@ def undisturbed(figure: Any) -> list[Line2D]:
     return [line for axes in figure.axes for line in axes.lines if line.get_linestyle() == ":"]
 
 
+@pytest.mark.slow
 def test_only_the_undisturbed_case_is_drawn_as_such():
     result = made("disturb")
     whole = hexmj.plot(result)
@@ -269,6 +270,7 @@ def test_candidates_stand_at_their_evaluation():
     assert drawn(history.isel(evaluation=slice(4, None))) == [[(5, 0.4), (6, 0.5)], [(5, 0.4), (6, 0.4)]]
 
 
+@pytest.mark.slow
 def test_each_group_of_an_ablation_is_set_off_however_its_rows_are_sorted():
     model, other = {"ldvs": hexmj.LDVS, "a": hexmj.HWS, "b": hexmj.HWS}, {"hws": hexmj.HWS}
     result = conduct(Ablation({"ldvs": model, "hws": other}, [0.5], **FEW))

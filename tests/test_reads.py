@@ -277,6 +277,7 @@ def test_a_file_that_a_text_names_and_nobody_opens_counts_by_being_there(
     assert computed(gain) == (1.0, 3)
 
 
+@pytest.mark.slow
 def test_what_packages_open_by_themselves_counts_by_what_it_holds(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

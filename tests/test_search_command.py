@@ -133,6 +133,7 @@ def test_physical_search(run, tmp_path):
     assert answer["settings"]["problem"]["conditions"]["vp"] == 200.0
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     """Its float fields, from their usual values; the found one can be named like any other."""
     (tmp_path / "mine.py").write_text(OWN)

@@ -125,6 +125,7 @@ def test_a_folder_that_has_gone(tmp_path: Path):
     assert (done.returncode, done.stderr) == (2, "hexmj: the current folder is no longer there; expected one that is\n")
 
 
+@pytest.mark.slow
 def test_who_walks_in_a_folder_that_has_gone_needs_none(tmp_path: Path):
     gone = tmp_path / "gone"
     gone.mkdir()

@@ -208,6 +208,7 @@ def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
     assert "of them" not in all_of_them.get_suptitle()
 
 
+@pytest.mark.slow
 def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
     words = ["terrain", "--velocities", "0.6", "--grounds", "step", "--heights", "4", "--grasps", "0", "--starts", "6"]
     (tmp_path / "walks").symlink_to(folder)
@@ -277,6 +278,7 @@ def test_obstacles_have_their_names_and_sizes():
     assert found["hurdle 2 mm"] == Conditions.of(ground="hurdle", ground_height=2.0)
 
 
+@pytest.mark.slow
 @drawing
 def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
     path = save_recording(record(walked("step"), 0).isel(step=slice(600, 640)), tmp_path / "recording.nc")

@@ -107,6 +107,7 @@ def test_slow_motion_multiplies_the_frames(fallen, tmp_path):
     assert len(read_film(tmp_path / "film.mp4")[0]) == counts[-1]
 
 
+@pytest.mark.slow
 @drawing
 def test_a_film_of_two_has_them_side_by_side_with_one_clock(walked, plan, fallen, tmp_path):
     film = Film(slow_motion=2.0, width=320, height=240)

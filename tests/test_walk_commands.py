@@ -91,6 +91,7 @@ def test_controllers_that_are_called_as_what_stands_beside_them_are_refused(run,
     assert (code, error) == (2, f"hexmj: a controller has the name {name!r}, which the results need; rename it\n")
 
 
+@pytest.mark.slow
 def test_physical_flss(run, tmp_path):
     words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--window", "start"]
     code, text, _ = run(*words, "--json", "--out", tmp_path)
