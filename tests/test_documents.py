@@ -84,8 +84,8 @@ SHORT = [
 
 @pytest.mark.parametrize("command", few_of(COMMANDS, *SHORT))
 def test_command(command, here, run):
-    """The first in a new process, as it is typed; the others here, where all is imported."""
-    if command == COMMANDS[0]:
+    """The first of each name in a new process, as it is typed; the others here, where all is imported."""
+    if command in FIRST.values():
         subprocess.run([sys.executable, "-m", "hexmj", *command.split()], check=True)
     else:
         code, _, error = run(*command.split())
@@ -147,7 +147,8 @@ def test_parameter_file(tmp_path):
 
 @pytest.mark.parametrize("example", few_of(EXAMPLES, *[one for one in EXAMPLES if one not in LONG_EXAMPLES]))
 def test_example(example, folder, monkeypatch):
-    """As `python examples/NAME.py` runs it, but here, where all is imported; the first in a new process."""
+    """As `python examples/NAME.py` does, but here, where all is imported and warnings are errors; the first in a new
+    process.  That no order of imports matters is held by `test_layers`."""
     monkeypatch.chdir(folder)
     path = str(ROOT / "examples" / f"{example}.py")
     if example == EXAMPLES[0]:

@@ -68,8 +68,8 @@ class Biology(SameStarts):
             Over (speed, quantity, start): `value`, NaN where a start fell or made no whole stride.  Over row, one for
             each of `ANIMALS`: its `name`, `unit`, `at` which speed and whether the animals' figure `depends` on it; our
             `mean` over the starts with its 95 % interval `low`, `high`; the animals' `animal_low`, `animal_high` and
-            their `source`; the `verdict` on our mean alone, and whether it was `built_in`; and how
-            many starts it is of (`walked`).
+            their `source`; the `verdict` on our mean alone, and whether it was `built_in`; and of how many starts
+            it is (`walked`).
         """
         import xarray as xr
 
