@@ -92,7 +92,7 @@ def test_real_time(measure, settled, n_starts):
     """Simulated over real time, of one insect or the sum over all."""
     some = settled if n_starts > 1 else settle(settled.starts[:1])
     duration = DURATION if n_starts > 1 else 50 * DURATION
-    amount = n_starts * duration / some.stride.dt * some.conditions.time.seconds(some.stride)
+    amount = n_starts * duration / some.stride.dt * some.conditions.seconds(some.stride)
     what = f"walking, {n_starts} insect{'s' if n_starts > 1 else ''}"
     measure(lambda: physical_outcomes(some, LDVS, VELOCITY, duration), what, amount=amount, unit="times real time")
 

@@ -161,7 +161,7 @@ def physical_steps(work: Work, result: "xr.Dataset") -> float:
     """Physics steps while the starts settle, and up to the falls or the end."""
     conditions, stride = Conditions(), Stride()
     walked = np.minimum(result.fall, work.t).values.sum() / stride.dt * conditions.substeps(stride)
-    settling = conditions.numerics.settling_time / 1000.0
+    settling = conditions.settling_time / 1000.0
     return float(walked + work.starts * round(settling / conditions.timestep(stride)))
 
 

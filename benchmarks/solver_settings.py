@@ -52,10 +52,10 @@ def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
     for name, options in OPTIONS.items():
         yield name, with_model(settled, **options)
     yield "pairs searched for", with_model(settled, searched=True)
-    coarse = with_model(settled, timestep=settled.conditions.time.seconds(settled.stride))
+    coarse = with_model(settled, timestep=settled.conditions.seconds(settled.stride))
     yield "time step x 2", replace(coarse, conditions=_Coarse())
-    yield "time step / 2", settle(starts, Conditions.of(longest_substep=0.3125))
-    yield FINEST, settle(starts, Conditions.of(longest_substep=0.15625))
+    yield "time step / 2", settle(starts, Conditions(longest_substep=0.3125))
+    yield FINEST, settle(starts, Conditions(longest_substep=0.15625))
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class Feeler:
 
 if __name__ == "__main__":
     for height in (0.0, 2.0, 4.0):
-        ground = hexmj.Conditions.of(ground="step", ground_height=height) if height else hexmj.Conditions()
+        ground = hexmj.Conditions(ground="step", ground_height=height) if height else hexmj.Conditions()
         result = hexmj.compare(
             {"feeler": Feeler(), "ldvs": hexmj.LDVS}, [0.5], n_starts=6, window=150.0, conditions=ground
         )

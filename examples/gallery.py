@@ -20,10 +20,10 @@ WIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=2.0)
 GAITS = ("graham", "walknet-reacog", "own-0.5")
 
 
-def walked(name: str, velocity: float, duration: float, start: int = 0, **conditions: object) -> Dataset:
+def walked(name: str, velocity: float, duration: float, start: int = 0, **conditions: Any) -> Dataset:
     """One start of seed 0 in physics, recorded."""
     starts = hexmj.draw_starts(start + 1, seed=0)[start:]
-    how = hexmj.Conditions.of(**conditions)
+    how = hexmj.Conditions(**conditions)
     walk = hexmj.physical_walk(starts, hexmj.load_controller(name), velocity, duration, conditions=how)
     return hexmj.record(walk, title=name)
 

@@ -6,7 +6,7 @@ import hexmj
 
 starts = hexmj.draw_starts(10, seed=0)  # (start, leg), mm
 plan = hexmj.walk(starts, hexmj.LDVS, velocity=0.5, duration=100.0)
-body = hexmj.physical_walk(starts, hexmj.LDVS, velocity=0.5, duration=100.0, conditions=hexmj.Conditions.of(vp=80.0))
+body = hexmj.physical_walk(starts, hexmj.LDVS, velocity=0.5, duration=100.0, conditions=hexmj.Conditions(vp=80.0))
 
 lost, fell = hexmj.loss_time(plan), body.outcomes.fall
 margin = np.nanmin(hexmj.walk_margin(body.measured), axis=0)

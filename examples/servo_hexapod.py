@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 import hexmj
-from hexmj.bodies.description import Servo
+from hexmj.body import Servo
 from hexmj.controllers import Controller, Plan, ReadingPlan
 from hexmj.legs import LEGS, SIDE, Geometry
 
@@ -115,7 +115,7 @@ def robot(folder: Path) -> hexmj.Body:
 def conditions(body: hexmj.Body, vp: float) -> hexmj.Conditions:
     """How the robot lifts its feet, 40 mm high, and how fast it swings them [mm/s]."""
     path = {"standing_height": HIGH, "step_height": 10 * LARGER, "lift_time": 40.0, "landing_time": 40.0}
-    return hexmj.Conditions.of(body=body, vp=vp, longest_substep=1.0, **path)
+    return hexmj.Conditions(body=body, vp=vp, longest_substep=1.0, **path)
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,7 @@ def main(n_starts: int = 40) -> None:
     body = robot(out)
     walks = {
         "stick insect": {
-            vp: {"controllers": hexmj.LDVS, "conditions": hexmj.Conditions.of(vp=vp)}
-            for vp in (20.0, 40.0, 80.0, 160.0)
+            vp: {"controllers": hexmj.LDVS, "conditions": hexmj.Conditions(vp=vp)} for vp in (20.0, 40.0, 80.0, 160.0)
         },
         "servo hexapod": {
             vp: {"controllers": Larger(), "stride": STRIDE, "conditions": conditions(body, vp)}

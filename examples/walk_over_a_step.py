@@ -8,7 +8,7 @@ import hexmj
 
 HEIGHT = 3.0  # mm
 starts = hexmj.draw_starts(4, seed=0)
-conditions = hexmj.Conditions.of(ground="step", ground_height=HEIGHT, ground_at=60.0)
+conditions = hexmj.Conditions(ground="step", ground_height=HEIGHT, ground_at=60.0)
 walked = hexmj.physical_walk(starts, hexmj.LDVS, velocity=0.4, duration=300.0, conditions=conditions)
 
 fell = np.isfinite(walked.outcomes.fall)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from hexmj import environments as environments
     from hexmj import gaits as gaits
     from hexmj import sweeps as sweeps
-    from hexmj.bodies.description import Body as Body
-    from hexmj.bodies.stick_insect import STICK_INSECT as STICK_INSECT
+    from hexmj.body import STICK_INSECT as STICK_INSECT
+    from hexmj.body import Body as Body
     from hexmj.conditions import Conditions as Conditions
     from hexmj.controllers.cruse1998 import HWS as HWS
     from hexmj.controllers.cruse1998 import LDVS as LDVS
@@ -68,8 +68,7 @@ if TYPE_CHECKING:
     from hexmj.walks import Walk as Walk
 
 _MODULES = {
-    "bodies.description": ("Body",),
-    "bodies.stick_insect": ("STICK_INSECT",),
+    "body": ("STICK_INSECT", "Body"),
     "conditions": ("Conditions",),
     "controllers.cruse1998": ("HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Symmetric", "Weights"),
     "controllers.named": ("load_controller",),

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import Body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 
 NAMES = ("name", "text", "paths", "nnames", "nbuffer")
@@ -18,7 +17,7 @@ NAMES = ("name", "text", "paths", "nnames", "nbuffer")
 
 def conditions(body: Body = STICK_INSECT, **values: Any) -> Conditions:
     """The usual conditions of a body but for some."""
-    return Conditions.of(body=body, **values)
+    return Conditions(body=body, **values)
 
 
 def arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:

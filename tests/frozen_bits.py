@@ -60,7 +60,7 @@ def compared_with_feedback(seed: int) -> Arrays:
 
 
 def other_conditions(seed: int) -> Arrays:
-    conditions = hexmj.Conditions.of(
+    conditions = hexmj.Conditions(
         vp=200.0, friction=0.5, load=1.0, leg_mass=0.5, centre_of_mass=2.0, grasp=0.5, standing_height=11.0,
         step_height=9.0, lift_time=10.0, landing_time=15.0, contact_gap=5.0, longest_substep=0.3,
     )  # fmt: skip

@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import kinematics
-from hexmj.bodies.description import Body, Leg
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body, Leg
 from hexmj.legs import LEGS, SIDE
 
 

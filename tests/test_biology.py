@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.controllers.checked_plans import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.drive import drive
@@ -130,7 +130,7 @@ def test_quantities_agree_with_each_other_and_with_the_plan(walking):
 
 def test_work_is_of_the_insects_own_mass_whatever_it_carries(walking):
     strides, compiled = walking[0][min(walking[0])], settle(draw_starts(1, 0)).compiled
-    carrying = replace(compiled, conditions=Conditions.of(load=1.0))
+    carrying = replace(compiled, conditions=Conditions(load=1.0))
     alone, together = (quantities(strides, one) for one in (compiled, carrying))
     name = "work on the centre of mass"
     assert together.pop(name) == 2.0 * alone.pop(name)
@@ -181,7 +181,7 @@ def test_a_leg_that_is_lifted_in_the_first_row_begins_its_strides_with_the_next(
 @pytest.mark.parametrize("vp", few_of([80.0, 500.0, 800.0], 800.0))
 def test_swings_are_told_from_hops_however_fast_legs_are(vp):
     """Swings of 24 ms at V_p = 800 mm/s are shorter than what is a hop at 80."""
-    settled, period = settle(draw_starts(2, 0)[:1], Conditions.of(vp=vp)), float(Stride().periods(24.0 / vp))
+    settled, period = settle(draw_starts(2, 0)[:1], Conditions(vp=vp)), float(Stride().periods(24.0 / vp))
     ((_, strides),) = last_strides(settled, LDVS, 24.0 / vp, 8 * period, 3 * period)
     told = quantities(strides, settled.compiled)
     assert told["period"] == pytest.approx(period / vp, rel=0.05)
@@ -191,7 +191,7 @@ def test_swings_are_told_from_hops_however_fast_legs_are(vp):
 
 def test_heights_are_those_above_the_ground_that_is_walked_on(walking):
     """All legs are on the step long before the strides that count."""
-    on_step = settle(draw_starts(3, 0), Conditions.of(ground="step", ground_at=45.0, ground_height=3.0))
+    on_step = settle(draw_starts(3, 0), Conditions(ground="step", ground_at=45.0, ground_height=3.0))
     strides = dict(last_strides(on_step, LDVS, 0.3, 6 * PERIOD, 2 * PERIOD))
     for one in strides.values():
         told, flat = quantities(one, on_step.compiled), walking[1][0]
@@ -203,7 +203,7 @@ def test_heights_are_those_above_the_ground_that_is_walked_on(walking):
 
 def test_heights_over_a_gap_are_those_beside_it(walking):
     strides, told = walking
-    gap = settle(draw_starts(1, 0), Conditions.of(ground="gap", ground_at=45.0, ground_length=1000.0)).compiled
+    gap = settle(draw_starts(1, 0), Conditions(ground="gap", ground_at=45.0, ground_length=1000.0)).compiled
     assert strides[0].qpos[:, 0].max() > 45.0
     assert quantities(strides[0], gap) == told[0]
 
@@ -327,9 +327,9 @@ def test_threads_change_no_bit(falling):
     ("wrong", "said"),
     [
         ({"periods": 3}, "periods = 3"),
-        ({"conditions": Conditions.of(vp=38.0)}, "vp = 38.0; expected more than 38 mm/s"),
-        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0"),
-        ({"conditions": Conditions.of(ground="rough")}, "ground = rough; expected flat"),
+        ({"conditions": Conditions(vp=38.0)}, "vp = 38.0; expected more than 38 mm/s"),
+        ({"conditions": Conditions(grasp=1.0)}, "grasp = 1.0; expected 0"),
+        ({"conditions": Conditions(ground="rough")}, "ground = rough; expected flat"),
         ({"n_starts": 0}, "at least 1"),
     ],
 )

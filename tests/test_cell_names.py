@@ -151,7 +151,7 @@ def test_the_package_knows_its_own_reach() -> None:
 
 @pytest.mark.parametrize(
     ("module", "file"),
-    [("controllers.cruse1998.presets", presets.OWN), ("bodies.stick_insect", hexmj.STICK_INSECT.mjcf)],
+    [("controllers.cruse1998.presets", presets.OWN), ("body", hexmj.STICK_INSECT.mjcf)],
 )
 def test_the_packages_own_data_count(module: str, file: Path) -> None:
     made = code(frozenset({f"hexmj.{module}"}))

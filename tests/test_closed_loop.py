@@ -98,14 +98,14 @@ def test_mirrored_starts_give_mirrored_walks():
 
 def test_a_push_is_that_of_the_open_loop():
     """Without friction the insect moves aside by impulse over mass, though the network's steps come one by one."""
-    conditions = hexmj.Conditions.of(friction=0.0)
+    conditions = hexmj.Conditions(friction=0.0)
     settled, standing = settle(hexmj.draw_starts(2, 0), conditions), hexmj.ReadsLegs(UNCOORDINATED)
     still, speed = (settled.starts, np.zeros(2), STRIDE), []
     for impulse in (0.0, 30.0):
         push = Push(np.array([impulse, -impulse]), np.array([2.0, 2.0]))
         planned = standing.begin(*still).advance(80)
         path = physical_walk_of_plan(settled, standing.begin(*still), planned, push=push).centre_of_mass[:, :, 1]
-        speed.append((path[-1] - path[-21]) / 20 / conditions.time.seconds(STRIDE))  # mm/s
+        speed.append((path[-1] - path[-21]) / 20 / conditions.seconds(STRIDE))  # mm/s
     assert_allclose((speed[1] - speed[0]) * conditions.body.mass, [30.0, -30.0], rtol=0.02)
 
 

@@ -74,7 +74,7 @@ def test_starts_settle_once(monkeypatch):
     monkeypatch.setattr(outcome_table, "settle", lambda *given: (settled.append(given), settle(*given))[1])
     compare(BOTH, [0.4, 0.6], **FEW)
     assert len(settled) == 1
-    compare(BOTH, [0.4], **FEW, conditions=Conditions.of(load=0.5))
+    compare(BOTH, [0.4], **FEW, conditions=Conditions(load=0.5))
     assert len(settled) == 2
 
 

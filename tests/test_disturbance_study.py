@@ -156,7 +156,7 @@ def test_windows_that_hold_no_push_or_recovery_are_refused_before_the_work():
     with pytest.raises(InputError, match=r"recovery: V and the window after it take .* units; expected at most 1e\+06"):
         study(recovery=slow)
     study(recovery=slow, strategies=["grasp"])
-    firm = Conditions.of(grasp=3.0)
+    firm = Conditions(grasp=3.0)
     with pytest.raises(InputError, match="grasp = 3; expected 0, since the strategy 'grasp' has its own, adhesion"):
         study(conditions=firm, strategies=["grasp"])
     study(conditions=firm, strategies=["reorganise"])

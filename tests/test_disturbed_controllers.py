@@ -65,7 +65,7 @@ class MadeForHalf(Lifts):
 
     def begin_at_speed(self, *given: Any, **how: Any) -> Any:
         plan = Lifts.begin_at_speed(self, *given, **how)
-        plan.made_for = Conditions.of(vp=40.0)
+        plan.made_for = Conditions(vp=40.0)
         return plan
 
 

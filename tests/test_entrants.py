@@ -82,11 +82,11 @@ def test_controllers_of_files_have_short_names_and_all_different_ones(tmp_path: 
     [
         (lambda: League({"ldvs": hexmj.LDVS}), "entrants\\['ldvs'\\] = .* expected an Entrant"),  # pyright: ignore
         (
-            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions.of(load=2.0)),
+            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions(load=2.0)),
             "load = 2.0; expected 0.0, since",
         ),
         (
-            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions.of(ground="step")),
+            lambda: League(entrants(("ldvs",)), conditions=hexmj.Conditions(ground="step")),
             "ground = 'step'; expected",
         ),
         (lambda: League(entrants(("ldvs",)), periods=0), "periods = 0; expected a whole number of at least 12"),

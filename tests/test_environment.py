@@ -14,7 +14,7 @@ from dm_env.test_utils import EnvironmentTestMixin
 
 from drawing import drawing
 from episodes import KINDS, ZEROS, episode
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.environments import dm
 from hexmj.errors import InputError, SimulationError
@@ -74,7 +74,7 @@ def test_physics_is_reached_by_names():
     named = walking.physics.named.data
     assert named.qpos["L1_thorax_coxa"] == step.observation["joint_angles"][0]
     assert named.qpos["R3_femur_tibia"] == step.observation["joint_angles"][17]
-    assert walking.control_timestep() == pytest.approx(Stride().dt / Conditions().time.vp)
+    assert walking.control_timestep() == pytest.approx(Stride().dt / Conditions().vp)
     for _ in range(200):
         walking.step(step.observation["joint_angles"])
     weight = 9810 * walking.physics.model.body_mass.sum()
@@ -137,7 +137,7 @@ def test_offsets_move_the_feet():
 
 
 def test_an_episode_ends_with_the_ground():
-    walking = dm.load(conditions=Conditions.of(ground="gap", ground_length=4.0), actions="tips")
+    walking = dm.load(conditions=Conditions(ground="gap", ground_length=4.0), actions="tips")
     walking.reset()
     assert walking.step(ZEROS).mid()
     walking.physics.data.qpos[1] = 1000.0
@@ -157,7 +157,7 @@ def test_divergence_raises():
 
 
 def test_no_step_follows_a_start_that_did_not_settle():
-    walking = dm.load(actions="tips", conditions=Conditions.of(centre_of_mass=-8.0), seed=1)
+    walking = dm.load(actions="tips", conditions=Conditions(centre_of_mass=-8.0), seed=1)
     with pytest.raises(SimulationError, match="did not settle"):
         walking.reset()
     with pytest.raises(InputError, match="a reset that failed"):

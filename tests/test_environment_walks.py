@@ -60,10 +60,10 @@ def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
 @pytest.mark.parametrize(
     ("controller", "conditions", "stride"),
     [
-        (HWS, Conditions.of(vp=200.0, friction=0.5), Stride()),
-        (HWS, Conditions.of(vp=40.0, standing_height=12.0), Stride(dt=0.5, geometry=CENTRED)),
+        (HWS, Conditions(vp=200.0, friction=0.5), Stride()),
+        (HWS, Conditions(vp=40.0, standing_height=12.0), Stride(dt=0.5, geometry=CENTRED)),
         (ReadsLegs(LDVS), Conditions(), Stride()),
-        (ReadsLegs(HWS), Conditions.of(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
+        (ReadsLegs(HWS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
     ],
     ids=["slippery", "slow and centred", "reads the legs", "reads the legs, loaded"],
 )

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
@@ -46,11 +46,11 @@ def test_more_grasp_than_the_contacts_can_hold_is_refused(grasp: float):
         rf"grasp = {grasp:g}; expected at most about 10: it presses feet .* mm into the ground at rest, more than 0\.1"
     )
     with pytest.raises(InputError, match=said):
-        settle(draw_starts(12, 0), Conditions.of(grasp=grasp))
+        settle(draw_starts(12, 0), Conditions(grasp=grasp))
 
 
 def test_as_much_grasp_as_the_contacts_can_hold_keeps_the_insect_on_the_ground():
-    settled = settle(draw_starts(12, 0), Conditions.of(grasp=9.5))
+    settled = settle(draw_starts(12, 0), Conditions(grasp=9.5))
     speed = np.concatenate([np.diff(one.qpos[:, :, 2], axis=1).ravel() for one in walked(settled)])
     assert np.abs(speed).max() / settled.compiled.model.opt.timestep < 100.0
 
@@ -126,7 +126,7 @@ def test_an_insect_that_a_push_still_throws_as_the_window_ends_is_no_outcome():
 def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duration: float = 80.0) -> Outcomes:
     """Of starts pushed at 20 time units, in multiples of m V_p."""
     settled = settle(draw_starts(24, 5), conditions)
-    pushed = Push(np.full(24, push * conditions.time.vp), np.full(24, 20.0))
+    pushed = Push(np.full(24, push * conditions.vp), np.full(24, 20.0))
     plan = begin(LDVS, settled.starts, velocity, settled.stride)
     return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), push=pushed)
 
@@ -142,7 +142,7 @@ def test_an_insect_tipped_over_by_a_push_fell(push: float):
 @pytest.mark.slow
 def test_an_insect_that_tumbles_down_fell():
     """Into a gap; some land on their backs."""
-    found = outcomes(Conditions.of(ground="gap", standing_height=12.0, ground_at=45.0), 0.7, duration=150.0)
+    found = outcomes(Conditions(ground="gap", standing_height=12.0, ground_at=45.0), 0.7, duration=150.0)
     assert np.isfinite(found.fall).mean() > 0.9
     assert (found.tilt > pi / 2).any()
 
@@ -169,7 +169,7 @@ def test_the_state_of_a_walk_that_cannot_be_measured_is_its_start(tmp_path):
 
 def test_a_state_of_a_body_with_bounds_of_its_own_is_replayed(tmp_path):
     body = replace(STICK_INSECT, name="high", lengths=replace(STICK_INSECT.lengths, highest_lift=20.0))
-    settled = settle(draw_starts(1, 0), Conditions(body=body).but(step_height=15.0))
+    settled = settle(draw_starts(1, 0), Conditions(body=body, step_height=15.0))
     error = walk_error(Diverged(0, "thrown", settled.saved(0)), "walking", 0.0, settled.conditions)
     assert len(divergence.replayed(divergence.save_state(error, tmp_path), body)) == settled.substeps
 
@@ -186,9 +186,9 @@ def test_a_state_that_diverged_says_so_again(tmp_path, capsys):
 @pytest.mark.parametrize("height", [0.0001, 0.099])
 def test_bumps_so_flat_that_a_foot_stands_on_dozens_are_refused(height: float):
     with pytest.raises(InputError, match=f"ground_height = {height}; expected 0.1 to 8 mm where rough"):
-        Conditions.of(ground="rough", ground_height=height)
-    assert Conditions.of(ground="rough", ground_height=0.1).ground.top == 0.1
-    assert Conditions.of(ground="step", ground_height=height).ground.top == height
+        Conditions(ground="rough", ground_height=height)
+    assert Conditions(ground="rough", ground_height=0.1).highest_ground == 0.1
+    assert Conditions(ground="step", ground_height=height).highest_ground == height
 
 
 def test_pushes_that_throw_the_insect_high_up_are_refused():

@@ -13,7 +13,7 @@ from hexmj.errors import InputError, SimulationError
 from tests.episodes import assert_same, some_actions
 
 TIPS: dict[str, Any] = {"actions": "tips"}
-TILTING: dict[str, Any] = TIPS | {"conditions": Conditions.of(centre_of_mass=-8.0)}
+TILTING: dict[str, Any] = TIPS | {"conditions": Conditions(centre_of_mass=-8.0)}
 """Not every start settles."""
 
 

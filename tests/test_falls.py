@@ -35,7 +35,7 @@ def test_a_walk_that_is_caught_nose_down_does_not_fall_but_topples():
 
     Start 1 touches the ground 7 degrees nose-up, as most that fall do.
     """
-    walk = physical_walk(draw_starts(100, 0)[[28, 1]], LDVS, 0.5, 45.0, conditions=Conditions.of(vp=20.0))
+    walk = physical_walk(draw_starts(100, 0)[[28, 1]], LDVS, 0.5, 45.0, conditions=Conditions(vp=20.0))
     leans, tilt = lean(walk.qpos[..., 3:7])
     furthest = np.degrees(leans[np.nanargmax(tilt, axis=0), [0, 1]])
     assert furthest[0] == pytest.approx([15.1, 13.3], abs=1.0)

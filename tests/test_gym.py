@@ -119,7 +119,7 @@ def test_the_dm_env_face_passes_them_by_shimmy(actions):
     ("controller", "conditions", "stride"),
     [
         (LDVS, Conditions(), Stride()),
-        (hexmj.ReadsLegs(LDVS), Conditions.of(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
+        (hexmj.ReadsLegs(LDVS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
     ],
     ids=["as usual", "reads the legs, loaded"],
 )

@@ -6,9 +6,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import JOINTS, PARTS, STICK_INSECT
+from hexmj.body import JOINTS, PARTS, ROOT_QPOS, STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.legs import FIG1, LEGS, MIRROR
 
@@ -246,6 +245,6 @@ def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):
 
 
 def test_feet_grasp_with_the_force_asked_for():
-    grasping = compile_body(Conditions.of(grasp=2.0))
+    grasping = compile_body(Conditions(grasp=2.0))
     assert grasping.model.nu == len(STICK_INSECT.joints) + 6
     assert_allclose(grasping.model.actuator_gainprm[grasping.columns.grasp, 0], 2.0 * 9810.0)

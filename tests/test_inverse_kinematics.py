@@ -9,11 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
 from hexmj.bodies.compiled import kinematics
-from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.loading import plain_model
 from hexmj.bodies.numeric import HingeChains, hinge_chains
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.legs import FIG1, LEGS, MIRROR
 from other_bodies import any_hexapod
 

@@ -21,7 +21,7 @@ FLOORS = (
     ("starts",),
     ("controllers",),
     ("gaits", "measures.frequency", "measures.kinematic", "measures.velocities", "variants"),
-    ("bodies.description", "bodies.stick_insect", "conditions"),
+    ("body", "body", "conditions"),
     ("bodies",),
     ("physics",),
     ("measures", "rendering"),
@@ -128,7 +128,7 @@ def test_no_two_files_import_each_other():
     [
         ("starts", "from hexmj.conditions import Conditions"),
         ("sweeps.grid", "from hexmj.timing import Stride"),
-        ("bodies.description", "from hexmj.bodies import loading"),
+        ("body", "from hexmj.bodies import loading"),
         ("measures.kinematic", "def later():\n    import hexmj.measures.physical"),
         ("physics.drive", "from hexmj import compare"),
     ],

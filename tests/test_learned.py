@@ -77,7 +77,7 @@ def test_offsets_keep_to_where_legs_step(part):
 @pytest.mark.parametrize("values", [{}, {"step_height": 8.0, "lift_time": 40.0, "standing_height": 12.0}, {"vp": 40.0}])
 def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
     """Heights come in evenly over a step, so not to the last bit."""
-    conditions, still = Conditions.of(**values), example("train_cma").Reflexes()
+    conditions, still = Conditions(**values), example("train_cma").Reflexes()
     walks = [
         hexmj.physical_walk(hexmj.draw_starts(1, 3), one, 0.3, 10.0, conditions=conditions, threads=1)
         for one in (WithOffsets(still, conditions=conditions), hexmj.LDVS)
@@ -87,7 +87,7 @@ def test_no_offsets_walk_nearly_as_the_controller_does(example, values):
 
 def test_a_policy_around_another_is_of_its_conditions(example):
     policy = example("train_cma").Reflexes()
-    outer = WithOffsets(policy, controller=WithOffsets(policy), conditions=Conditions.of(vp=40.0))
+    outer = WithOffsets(policy, controller=WithOffsets(policy), conditions=Conditions(vp=40.0))
     with pytest.raises(InputError, match=r"the plan is made for vp = 80\.0; expected that of the conditions, 40\.0"):
         hexmj.physical_walk(hexmj.draw_starts(1, 3), outer, 0.3, 1.0, conditions=outer.conditions)
     live = LiveWalk(outer.controller, 0.3, hexmj.draw_starts(1, 3)[0])
@@ -102,7 +102,7 @@ def test_a_policy_around_another_is_of_its_conditions(example):
     ("values", "told"), [({"step_height": 8.0}, "step_height = 12.0; .* 8.0"), ({"vp": 40.0}, "vp = 80.0; .* 40.0")]
 )
 def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values, told):
-    conditions, still = Conditions.of(**values), WithOffsets(example("train_cma").Reflexes())
+    conditions, still = Conditions(**values), WithOffsets(example("train_cma").Reflexes())
     for one in (still, LegLost(still, 2), PoorSenses(still)):
         with pytest.raises(InputError, match=f"the plan is made for {told}"):
             hexmj.physical_walk(hexmj.draw_starts(1, 3), one, 0.3, 1.0, conditions=conditions)
@@ -111,8 +111,8 @@ def test_a_walk_under_conditions_that_it_was_not_told_is_refused(example, values
     body = hexmj.STICK_INSECT
     other = replace(body, lengths=replace(body.lengths, largest_tip_offset=1.0))
     with pytest.raises(InputError, match="the plan is made for another body that is called stick_insect"):
-        hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(body=other))
-    hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions.of(load=1.0))
+        hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions(body=other))
+    hexmj.physical_walk(hexmj.draw_starts(1, 3), still, 0.3, 1.0, conditions=Conditions(load=1.0))
 
 
 @dataclass(frozen=True)

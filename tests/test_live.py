@@ -215,7 +215,7 @@ def test_a_push_moves_the_insect_to_its_side():
 def test_other_conditions_begin_again():
     live = begun()
     live.advance(0.1)
-    live.begin(conditions=Conditions.of(vp=160.0))
+    live.begin(conditions=Conditions(vp=160.0))
     assert live.moment.seconds < 0.01
     live.advance(0.1)
     assert live.moment.qpos[0] > 3.0

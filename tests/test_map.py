@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hexmj import LDVS, Conditions, InputError, ReadsLegs, Stride, compare
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
 from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
@@ -35,7 +35,7 @@ def result(folder):
 @pytest.mark.slow
 def test_cells_are_those_of_the_comparison(result):
     for vp in result.value.values:
-        alone = compare(LDVS, [0.5, 0.7], n_starts=12, window=60.0, conditions=Conditions.of(vp=vp)).isel(controller=0)
+        alone = compare(LDVS, [0.5, 0.7], n_starts=12, window=60.0, conditions=Conditions(vp=vp)).isel(controller=0)
         for name in ("planned_loss", "measured_loss", "fall", "tilt", "kinematic", "physical", "physical_high"):
             assert np.array_equal(result[name].sel(value=vp).values, alone[name].values), name
 
@@ -126,17 +126,17 @@ def test_the_body_as_it_is_now_decides_which_starts_stand(tmp_path):
 
 def test_the_froude_number_is_one_where_weight_only_just_holds_the_arc():
     vp = np.sqrt(9810.0 * 10.0) / 0.5
-    assert_allclose(froude(Conditions.of(vp=vp, standing_height=10.0), np.array([0.5])), 1.0)
-    slow, fast = (froude(Conditions.of(vp=vp), np.array([0.3])) for vp in (80.0, 160.0))
+    assert_allclose(froude(Conditions(vp=vp, standing_height=10.0), np.array([0.5])), 1.0)
+    slow, fast = (froude(Conditions(vp=vp), np.array([0.3])) for vp in (80.0, 160.0))
     assert_allclose(fast, 4 * slow)
 
 
 def test_the_values_of_every_condition_make_sense():
     for name, condition in CONDITIONS.items():
-        assert Conditions().flat()[name] in condition.values
+        assert Conditions().values()[name] in condition.values
         assert sorted(condition.values) == list(condition.values)
         for value in condition.values:
-            assert Conditions.of(**{name: value}).flat()[name] == value
+            assert Conditions(**{name: value}).values()[name] == value
     assert set(FLSS) == {"kinematic", "measured", "physical", "toppled", "static"}
 
 
@@ -152,7 +152,7 @@ def test_the_values_of_every_condition_make_sense():
         ("vp", {"window": "long"}, "valid names: walk, start"),
         (
             "vp",
-            {"conditions": Conditions.of(vp=20.0)},
+            {"conditions": Conditions(vp=20.0)},
             "vp = 20.0; expected 80.0: values has all that are tried",
         ),
         ("vp", {"controller": ReadsLegs(LDVS)}, "reads the legs; expected a controller that does not"),

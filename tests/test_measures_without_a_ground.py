@@ -37,9 +37,9 @@ def test_a_measure_that_no_walk_would_obey_is_a_sentence(name: str):
     with pytest.raises(
         InputError, match=r"^ground_height = 6\.0 with ground = flat; expected it with a ground that has"
     ):
-        TAKES[name](Conditions.of(ground_height=6.0))
+        TAKES[name](Conditions(ground_height=6.0))
 
 
 def test_the_league_s_trials_have_their_own():
     with pytest.raises(InputError, match=r"^ground_at = 60\.0; expected 50\.0, since trials have their own"):
-        League(entrants(("ldvs",)), conditions=Conditions.of(ground_at=60.0))
+        League(entrants(("ldvs",)), conditions=Conditions(ground_at=60.0))

@@ -29,7 +29,7 @@ def sensors(settled, touch):
 def test_a_foot_stands_for_the_gap_after_it_was_last_carried(gap, stands):
     """The gap is told in physics steps; the foot is carried in the first of them, and never again."""
     milliseconds = gap * settle(draw_starts(1, 0)).compiled.model.opt.timestep * 1000.0
-    settled = settle(draw_starts(1, 0), Conditions.of(contact_gap=milliseconds))
+    settled = settle(draw_starts(1, 0), Conditions(contact_gap=milliseconds))
     touch = np.zeros((1, 5, 6))
     touch[:, 0] = 0.1
     senses, force = Senses(settled), np.zeros((1, 5, settled.compiled.joints))
@@ -43,7 +43,7 @@ def test_a_foot_stands_for_the_gap_after_it_was_last_carried(gap, stands):
     [({"contact_gap": 15.0, "vp": 120.0}, 36), ({"contact_gap": 15.0, "longest_substep": 0.5}, 36)],
 )
 def test_a_gap_of_whole_physics_steps_lasts_for_all_of_them(conditions, substeps):
-    settled = settle(draw_starts(1, 0), Conditions.of(**conditions))
+    settled = settle(draw_starts(1, 0), Conditions(**conditions))
     touch = np.zeros((1, substeps + 9, 6))
     touch[:, 0] = 0.1
     still = np.zeros((1, 1, settled.compiled.joints))
@@ -54,7 +54,7 @@ def test_a_gap_of_whole_physics_steps_lasts_for_all_of_them(conditions, substeps
 @pytest.mark.slow
 def test_adhesion_is_no_load_where_a_foot_touches():
     """Below 0 where it holds a foot that pulls, and the foot stands; above the ground it holds nothing."""
-    settled = settle(draw_starts(1, 0), Conditions.of(grasp=1.0))
+    settled = settle(draw_starts(1, 0), Conditions(grasp=1.0))
     touch, force = np.array([[[30.0, 10.0, 0.0, 20.0, 5.0, 0.0]]]), np.full((1, 1, settled.compiled.model.nu), 20.0)
     standing, load = Senses(settled).feel(np.array([0]), sensors(settled, touch), force)
     assert load.tolist() == [[[10.0, -10.0, 0.0, 0.0, -15.0, 0.0]]]

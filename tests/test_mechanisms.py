@@ -21,7 +21,7 @@ STEPS, LOST, LANDED, END = 300, 100, 140, 200  # of 1.25 ms; END is that of a fa
 
 @pytest.fixture(scope="module", params=[80.0, 320.0])
 def walked(request):
-    return physical_walk(draw_starts(24, 0), LDVS, 0.7, 80.0, conditions=Conditions.of(vp=request.param))
+    return physical_walk(draw_starts(24, 0), LDVS, 0.7, 80.0, conditions=Conditions(vp=request.param))
 
 
 def staged(*, fall: bool = False, lean: dict[int, tuple[float, float]] | None = None, **stands: slice) -> PhysicalWalk:
@@ -154,7 +154,7 @@ SEEN = {  # V and V_p -> start -> its name, and how the trunk leans one after th
 def test_names_are_true_of_walks_that_were_looked_at(how):
     """Step by step: leans, feet, loads and margins; `unplanned` is the only name that no walk was found for."""
     (velocity, vp), starts = how, draw_starts(100, 0)[list(SEEN[how])]
-    walk = physical_walk(starts, LDVS, velocity, 60.0, conditions=Conditions.of(vp=vp))
+    walk = physical_walk(starts, LDVS, velocity, 60.0, conditions=Conditions(vp=vp))
     leans = np.degrees(lean(walk.qpos[..., 3:7])[0])
     names = NAMES[mechanisms(walk)]
     for i, (name, passed) in enumerate(SEEN[how].values()):
@@ -191,7 +191,7 @@ def test_the_static_criterion_sees_the_body_from_its_own_centre_of_mass():
     starts, behind = draw_starts(40, 1), -6.0
     front, middle, hind = FIG1.origins
     moved = Stride(geometry=Geometry(origins=(front - behind, middle - behind, hind - behind)))
-    seen = replace(staged(), planned=walk(starts, LDVS, 0.5, 60.0), conditions=Conditions.of(centre_of_mass=behind))
+    seen = replace(staged(), planned=walk(starts, LDVS, 0.5, 60.0), conditions=Conditions(centre_of_mass=behind))
     losses = loss_time(static_plan(seen))
     assert np.array_equal(losses, first_loss(starts, LDVS, 0.5, 60.0, stride=moved))
     assert np.isfinite(losses).any()

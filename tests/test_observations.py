@@ -5,7 +5,7 @@ import pytest
 from dm_control.rl import control
 
 from episodes import run_steps
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.environments import dm
 
@@ -62,7 +62,7 @@ def test_reward_is_its_formula():
     walking = dm.load(0.25)
     walking.reset()
     task, physics = walking.task, walking.physics
-    command = 0.25 * Conditions().time.vp
+    command = 0.25 * Conditions().vp
     with physics.reset_context():
         physics.data.qpos[2:7] = 20.0, 1.0, 0.0, 0.0, 0.0
     for speed, reward in ((1, 1), (0, 0), (0.5, 0.5), (1.5, 0.5), (2, 0), (3, 0), (-1, 0)):

@@ -13,12 +13,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from compiled_bodies import at_home, conditions, differences
 from film_reader import read_film
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import Body
 from hexmj.bodies.gains import gains, longest_lever
 from hexmj.bodies.hinges import ThreeHinges
 from hexmj.bodies.loading import compile_body, plain_model
 from hexmj.bodies.numeric import HingeChains
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions, Ground
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.reads_legs import ReadsLegs
@@ -190,16 +189,16 @@ def test_a_body_that_the_usual_conditions_do_not_fit_walks_under_its_own():
     own: dict[str, Any] = {"vp": 40.0, "step_height": 6.0, "longest_substep": 0.5}
     for lacking in own:
         with pytest.raises(InputError, match=f"{lacking} = .*; expected above"):
-            Conditions.of(body=body, **{name: value for name, value in own.items() if name != lacking})
-    conditions = Conditions.of(body=body, **own)
-    assert conditions == Conditions().but(body=body, **own)
+            Conditions(body=body, **{name: value for name, value in own.items() if name != lacking})
+    conditions = Conditions(body=body, **own)
+    assert conditions == replace(Conditions(), body=body, **own)
     walked = physical_walk(draw_starts(1, 0), LDVS, 0.5, 5.0, conditions=conditions)
     assert recorded_conditions(record(walked), body) == conditions
 
 
 @pytest.mark.parametrize(("vp", "dt"), [(80.0, 0.55), (3.0, 0.27), (96.0, 0.54), (144.0, 0.81)])
 def test_time_steps_that_are_the_longest_but_for_the_last_bit_are_taken(vp: float, dt: float):
-    conditions = Conditions.of(vp=vp)
+    conditions = Conditions(vp=vp)
     step = conditions.timestep(Stride(dt=dt))
     assert step == pytest.approx(STICK_INSECT.longest_step, rel=1e-12)
     assert compile_body(conditions, step).model.opt.timestep == step

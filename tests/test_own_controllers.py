@@ -118,7 +118,7 @@ def test_uncoupled_oscillators_lose_more():
 def test_a_swing_ends_where_the_foot_meets_the_ground():
     """On a step of 3 mm, which the plan knows nothing of, feet come to stand higher, and the paper's plan does not."""
     feeler, starts = hexmj.load_controller(OWN["feeler"]), hexmj.draw_starts(6, 0)
-    ground = hexmj.Conditions.of(ground="step", ground_height=3.0)
+    ground = hexmj.Conditions(ground="step", ground_height=3.0)
     settled = settle(starts, ground, STRIDE)
     begun = feeler.begin(starts, np.full(6, 0.5), STRIDE)
     told = [chunk.plan for chunk in drive(settled, begun, 120.0)]
@@ -231,10 +231,10 @@ def test_heights_are_honoured(unchanged):
     assert not np.array_equal(walked.qpos, unchanged[0].qpos)
     swings = ~walked.planned.stance
     swung = swings[2:-1] & swings[1:-2] & swings[:-3]  # for three steps, as sensed after them
-    height = tips[3:, ..., 2] + walked.conditions.path.standing_height
+    height = tips[3:, ..., 2] + walked.conditions.standing_height
     assert np.median(height[swung]) == pytest.approx(5.0, abs=0.5)
     assert height[swung].max() < 6.0
-    usual = unchanged[1][3:, ..., 2] + walked.conditions.path.standing_height
+    usual = unchanged[1][3:, ..., 2] + walked.conditions.standing_height
     assert usual[swung].max() > 11.0
     puppet = hexmj.record_plan(walked.planned, walked.conditions, STRIDE)
     up = puppet.planned_tip.values[..., 2] - puppet.qpos.values[:, None, 2]

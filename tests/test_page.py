@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 
 from chromium import Tab, tab
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError
@@ -128,8 +128,8 @@ def test_shapes_are_closed_and_look_outwards():
 
 @pytest.mark.parametrize("ground", ["flat", "step", "gap", "hurdle", "rough"])
 def test_the_ground_is_as_high_as_it_is(ground):
-    shape = ground_shape(compile_body(Conditions.of(ground=ground, ground_height=2.0) if ground != "gap" else
-                                      Conditions.of(ground="gap")))  # fmt: skip
+    shape = ground_shape(compile_body(Conditions(ground=ground, ground_height=2.0) if ground != "gap" else
+                                      Conditions(ground="gap")))  # fmt: skip
     assert (len(shape.faces) > 0) == (ground != "flat")
     if ground in ("step", "hurdle", "rough"):
         assert 0 < shape.corners[:, 2].max() <= 2.0 + 1e-9

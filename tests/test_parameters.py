@@ -158,7 +158,7 @@ def test_weights_off_the_neighbour_sets():
         (lambda: Geometry(origins=(28.0, float("inf"), -20.0)), "expected finite origins"),
         (lambda: Acceleration(start=1.0), r"velocity at the start = 1.0; expected 0 <= V_r\(0\) < 1"),
         (lambda: Acceleration(rate=0.0), "acceleration = 0.0; expected a finite number above 0"),
-        (lambda: Conditions.of(gravity=1.0), "condition 'gravity'; valid names: "),
+        (lambda: Conditions(gravity=1.0), "condition 'gravity'; valid names: "),
         (
             lambda: draw_starts(MOST_DRAWN + 1, 0),
             f"starts = {MOST_DRAWN + 1}; expected at most {MOST_DRAWN} in one array",

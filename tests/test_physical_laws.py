@@ -9,7 +9,7 @@ from mujoco.batch import Batch
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
@@ -97,7 +97,7 @@ def test_mirrored_starts_walk_mirrored_paths():
 @pytest.mark.thorough
 def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
     """`test_physics` has the half of it, over the window `walk`."""
-    conditions = (Conditions.of(longest_substep=ms) for ms in (0.625, 0.15625))
+    conditions = (Conditions(longest_substep=ms) for ms in (0.625, 0.15625))
     whole, quarter = (physical_flss(LDVS, [0.5], n_starts=60, window="start", conditions=one) for one in conditions)
     assert whole.low.item() <= quarter.flss.item() <= whole.high.item()
 
@@ -120,7 +120,7 @@ def heights(settled: Settled, sensors: np.ndarray) -> np.ndarray:
 def test_at_rest_the_feet_carry_the_weight_and_hardly_sink_in(resting):
     force, height = resting
     assert_allclose(force.sum(axis=1), WEIGHT, rtol=0.01)
-    assert -height.min() < 0.02 * Conditions().path.standing_height
+    assert -height.min() < 0.02 * Conditions().standing_height
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +197,7 @@ def test_tracking_is_a_percentile_and_depth_the_most_of_all_feet():
             feet = one.sensors[row, : one.valid[row], columns.foot].reshape(-1, 6, 3)
             turned = qpos[:, None, :3] + rotated(qpos[:, None, 3:7], targets)
             off = np.linalg.norm(feet - turned, axis=2)
-            seen[start].append(off[targets[:, :, 2] == -settled.conditions.path.standing_height])
+            seen[start].append(off[targets[:, :, 2] == -settled.conditions.standing_height])
             until = one.valid[row] - one.fell[row]
             deepest[start] = max(deepest[start], one.depth[row, :until].max())
             shown[start] = max(shown[start], -heights(settled, one.sensors[row, : one.valid[row]]).min())
@@ -223,7 +223,7 @@ def test_feet_beyond_20_mm_from_their_targets_are_infinitely_far(monkeypatch):
 )
 def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
     """Whole walks and plain arrays instead of sums; weak servos and one substep a step, falls, 0.3 mm commanded."""
-    settled, duration = settle(draw_starts(6, 0), Conditions.of(vp=vp)), 30.0
+    settled, duration = settle(draw_starts(6, 0), Conditions(vp=vp)), 30.0
     compiled, m, dt = settled.compiled, settled.substeps, settled.stride.dt
     compiled.model.actuator_forcerange[:] *= strength
     outcomes = physical_outcomes(settled, controller, velocity, duration)
@@ -285,7 +285,7 @@ def test_targets_belong_to_the_state_that_is_shown():
     shown = list(drive(settled, begin(LDVS, settled.starts, 0.0, settled.stride), 2.0))
     targets = np.concatenate([one.targets for one in shown], axis=1)
     assert targets.shape[1] == sum(one.qpos.shape[1] for one in shown)
-    assert (targets[..., 2] == -settled.conditions.path.standing_height).all()
+    assert (targets[..., 2] == -settled.conditions.standing_height).all()
     assert (targets[..., 0] == (settled.starts + settled.stride.geometry.origin)[:, None]).all()
 
 

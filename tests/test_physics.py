@@ -10,7 +10,7 @@ import pytest
 from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
@@ -111,8 +111,7 @@ def test_progress_is_done_where_all_have_fallen():
 def test_every_bounce_counts_without_a_contact_gap():
     """Measured stability is stricter the shorter the gap; what the body does is the same."""
     every, usual = (
-        physical_outcomes(settle(draw_starts(20, 0), Conditions.of(contact_gap=ms)), LDVS, 0.5, 40.0)
-        for ms in (0.0, 10.0)
+        physical_outcomes(settle(draw_starts(20, 0), Conditions(contact_gap=ms)), LDVS, 0.5, 40.0) for ms in (0.0, 10.0)
     )
     assert np.array_equal(every.fall, usual.fall)
     assert (every.measured_loss <= usual.measured_loss).all()
@@ -144,7 +143,7 @@ def test_speed_keeps_to_the_command(hundred):
 @pytest.mark.thorough
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
-    result = compare(LDVS, [0.5], n_starts=100, conditions=Conditions.of(vp=20.0))
+    result = compare(LDVS, [0.5], n_starts=100, conditions=Conditions(vp=20.0))
     assert (abs(result.kinematic - result.physical) <= 0.06).all()
     assert (result.agreement >= 0.88).all()
 
@@ -195,9 +194,9 @@ def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
     with pytest.raises(
         SimulationError, match=r"start 0 did not settle in 1 ms: it still moves at [\d.]+ mm/s; expected at most 5 mm/s"
     ):
-        settle(draw_starts(2, 0), Conditions.of(settling_time=1.0))
+        settle(draw_starts(2, 0), Conditions(settling_time=1.0))
     with pytest.raises(SimulationError, match="its feet carry less than half of its weight"):
-        settle(draw_starts(24, 0), Conditions.of(settling_time=0.01, longest_substep=0.3125))
+        settle(draw_starts(24, 0), Conditions(settling_time=0.01, longest_substep=0.3125))
 
 
 def test_an_insect_that_diverges_as_it_settles_is_an_error(monkeypatch):
@@ -261,7 +260,7 @@ def test_a_roll_is_mujocos_own_steps(settled):
 def test_what_a_body_shows_where_it_stands_is_mujocos_own(settled):
     """Feet, centre of mass and contacts of the trunk, whether it is above the ground, at it, or in it."""
     model, columns, states, rng = settled.compiled.model, settled.compiled.columns, settled.state.copy(), default_rng(0)
-    states[:, 2] += np.linspace(-1.0, 1.0, 24) * settled.conditions.path.standing_height
+    states[:, 2] += np.linspace(-1.0, 1.0, 24) * settled.conditions.standing_height
     states[:, 3:7] = Rotation.from_euler("xyz", rng.normal(0.0, 0.3, (24, 3))).as_quat(scalar_first=True)
     batch, data, ids = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model), np.arange(24)
     batch.stand(ids, states, settled.ctrl)
@@ -279,7 +278,7 @@ def test_what_a_body_shows_where_it_stands_is_mujocos_own(settled):
 def test_a_diverged_state_goes_on_as_it_did(parts, tmp_path, monkeypatch):
     """With the time step, the contacts and the push of its own roll, fine as it may be, and its conditions."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
-    conditions = Conditions.of(load=1.0, grasp=0.5, friction=0.7)
+    conditions = Conditions(load=1.0, grasp=0.5, friction=0.7)
     two = settle(draw_starts(2, 0), conditions)
     batch, ids = MujocoBatch(two.compiled, 2, 1), np.arange(2)
     batch.put(ids, two.state)
@@ -313,14 +312,14 @@ def test_more_starts_than_the_memory_holds_are_refused(tmp_path, monkeypatch):
 
 
 def test_targets_out_of_reach_are_counted():
-    low = Conditions.of(standing_height=7.0, step_height=14.0)
+    low = Conditions(standing_height=7.0, step_height=14.0)
     outcomes = physical_outcomes(settle(draw_starts(4, 0), low), LDVS, 0.5, 40.0)
     assert outcomes.unreachable.sum() > 0
 
 
 def test_legs_out_of_reach_keep_their_last_angles_however_the_plan_is_divided():
     """Chunk by chunk or step by step: the same targets, all numbers, and as many misses."""
-    settled = settle(draw_starts(4, 0), Conditions.of(standing_height=7.0, step_height=14.0))
+    settled = settle(draw_starts(4, 0), Conditions(standing_height=7.0, step_height=14.0))
     plans = [OrdersFromPlan(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 40.0) for _ in range(2)]
     chunks, steps = (
         list(iter(lambda one=one, steps=steps: one.ahead(np.arange(4), steps), None))
@@ -339,7 +338,7 @@ def test_legs_out_of_reach_keep_their_last_angles_however_the_plan_is_divided():
 
 def test_feet_grasp_while_the_plan_lets_them_stand():
     """From the substep on in which a step of the plan begins; the one after the last step is like the last."""
-    settled = settle(draw_starts(3, 0), Conditions.of(grasp=0.5))
+    settled = settle(draw_starts(3, 0), Conditions(grasp=0.5))
     orders = OrdersFromPlan(settled, begin(UNCOORDINATED, settled.starts, 0.5, settled.stride), 12.0)
     ids, m = np.array([2, 0]), settled.substeps
     grasp = np.concatenate([one.control[:, :, 18:] for one in iter(lambda: orders.ahead(ids), None)], axis=1)
@@ -362,7 +361,7 @@ def test_comparison_holds_every_answer():
 @pytest.mark.thorough
 def test_halving_the_physics_step_hardly_changes_physical_flss(hundred):
     """Measured with 200 starts at V = 0.3, 0.5, 0.7: 0.155, 0.365, 0.690 became 0.160, 0.365, 0.695."""
-    assert Conditions().numerics.longest_substep == 0.625
-    fine = physical_flss(LDVS, [0.5], n_starts=50, conditions=Conditions.of(longest_substep=0.3125))
+    assert Conditions().longest_substep == 0.625
+    fine = physical_flss(LDVS, [0.5], n_starts=50, conditions=Conditions(longest_substep=0.3125))
     usual = np.isfinite(hundred.fall.values.squeeze()[:50]).mean()
     assert abs(usual - fine.flss.item()) <= 0.02

@@ -162,7 +162,7 @@ def test_a_setting_that_no_field_tells_is_refused() -> None:
 
 
 def test_a_whole_number_and_the_same_float_are_one_setting() -> None:
-    for one, other in ((Conditions.of(vp=80, load=0), Conditions.of(load=-0.0)), (Stride(aep0=10), Stride())):
+    for one, other in ((Conditions(vp=80, load=0), Conditions(load=-0.0)), (Stride(aep0=10), Stride())):
         assert json.dumps(plain(one)) == json.dumps(plain(other))
 
 

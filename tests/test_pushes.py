@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
@@ -30,7 +30,7 @@ def settled():
 @pytest.mark.parametrize("vp", [80.0, 400.0])
 def test_a_push_gives_the_momentum_asked_for(vp):
     """Without friction the ground holds nothing back: the whole insect moves aside by impulse over mass."""
-    settled = settle(draw_starts(3, 0), Conditions.of(friction=0.0, vp=vp))
+    settled = settle(draw_starts(3, 0), Conditions(friction=0.0, vp=vp))
     speed = []
     for impulse in (0.0, 30.0):
         push = Push(np.array([impulse, -impulse, 0.0]), np.full(3, 2.0))
@@ -81,7 +81,7 @@ def test_a_push_lasts_as_long_whatever_the_physics_step():
     """So standing insects slide as far, by 30 mm; a quarter of the step changes that by 3 %, so by less than 5."""
     slid = []
     for longest in (0.625, 0.15625):
-        settled = settle(draw_starts(3, 0), Conditions.of(longest_substep=longest))
+        settled = settle(draw_starts(3, 0), Conditions(longest_substep=longest))
         push = Push(np.full(3, 800.0), np.full(3, 2.0))
         plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
         *_, last = drive(settled, plan, 8.0, push=push)
@@ -92,7 +92,7 @@ def test_a_push_lasts_as_long_whatever_the_physics_step():
 @pytest.mark.parametrize("vp", [60.0, 100.0])
 def test_a_push_begins_when_told(vp):
     """In whole steps of the plan."""
-    settled = settle(draw_starts(3, 0), Conditions.of(vp=vp))
+    settled = settle(draw_starts(3, 0), Conditions(vp=vp))
     lasts = round(0.025 * vp / settled.stride.dt)
     begun = np.array([2 * lasts, 2 * lasts, 2 * lasts + 4])
     push = Push(np.full(3, 10.0 * vp), begun * settled.stride.dt)
@@ -110,7 +110,7 @@ def test_a_push_begins_when_told(vp):
 @pytest.mark.parametrize("vp", few_of([80.0, 130.0], 130.0))
 def test_a_push_depends_on_no_start_beside(vp):
     """To the last bit, however their pushes cut the chunks."""
-    conditions, starts, times = Conditions.of(vp=vp), draw_starts(3, 4), np.array([12.0, 14.0, 16.3])
+    conditions, starts, times = Conditions(vp=vp), draw_starts(3, 4), np.array([12.0, 14.0, 16.3])
     impulse = 20.0 * conditions.body.mass * vp
 
     def outcomes(ids: list[int]) -> Outcomes:
@@ -129,7 +129,7 @@ def test_a_push_depends_on_no_start_beside(vp):
 @pytest.mark.parametrize(("vp", "dt", "told"), [(8.0, 1.0, "125 ms"), (20.0, 1.0, "50 ms"), (21.0, 1.0, None)])
 def test_steps_in_which_no_push_fits_are_refused(vp, dt, told):
     """One of 25 ms, to the nearest step; who pushes nobody is told nothing."""
-    conditions, stride = Conditions.of(vp=vp), Stride(dt=dt)
+    conditions, stride = Conditions(vp=vp), Stride(dt=dt)
     sentence = f"steps of the plan last {told}; expected less than 50 ms, since a push lasts 25 ms"
     with pytest.raises(InputError, match=sentence) if told else nullcontext():
         DisturbedWalks(LDVS, conditions=conditions, stride=stride, velocities=[0.5], n_starts=2)

@@ -9,9 +9,8 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import ROOT_QPOS, STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.errors import InputError
@@ -105,7 +104,7 @@ def tips_of(recording: xr.Dataset) -> np.ndarray:
 
 def test_a_puppet_puts_its_tips_where_they_are_planned():
     stride, conditions = Stride(), Conditions()
-    height, radius = conditions.path.standing_height, compile_body(conditions).foot_radius
+    height, radius = conditions.standing_height, compile_body(conditions).foot_radius
     plan = walk(draw_starts(2, seed=3), LDVS, 0.4, 40.0)
     recording = record_plan(plan, conditions, stride, start=1)
     root, tips = recording.qpos.values[:, :ROOT_QPOS], tips_of(recording)
@@ -114,7 +113,7 @@ def test_a_puppet_puts_its_tips_where_they_are_planned():
     assert_allclose(tips[..., 1], plan.y[:, 1], atol=1e-9)
     lift = recording.planned_tip.values[..., 2] - radius
     assert lift.min() == pytest.approx(0.0, abs=1e-9)
-    assert lift.max() == pytest.approx(conditions.path.step_height)
+    assert lift.max() == pytest.approx(conditions.step_height)
     assert_allclose(np.diff(root[:, 0]), 0.4 * stride.dt)
     assert (root[:, 2] == height + radius).all()
     stands = recording.planned_stance.values
@@ -137,7 +136,7 @@ def test_tips_beside_their_lines_and_heights_of_their_own_are_recorded():
     tips, wanted = tips_of(recording), one_start(plan, 1)
     assert_allclose(tips[..., 0], wanted.feet[:, 0, :, 0], atol=1e-9)
     assert_allclose(tips[..., 1], wanted.y[:, 0], atol=1e-9)
-    assert_allclose(tips[..., 2] + conditions.path.standing_height, wanted.height[:, 0], atol=1e-9)
+    assert_allclose(tips[..., 2] + conditions.standing_height, wanted.height[:, 0], atol=1e-9)
     assert (np.abs(wanted.y[:, 0] - FIG1.y) > 0.5).mean() > 0.5
     settled = settle(starts, conditions, stride)
     walked = physical_walk_of_plan(settled, Given(settled.starts, stride, plan), plan)
@@ -165,7 +164,7 @@ class Given:
 
 
 def test_a_leg_of_a_puppet_that_is_out_of_reach_keeps_its_angles():
-    conditions = Conditions.of(standing_height=5.0, step_height=14.0)
+    conditions = Conditions(standing_height=5.0, step_height=14.0)
     recording = record_plan(walk(draw_starts(1, seed=3), LDVS, 0.4, 40.0), conditions, Stride())
     joints = recording.qpos.values[:, ROOT_QPOS:].reshape(-1, 6, 3)
     tips = tips_of(recording) + recording.qpos.values[:, None, :3]

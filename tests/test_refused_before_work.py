@@ -132,9 +132,9 @@ def test_ideal_entrants_are_asked_for_the_velocities_at_which_they_walk_alone() 
 
 
 def test_adhesion_of_a_start_that_does_not_settle_is_no_matter_of_this_check() -> None:
-    check_adhesion(hexmj.Conditions.of(grasp=1.0, settling_time=3.0), hexmj.Stride(), 0)
+    check_adhesion(hexmj.Conditions(grasp=1.0, settling_time=3.0), hexmj.Stride(), 0)
     with pytest.raises(hexmj.InputError, match="grasp = 50"):
-        check_adhesion(hexmj.Conditions.of(grasp=50.0), hexmj.Stride(), 0)
+        check_adhesion(hexmj.Conditions(grasp=50.0), hexmj.Stride(), 0)
 
 
 def test_what_is_no_method_tells_no_limits() -> None:
@@ -171,7 +171,7 @@ def test_limits_are_told_whatever_the_controller_raises() -> None:
 def test_a_load_that_nobody_carries_refuses_no_league() -> None:
     """Entrants from ideal starts take no trials."""
     ideal = Entrant(hexmj.load_controller("graham"), ideal=True)
-    league = League({"graham-ideal": ideal}, velocities=(0.5,), conditions=hexmj.Conditions.of(grasp=10.0))
+    league = League({"graham-ideal": ideal}, velocities=(0.5,), conditions=hexmj.Conditions(grasp=10.0))
     assert len(league.cells()) == 2
     tried = replace(league, entrants={"ldvs": Entrant(hexmj.LDVS)})
     with pytest.raises(hexmj.InputError, match=r"grasp = 10; expected at most about 9\.\d with a load of 1"):

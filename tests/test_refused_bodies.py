@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from compiled_bodies import at_home, changed_body, conditions, differences
-from hexmj.bodies.description import Leg
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Leg
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import FIG1

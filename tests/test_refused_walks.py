@@ -89,6 +89,6 @@ def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
 
 
 def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
-    entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions.of(settling_time=3.0), stride=Stride())
+    entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions(settling_time=3.0), stride=Stride())
     with pytest.raises(SimulationError, match="start 0 did not settle in 3 ms"):
         in_physics.walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)

@@ -51,7 +51,7 @@ def flss() -> xr.Dataset:
 
 
 def compared() -> xr.Dataset:
-    conditions = hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5)
+    conditions = hexmj.Conditions(vp=200.0, ground="step", friction=0.5)
     slow = hexmj.Acceleration(rate=0.02)
     models = {ALPHA: hexmj.LDVS, "null": hexmj.load_controller("graham")}
     how: Any = {"n_starts": 3, "window": 20.0, "conditions": conditions, "acceleration": slow}
@@ -77,7 +77,7 @@ def study(name: str) -> xr.Dataset:
     from hexmj.studies.terrain.study import Terrain
     from hexmj.studies.variants.study import Variants
 
-    conditions = hexmj.Conditions.of(vp=200.0)
+    conditions = hexmj.Conditions(vp=200.0)
     small: dict[str, Callable[[], Study]] = {
         "map": lambda: StabilityMap(hexmj.LDVS, "vp", [80.0, 320.0], [0.5], n_starts=2, window=10.0),
         "converge": lambda: StaticLimit(hexmj.LDVS, vps=[320.0], n_starts=2, window=10.0),
@@ -186,7 +186,7 @@ def test_settings_are_told_as_they_were_given():
     told = hexmj.settings(compared())
     assert told["study"] == "compare"
     assert [*told["controllers"]] == [ALPHA, "null"]
-    assert told["conditions"] == hexmj.Conditions.of(vp=200.0, ground="step", friction=0.5).settings()
+    assert told["conditions"] == hexmj.Conditions(vp=200.0, ground="step", friction=0.5).settings()
     assert told["acceleration"] == {"rate": 0.02, "start": 0.1}
     assert (told["window"], told["starts"], told["seed"]) == (20.0, 3, 0)
     assert hexmj.settings(flss())["seed"] == 2**70

@@ -127,7 +127,7 @@ def test_physical_search(run, tmp_path):
     answer = json.loads(text)
     fell = hexmj.physical_flss(
         hexmj.load_controller(str(tmp_path / "found.toml")), [0.6], n_starts=4, window="start", seed=1998,
-        conditions=hexmj.Conditions.of(vp=200.0),
+        conditions=hexmj.Conditions(vp=200.0),
     )  # fmt: skip
     assert answer["verdict"]["found"]["start"]["flss"] == fell.flss.item()
     assert answer["settings"]["problem"]["conditions"]["vp"] == 200.0

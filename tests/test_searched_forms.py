@@ -124,7 +124,7 @@ def test_a_candidate_whose_simulation_fails_costs_as_one_that_loses_all_and_is_n
     assert Sample(problem, 2, 0).costs(np.array([[1.5, -0.5], [2.5, -0.5]])).tolist() == [1.0, 0.0]
     found = search(problem, Effort(starts=2, budget=10, refine_budget=0))
     assert found.vector[0] >= 2 and found.cost == 0 and (found.history.cost == 1).any()
-    restless = replace(problem, conditions=hexmj.Conditions.of(settling_time=1.0))
+    restless = replace(problem, conditions=hexmj.Conditions(settling_time=1.0))
     with pytest.raises(SimulationError, match="did not settle"):
         Sample(restless, 2, 0).costs(np.array([[2.5, -0.5]]))
     with pytest.raises(SimulationError, match=r"with good = 1, .* does not walk from its 2 starts: start 0 diverged"):

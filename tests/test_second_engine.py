@@ -9,8 +9,7 @@ import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]  # lies where only Python's start finds it
 import pytest
 
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import ROOT_QPOS, ROOT_QVEL, STICK_INSECT, Body
 from other_bodies import renamed
 
 RELATIVE = 1e-12

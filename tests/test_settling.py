@@ -30,7 +30,7 @@ def test_who_waits_for_rest_can_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.5)
         with pytest.raises(KeyboardInterrupt):
-            settle(draw_starts(200, 0), Conditions.of(settling_time=10_000.0), threads=1)
+            settle(draw_starts(200, 0), Conditions(settling_time=10_000.0), threads=1)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

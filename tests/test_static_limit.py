@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, load_controller, physical_walk
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.stability import walk_margin
 from hexmj.studies.static_limit.distances import distances
 from hexmj.studies.static_limit.figure import static_limit_figure
@@ -102,7 +102,7 @@ def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
     margins, servo = [], STICK_INSECT.servo
     for finer, leg_mass, longest in ((1, 1.0, 0.5), (2, 0.01, 0.25), (4, 0.01, 0.125)):
         body = replace(STICK_INSECT, servo=replace(servo, step=servo.step / finer))
-        conditions = replace(Conditions.of(vp=25.0, leg_mass=leg_mass, longest_substep=longest), body=body)
+        conditions = replace(Conditions(vp=25.0, leg_mass=leg_mass, longest_substep=longest), body=body)
         walk = physical_walk(draw_starts(8, 0), LDVS, 0.5, 40.0, conditions=conditions)
         margins.append(distances(walk)["margin_same_feet"].mean())
     assert margins[1] < margins[0] / 3
@@ -122,7 +122,7 @@ def test_finished_walks_are_not_walked_again(slower, monkeypatch):
 
 @pytest.mark.slow
 def test_who_reads_the_legs_is_measured_against_what_these_are_told():
-    walk = physical_walk(draw_starts(6, 0), load_controller("tegotae"), 0.5, 60.0, conditions=Conditions.of(vp=20.0))
+    walk = physical_walk(draw_starts(6, 0), load_controller("tegotae"), 0.5, 60.0, conditions=Conditions(vp=20.0))
     on_paper = replace(walk, ordered=walk.planned)
     told, planned = (distances(one)["same_feet"].mean() for one in (walk, on_paper))
     assert told > 1.02 * planned
@@ -146,11 +146,11 @@ def test_a_controller_may_read_the_legs(slower):
         ({"velocity": 1.0}, "0 <= V < 1"),
         ({"window": "long"}, "valid names: walk, start"),
         (
-            {"conditions": Conditions.of(vp=20.0)},
+            {"conditions": Conditions(vp=20.0)},
             "vp = 20.0; expected 80.0: vps has all that are tried",
         ),
         (
-            {"conditions": Conditions.of(leg_mass=0.5)},
+            {"conditions": Conditions(leg_mass=0.5)},
             "leg_mass = 0.5; expected .*: leg_masses has all that are tried",
         ),
     ],

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
@@ -31,15 +31,15 @@ from hexmj.starts import draw_starts
 from tiers import few_of
 
 OBSTACLES = {
-    ground: Conditions.of(ground=ground, ground_at=45.0, ground_length=8.0, ground_height=4.0)
+    ground: Conditions(ground=ground, ground_at=45.0, ground_length=8.0, ground_height=4.0)
     for ground in ("flat", "step", "gap", "hurdle", "rough")
 }
 CONDITIONS: dict[str, Conditions] = {
     **OBSTACLES,
-    "slow": Conditions.of(vp=20.0),
-    "fast": Conditions.of(vp=400.0),
-    "hard landing": Conditions.of(lift_time=1.0, landing_time=1.0),
-    "low": Conditions.of(standing_height=7.0),
+    "slow": Conditions(vp=20.0),
+    "fast": Conditions(vp=400.0),
+    "hard landing": Conditions(lift_time=1.0, landing_time=1.0),
+    "low": Conditions(standing_height=7.0),
     "closed loop": Conditions(),
 }
 FAR = 10.0
@@ -58,14 +58,14 @@ def outcomes(
 ) -> Outcomes:
     """Of the same walks, or longer ones, pushed aside at 20 time units by a multiple of m V_p."""
     size = len(settled.starts)
-    pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.time.vp), np.full(size, 20.0))
+    pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.vp), np.full(size, 20.0))
     plan = begin(controller, settled.starts, 0.6, settled.stride)
     return outcomes_of_plan(settled, plan, 130.0 if push else 80.0, np.full(size, np.inf), push=pushed, threads=threads)
 
 
 def allowed(settled: Settled) -> float:
     """How deep a foot may be: 2 % of the standing height [mm]."""
-    return 0.02 * settled.conditions.path.standing_height
+    return 0.02 * settled.conditions.standing_height
 
 
 def never_finely(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_a_dropped_insect_rebounds_as_from_fine_steps_and_hard_contacts_througho
 
     Measured: 16.2 mm, 16.3 mm with fine steps throughout, 17.3 mm with the usual steps alone.
     """
-    usual, fine = (settle(draw_starts(12, 4), Conditions.of(longest_substep=ms)) for ms in (0.625, 0.15625))
+    usual, fine = (settle(draw_starts(12, 4), Conditions(longest_substep=ms)) for ms in (0.625, 0.15625))
     fine.compiled.model.pair_solref[:, 0] = 2 * fine.compiled.model.opt.timestep
     struck, reference = rebound(usual), rebound(fine)
     assert struck == pytest.approx(reference, rel=0.02)

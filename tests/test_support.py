@@ -17,7 +17,7 @@ from hexmj.physics.settling import settle
 @pytest.fixture(scope="module")
 def walked() -> PhysicalWalk:
     """Some of these fall."""
-    return physical_walk(draw_starts(12, 0), LDVS, 0.7, 60.0, conditions=Conditions.of(vp=50.0))
+    return physical_walk(draw_starts(12, 0), LDVS, 0.7, 60.0, conditions=Conditions(vp=50.0))
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +34,13 @@ def test_the_higher_a_foot_may_hover_the_more_stand_and_the_later_is_a_loss(walk
 
 
 def test_every_foot_that_the_ground_carries_is_at_the_ground(walked):
-    height = GROUNDED * walked.conditions.path.standing_height
+    height = GROUNDED * walked.conditions.standing_height
     assert (walked.height[walked.load > 0] < height).all()
     assert_array_equal(grounded(walked).stance, walked.measured.stance | (walked.height <= height))
 
 
 def test_it_is_the_same_for_a_body_of_another_size(walked):
-    larger = walked.conditions.but(standing_height=1.3 * walked.conditions.path.standing_height)
+    larger = replace(walked.conditions, standing_height=1.3 * walked.conditions.standing_height)
     again = replace(walked, height=1.3 * walked.height, conditions=larger)
     assert_array_equal(grounded(again).stance, grounded(walked).stance)
 
@@ -65,7 +65,7 @@ def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_
     starts, weight = draw_starts(6, 0), STICK_INSECT.mass * 9810.0
     far = []
     for grasp in (0.0, 1.0, 5.0):
-        conditions = Conditions.of(vp=20.0, grasp=grasp)
+        conditions = Conditions(vp=20.0, grasp=grasp)
         assert_allclose(settle(starts, conditions).load.sum(axis=1), weight, rtol=0.01)
         walk = physical_walk(starts, LDVS, 0.3, 60.0, conditions=conditions)
         assert_allclose(walk.load.sum(axis=-1).mean(), weight, rtol=0.02)

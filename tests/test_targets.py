@@ -56,7 +56,7 @@ def planned(
 @pytest.mark.parametrize("controller", [HWS, LDVS, UNCOORDINATED], ids=lambda one: one.name)
 def test_no_tip_jumps(vp: float, controller: Controller):
     """Along its line a tip moves at most V_p; up and down at most as at a phase of 3/4, where it is steepest."""
-    conditions = Conditions.of(vp=vp)
+    conditions = Conditions(vp=vp)
     path = conditions.path
     tips, _ = all_tips(conditions, controller)
     seconds = conditions.timestep(STRIDE)
@@ -75,7 +75,7 @@ def test_a_foot_is_slow_where_the_ground_may_come_early():
     """Half a millimetre above the planned ground, as far as the body sags, a foot falls at less than 0.2 m/s."""
     conditions = Conditions()
     tips, _ = all_tips(conditions)
-    height = tips[..., 2] + conditions.path.standing_height
+    height = tips[..., 2] + conditions.standing_height
     speed = -np.diff(height, axis=1) / (1000.0 * conditions.timestep(STRIDE))  # mm/ms = m/s
     low = (height[:, 1:] <= 0.5) & (speed > 0)
     assert low.any()
@@ -93,7 +93,7 @@ def test_targets_at_the_plans_steps_are_the_plan():
 def test_lift_takes_its_milliseconds_whatever_vp():
     """A foot is at full height exactly one lift time after its swing began, if the swing lasts that long."""
     for vp in (20.0, 50.0):
-        conditions = Conditions.of(vp=vp, lift_time=25.0)
+        conditions = Conditions(vp=vp, lift_time=25.0)
         path, m = conditions.path, conditions.substeps(STRIDE)
         tips, plan = all_tips(conditions, velocity=0.3, steps=900)
         substep_ms = 1000.0 * conditions.timestep(STRIDE)
@@ -106,7 +106,7 @@ def test_lift_takes_its_milliseconds_whatever_vp():
 @pytest.mark.parametrize("vp", [20.0, 80.0])
 def test_feet_meet_the_ground_at_their_aep(vp: float):
     """Wherever a swing ends at AEP_0, within a step of the plan; those that end earlier take their landing time."""
-    conditions = Conditions.of(vp=vp)
+    conditions = Conditions(vp=vp)
     path, m = conditions.path, conditions.substeps(STRIDE)
     tips, plan = all_tips(conditions, velocity=0.3, steps=900)
     height = tips[:, m - 1 :: m, :, 2].swapaxes(0, 1) + path.standing_height
@@ -114,8 +114,8 @@ def test_feet_meet_the_ground_at_their_aep(vp: float):
     there = lands & (plan.x[1:] >= STRIDE.aep0)
     assert there.sum() > 100
     assert (height[1:][there] < 1e-9).all()
-    wait = int(np.ceil(path.landing_time / 1000.0 / conditions.time.seconds(STRIDE))) + 1
-    early = np.argwhere(lands[:-wait] & (plan.x[1:-wait] < STRIDE.aep0 - path.landing_distance(conditions.time)))
+    wait = int(np.ceil(path.landing_time / 1000.0 / conditions.seconds(STRIDE))) + 1
+    early = np.argwhere(lands[:-wait] & (plan.x[1:-wait] < STRIDE.aep0 - conditions.landing_distance))
     stay = [one for one in early.tolist() if plan.stance[one[0] + 1 : one[0] + 1 + wait, one[1], one[2]].all()]
     assert stay
     for step, start, leg in stay:
@@ -150,7 +150,7 @@ def test_a_leg_that_swings_on_its_spot_is_lifted_until_that_is_where_its_swing_e
 def test_feet_that_stand_still_have_standing_tips():
     starts, conditions = draw_starts(3, 2), Conditions()
     plan = begin(UNCOORDINATED, starts, 0.0, STRIDE)
-    standing = standing_tips(starts, conditions.path.standing_height, STRIDE)
+    standing = standing_tips(starts, conditions.standing_height, STRIDE)
     tips = TipTargets(starts, conditions, STRIDE).follow(plan.advance(4), np.arange(3))
     assert standing.shape == (3, 6, 3)
     assert_array_equal(tips, np.broadcast_to(standing[:, np.newaxis], tips.shape))
@@ -159,15 +159,15 @@ def test_feet_that_stand_still_have_standing_tips():
 @pytest.mark.parametrize(("vp", "m"), [(400.0, 1), (80.0, 2), (20.0, 8)])
 def test_a_height_of_its_own_and_a_place_beside_the_line_are_honoured(vp: float, m: int):
     """At the end of each step they are what the plan says, between the steps they change evenly."""
-    conditions, rng, steps = Conditions.of(vp=vp), np.random.default_rng(5), 12
+    conditions, rng, steps = Conditions(vp=vp), np.random.default_rng(5), 12
     assert conditions.substeps(STRIDE) == m
     x, aside, height = (rng.uniform(*range_, (steps, 6)) for range_ in ((-10, 10), (-4, 4), (0, 9)))
     y, stance, start = LINES[:, 1] + aside, rng.random((steps, 6)) < 0.5, np.zeros((1, 6))
     targets, halves = TipTargets(start, conditions, STRIDE), (slice(5), slice(5, None))
     parts = [planned(x[half], stance[half], y[half], height[half]) for half in halves]
     tips = np.concatenate([targets.follow(part, np.arange(1))[0] for part in parts])
-    at_steps = np.stack([x + LINES[:, 0], y, height - conditions.path.standing_height], axis=-1)
-    at_first = np.concatenate([LINES, np.full((6, 1), -conditions.path.standing_height)], axis=1)
+    at_steps = np.stack([x + LINES[:, 0], y, height - conditions.standing_height], axis=-1)
+    at_first = np.concatenate([LINES, np.full((6, 1), -conditions.standing_height)], axis=1)
     whole = np.concatenate([at_first[np.newaxis], at_steps]).reshape(steps + 1, -1)
     time = np.arange(1, steps * m + 1) / m
     wanted = np.stack([np.interp(time, np.arange(steps + 1), one) for one in whole.T], axis=1)
@@ -204,10 +204,10 @@ def test_starts_left_out_change_nothing_for_the_others():
 
 def test_substeps_are_whole_and_short_enough():
     for vp in (20.0, 80.0, 99.9, 100.0, 400.0):
-        conditions = Conditions.of(vp=vp)
+        conditions = Conditions(vp=vp)
         m = conditions.substeps(STRIDE)
         assert conditions.timestep(STRIDE) <= 0.000625 + 1e-12
-        assert m == 1 or conditions.time.seconds(STRIDE) / (m - 1) > 0.000625
+        assert m == 1 or conditions.seconds(STRIDE) / (m - 1) > 0.000625
     assert Conditions().substeps(STRIDE) == 2
 
 
@@ -219,4 +219,4 @@ def test_substeps_are_whole_and_short_enough():
 )  # fmt: skip
 def test_conditions_that_make_no_sense(change: dict[str, float]):
     with pytest.raises(InputError, match=f"{next(iter(change))} = .*expected"):
-        Conditions.of(**change)
+        Conditions(**change)

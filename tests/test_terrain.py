@@ -39,10 +39,10 @@ from hexmj.sweeps import Cell, conduct
 
 GROUNDS = {
     "flat": Conditions(),
-    "step": Conditions.of(ground="step", ground_at=45.0),
-    "gap": Conditions.of(ground="gap", ground_at=45.0, ground_length=5.0),
-    "hurdle": Conditions.of(ground="hurdle", ground_at=45.0),
-    "rough": Conditions.of(ground="rough", ground_at=45.0, ground_height=4.0),
+    "step": Conditions(ground="step", ground_at=45.0),
+    "gap": Conditions(ground="gap", ground_at=45.0, ground_length=5.0),
+    "hurdle": Conditions(ground="hurdle", ground_at=45.0),
+    "rough": Conditions(ground="rough", ground_at=45.0, ground_height=4.0),
 }
 FEW: dict[str, Any] = {
     "velocities": (0.6,), "grounds": ("step",), "heights": (4.0,), "grasps": (0.0,), "n_starts": 6,
@@ -92,7 +92,7 @@ def test_the_ground_is_as_high_as_it_says(ground):
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_the_trunk_on_any_ground_is_a_fall(ground):
     """Laid down with its legs in the air, on the obstacle itself."""
-    compiled = compile_body(GROUNDS[ground].but(ground_length=300.0) if ground == "hurdle" else GROUNDS[ground])
+    compiled = compile_body(replace(GROUNDS[ground], ground_length=300.0) if ground == "hurdle" else GROUNDS[ground])
     model = compiled.model
     data = mujoco.MjData(model)
     level = level_of(compiled.conditions, np.array([150.0, 0.0]))
@@ -104,9 +104,9 @@ def test_the_trunk_on_any_ground_is_a_fall(ground):
 
 @pytest.mark.parametrize("ground", ["step", "hurdle"])
 def test_feet_stand_on_top_as_on_the_plane(ground):
-    long = GROUNDS[ground].but(ground_length=300.0)
+    long = replace(GROUNDS[ground], ground_length=300.0)
     depths, forces = [], []
-    for one, ahead, up in ((GROUNDS["flat"], 0.0, 0.0), (long, 150.0, long.ground.ground_height)):
+    for one, ahead, up in ((GROUNDS["flat"], 0.0, 0.0), (long, 150.0, long.ground_height)):
         compiled = compile_body(one)
         model = compiled.model
         data = mujoco.MjData(model)
@@ -125,7 +125,7 @@ def test_feet_stand_on_top_as_on_the_plane(ground):
 def test_nothing_is_felt_before_it_is_reached(ground):
     """The same bits as on flat ground; a bank's box rounds other than a plane."""
     flat, ahead = walked("flat").qpos, walked(ground).qpos
-    begin = GROUNDS[ground].ground.ground_at - reach(Stride())[0]
+    begin = GROUNDS[ground].ground_at - reach(Stride())[0]
     far = np.where(np.isfinite(flat), flat, 0.0)[..., 0].max(axis=1) < begin
     assert 50 < far.sum() < len(far)
     if ground == "gap":
@@ -152,7 +152,7 @@ def test_every_start_is_counted_once(few):
 
 
 def test_a_cell_is_a_physical_walk_under_those_conditions(few):
-    conditions = Conditions.of(ground_at=80.0, ground="step", ground_height=4.0)
+    conditions = Conditions(ground_at=80.0, ground="step", ground_height=4.0)
     settled = settle(draw_starts(6, 0), conditions)
     walks = physical_outcomes(settled, LDVS, 0.6, few.attrs["distance"] / 0.6, threads=1)
     one = few.sel(obstacle="step 4 mm").squeeze()
@@ -238,16 +238,16 @@ def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
         ({"velocities": (0.0,)}, "velocities = .*; expected V > 0"),
         ({"n_starts": 0}, "starts = 0; expected a whole number"),
         (
-            {"conditions": Conditions.of(ground="step")},
+            {"conditions": Conditions(ground="step")},
             "ground = step; expected flat: grounds has",
         ),
-        ({"conditions": Conditions.of(grasp=1.0)}, "grasp = 1.0; expected 0.0: grasps has"),
+        ({"conditions": Conditions(grasp=1.0)}, "grasp = 1.0; expected 0.0: grasps has"),
         (
-            {"grounds": ("gap",), "conditions": FARTHER.but(ground_length=7.0)},
+            {"grounds": ("gap",), "conditions": replace(FARTHER, ground_length=7.0)},
             "ground_length = 7.0; expected hurdle among the grounds",
         ),
         (
-            {"grounds": ("step",), "conditions": FARTHER.but(ground_seed=7)},
+            {"grounds": ("step",), "conditions": replace(FARTHER, ground_seed=7)},
             "ground_seed = 7; expected rough among the grounds",
         ),
     ],
@@ -274,8 +274,8 @@ def test_obstacles_have_their_names_and_sizes():
     study = Terrain(LDVS, grounds=("gap", "hurdle"), heights=(2.0,), lengths=(5.0,), conditions=Conditions())
     found = study.obstacles
     assert list(found) == ["flat", "gap 5 mm", "hurdle 2 mm"]
-    assert found["gap 5 mm"] == Conditions.of(ground="gap", ground_length=5.0)
-    assert found["hurdle 2 mm"] == Conditions.of(ground="hurdle", ground_height=2.0)
+    assert found["gap 5 mm"] == Conditions(ground="gap", ground_length=5.0)
+    assert found["hurdle 2 mm"] == Conditions(ground="hurdle", ground_height=2.0)
 
 
 @pytest.mark.slow
@@ -294,7 +294,7 @@ def test_a_recording_keeps_its_ground_and_the_film_shows_it(tmp_path):
 @pytest.mark.parametrize(("ground", "size"), [("step", {"ground_height": 2.0}), ("gap", {"ground_length": 1.0})])
 def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
     body = replace(STICK_INSECT, lengths=replace(STICK_INSECT.lengths, ground_reach=60.0))
-    ahead = Conditions.of(ground=ground, ground_at=46.0, **size)
+    ahead = Conditions(ground=ground, ground_at=46.0, **size)
     with pytest.raises(
         InputError, match=f"start 0 walks off the {ground} at x = .* mm; expected shorter walks, in which no"
     ):
@@ -316,7 +316,7 @@ def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
     ],
 )
 def test_the_ground_ends_where_its_pieces_do(ground, within, beyond):
-    ahead = Conditions.of(ground=ground, ground_at=500.0, ground_length=10.0, ground_height=2.0).ground
+    ahead = Conditions(ground=ground, ground_at=500.0, ground_length=10.0, ground_height=2.0).ground
     for places, ends in ((within, False), (beyond, True)):
         for x, y in places:
             assert beyond_the_ground(ahead, STICK_INSECT.lengths, np.array([x, y, 0.0])) == ends, (x, y)

@@ -7,7 +7,7 @@ import pytest
 
 import hexmj
 from coarse_steps import COARSE
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import RISE, LegLost
@@ -29,8 +29,8 @@ def test_trials_are_what_they_say() -> None:
     walked = [name for name in TRIALS if name not in DISTURBED]
     found = {name: one for name in walked if (one := walking(name, entrant, usual, 0.3, Stride()))}
     assert list(found) == walked
-    assert found["load"].conditions.masses.load == 1.0
-    assert found["step"].conditions.ground.ground_height == 3.0
+    assert found["load"].conditions.load == 1.0
+    assert found["step"].conditions.ground_height == 3.0
     assert found["lost 2"].controller == LegLost(hexmj.LDVS, 1)
     assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
 
@@ -48,7 +48,7 @@ def test_grounds_lie_as_the_body_is_large() -> None:
         usual = Conditions(body=body)
         for name in GROUNDS:
             met = walking(name, Entrant(hexmj.LDVS), usual, 0.3, Stride())
-            assert met and met.conditions.ground.ground == name
+            assert met and met.conditions.ground == name
             ground = met.conditions.ground
             assert (ground.ground_height, ground.ground_at, crossed(usual)) == pytest.approx(sizes, rel=1e-12)
 
@@ -79,7 +79,7 @@ def test_a_lost_leg_is_in_neither_measure(leg: int) -> None:
 def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() -> None:
     high = []
     short = Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)
-    tall = Conditions.of(standing_height=14.0)
+    tall = Conditions(standing_height=14.0)
     for conditions, stride in ((Conditions(), short), (Conditions(body=LARGER), Stride()), (tall, Stride())):
         trial = walking("lost 1", Entrant(hexmj.LDVS), conditions, 0.3, stride)
         assert trial is not None
@@ -118,5 +118,5 @@ def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
     late = PoorSenses(ReadsLegs(hexmj.LDVS), delay=0.04)
     with pytest.raises(InputError, match=r"delay = 0.04 with steps of 0.1 time units; expected at least one step"):
         late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
-    assert walking("late", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), 0.3, Stride()) is None
-    assert walking("noise", Entrant(hexmj.LDVS), Conditions.of(vp=2.0), 0.3, Stride())
+    assert walking("late", Entrant(hexmj.LDVS), Conditions(vp=2.0), 0.3, Stride()) is None
+    assert walking("noise", Entrant(hexmj.LDVS), Conditions(vp=2.0), 0.3, Stride())

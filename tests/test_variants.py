@@ -203,10 +203,10 @@ def test_the_insect_walks_the_variants_that_its_legs_reach():
     """On paper the other one is walked too."""
     assert set(variants()) - set(variants(physical=True)) == {"AEP0 11"}
     few: dict[str, Any] = {"velocities": (0.7,), "n_starts": 2, "window": 20.0}
-    walked = conduct(Variants({"ldvs": (LDVS,)}, conditions=Conditions.of(vp=200.0), **few))
+    walked = conduct(Variants({"ldvs": (LDVS,)}, conditions=Conditions(vp=200.0), **few))
     assert walked.variant.values.tolist() == variants(physical=True)
     assert notes(walked)[0] == "without AEP0 11, which the stick insect's legs do not reach on their usual lines"
-    alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, window=20.0, conditions=Conditions.of(vp=200.0))
+    alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, window=20.0, conditions=Conditions(vp=200.0))
     assert walked.flss.sel(variant="usual").item() == alone.flss.item()
 
 

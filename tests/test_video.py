@@ -16,7 +16,7 @@ from compiled_bodies import changed_body
 from drawing import drawing
 from film_reader import read_film
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.physical import PhysicalWalk, physical_walk

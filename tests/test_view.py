@@ -76,7 +76,7 @@ def test_a_page_is_served_the_walk_goes_on_and_sliders_change_it(view):
     seconds = walked.moment.seconds
     assert seconds > 0.1
     view.controls["V_p"].value = 120.0
-    until(view, lambda: walked.conditions.time.vp == 120.0)
+    until(view, lambda: walked.conditions.vp == 120.0)
     assert walked.moment.seconds < seconds
     assert "margin" in view._readout.content
 
@@ -93,7 +93,7 @@ def test_charts_of_a_walk_that_stands_still_stay_as_they_were(view):
 
 @pytest.mark.parametrize(("velocity", "vp"), [(0.97, 10.0), (0.345, 1000.0)])
 def test_what_lies_beyond_the_usual_has_sliders_too(velocity, vp):
-    walk = LiveWalk(LDVS, velocity, STARTS[0], Conditions.of(vp=vp))
+    walk = LiveWalk(LDVS, velocity, STARTS[0], Conditions(vp=vp))
     view = BrowserView(LiveSession(walk, 0, STARTS.__getitem__), port=0)
     try:
         assert (view.controls["V"].value, view.controls["V_p"].value) == (velocity, vp)

@@ -97,7 +97,7 @@ def test_physical_flss(run, tmp_path):
     code, text, _ = run(*words, "--json", "--out", tmp_path)
     answer = json.loads(text)
     assert code == 0
-    conditions = hexmj.Conditions.of(vp=200.0)
+    conditions = hexmj.Conditions(vp=200.0)
     expected = hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=10, window="start", conditions=conditions)
     assert answer["flss"] == expected.flss.values.tolist()
     assert answer["settings"]["conditions"]["vp"] == 200.0

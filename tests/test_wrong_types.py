@@ -207,10 +207,10 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Conditions(time=3), "time = 3; expected a TimeScale"),  # pyright: ignore
     (lambda: hexmj.Conditions(body="insect"), "body = 'insect'; expected a Body"),  # pyright: ignore
-    (lambda: hexmj.Conditions.of(vp="80"), "vp = '80'; expected a number"),
-    (lambda: hexmj.Conditions.of(load=True), "load = True; expected a number"),
-    (lambda: hexmj.Conditions.of(ground=3), "ground = 3; valid names: flat, step, gap, hurdle, rough"),
-    (lambda: hexmj.Conditions.of(ground_seed=1.0), "ground_seed = 1.0; expected a whole number"),
+    (lambda: hexmj.Conditions(vp="80"), "vp = '80'; expected a number"),
+    (lambda: hexmj.Conditions(load=True), "load = True; expected a number"),
+    (lambda: hexmj.Conditions(ground=3), "ground = 3; valid names: flat, step, gap, hurdle, rough"),
+    (lambda: hexmj.Conditions(ground_seed=1.0), "ground_seed = 1.0; expected a whole number"),
     (lambda: TimeScale(vp=None), "vp = None; expected a number"),  # pyright: ignore
     (lambda: Masses(load=[1.0]), "load = [1.0]; expected a number"),  # pyright: ignore
     (lambda: Ground(ground="sand"), "ground = 'sand'; valid names: flat"),  # pyright: ignore
@@ -360,11 +360,11 @@ def test_numbers_of_numpy_are_numbers():
     given = flss(n_starts=np.int64(30), seed=np.uint8(4), window=np.float64(20.0), velocities=np.array([0.5]))
     assert given.equals(usual)
     assert json.dumps(given.attrs) == json.dumps(usual.attrs)
-    assert type(hexmj.Conditions.of(ground=np.str_("rough")).ground.ground) is str
+    assert type(hexmj.Conditions(ground=np.str_("rough")).ground) is str
     assert type(hexmj.Cruse1998(hexmj.LDVS.weights, name=np.str_("own")).name) is str
     assert flss(n_starts=3, velocities=np.array(0.5)).identical(flss(n_starts=3, velocities=0.5))
     assert flss(n_starts=3, window=np.str_("start")).identical(flss(n_starts=3, window="start"))
-    assert hexmj.Conditions.of(vp=np.float32(40.0), ground_seed=np.int32(2)).flat()["vp"] == 40.0
+    assert hexmj.Conditions(vp=np.float32(40.0), ground_seed=np.int32(2)).values()["vp"] == 40.0
     stride = hexmj.Stride(dt=np.float32(0.25), geometry=hexmj.Geometry(origins=np.array([24, 0, -24])))  # pyright: ignore
     assert stride == hexmj.Stride(dt=0.25, geometry=hexmj.CENTRED)
     assert json.dumps(settings_of(replace(LDVS, weights=hexmj.Symmetric(np.float32(2.0)))))  # pyright: ignore

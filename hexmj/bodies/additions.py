@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.gains import Gains
+from hexmj.body import Body
 from hexmj.legs import LEGS
 
 _SENSOR, _OBJECT = mujoco.mjtSensor, mujoco.mjtObj

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.check_finished import MASS_TOLERANCE
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.bodies.reading import segments
+from hexmj.body import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.errors import InputError
 
 LEG_TOLERANCE = 1.5

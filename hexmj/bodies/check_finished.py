@@ -13,7 +13,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QVEL, Body
+from hexmj.body import ROOT_QVEL, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 
@@ -183,7 +183,7 @@ def _in_contacts(model: mujoco.MjModel, body: Body) -> Iterator[str]:
 
 
 def _in_conditions(model: mujoco.MjModel, conditions: Conditions) -> Iterator[str]:
-    body, load, ground = conditions.body, conditions.masses.load, conditions.ground.ground
+    body, load, ground = conditions.body, conditions.load, conditions.ground
     mass, expected = model.body_subtreemass[model.body(body.root).id], body.mass * (1.0 + load)
     if not abs(mass - expected) <= MASS_TOLERANCE * expected:
         yield f"with load = {load:g} it weighs {mass:.6g} g; expected {expected:.6g} g"

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.bodies.additions import sensor_groups
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.bodies.grounds import depth_in_ground
 from hexmj.bodies.hinges import ThreeHinges, three_hinges
 from hexmj.bodies.numeric import HingeChains, hinge_chains
 from hexmj.bodies.reading import posed
+from hexmj.body import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 
@@ -87,7 +87,7 @@ class CompiledBody:
 
     def depth(self, feet: np.ndarray) -> np.ndarray:
         """How deep feet in the world, (..., axis) [mm], are in the ground, (...) [mm]; negative above it."""
-        return depth_in_ground(self.conditions.ground, self.body.lengths, feet, self.foot_radius)
+        return depth_in_ground(self.conditions, feet, self.foot_radius)
 
     def carried(self, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Force of the ground on each foot along its normal, (..., leg), adhesion taken off [g mm/s^2]: below 0 where

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.reading import joint_numbers, posed, segments
+from hexmj.body import Body
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,12 @@
 """The ground: a plane, or what lies ahead on it.  Only feet and trunk touch it, as listed pairs.
 
-Everywhere `ground` says what lies ahead: `ground.ground` is its kind, `ground_height`, `ground_at`, `ground_length` and
-`ground_seed` its measures (`hexmj.conditions.Ground`).
+`Conditions.ground` is its kind; `ground_height`, `ground_at`, `ground_length` and `ground_seed` are its measures.
 """
 
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import Body, Lengths
-from hexmj.conditions import Ground
+from hexmj.conditions import Conditions
 
 BUMPS = (15, 9)
 """Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
@@ -23,26 +21,31 @@ CONTACT = ("condim", "friction", "solref", "solimp")
 """Of what touches the ground: it touches what lies ahead alike."""
 
 
-def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
+def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
     """Add what lies ahead to a spec of a body on its plane."""
-    lengths, kinds = body.lengths, mujoco.mjtGeom
-    near, length, height, far = ground.ground_at, ground.ground_length, ground.ground_height, lengths.ground_reach
+    body, lengths, kinds = conditions.body, conditions.body.lengths, mujoco.mjtGeom
+    near, length, height, far = (
+        conditions.ground_at,
+        conditions.ground_length,
+        conditions.ground_height,
+        lengths.ground_reach,
+    )
     boxes = {
         "step": {"step": (near, near + far, height)},
         "hurdle": {"hurdle": (near, near + length, height)},
         "gap": {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)},
     }
     pieces = {}  # what lies ahead, its size and place by its name
-    for name, (begin, end, top) in boxes.get(ground.ground, {}).items():
+    for name, (begin, end, top) in boxes.get(conditions.ground, {}).items():
         half = (top + lengths.shortest_leg) / 2
         size = (end - begin) / 2, lengths.ground_half_width, half
         pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
-    if ground.ground == "gap":
+    if conditions.ground == "gap":
         spec.geom(body.ground).pos[2] -= lengths.shortest_leg  # in its own frame, if it stands in one
-    if ground.ground == "rough":
+    if conditions.ground == "rough":
         # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that
         # is deeper than its distance from their sides sideways into the next, and there it stays.
-        for i, ((x, y), top, radius) in enumerate(zip(*_bumps(ground, lengths), strict=True)):
+        for i, ((x, y), top, radius) in enumerate(zip(*_bumps(conditions), strict=True)):
             pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
     look = LOOK | {"material": spec.geom(body.ground).material}
     alike = {frozenset((pair.geomname1, pair.geomname2)): pair for pair in spec.pairs}
@@ -54,55 +57,59 @@ def lay_ground(spec: mujoco.MjSpec, ground: Ground, body: Body) -> None:
                 setattr(pair, setting, getattr(alike[frozenset((body.ground, touching))], setting))
 
 
-def ground_level(ground: Ground, lengths: Lengths, places: np.ndarray) -> np.ndarray:
+def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
     """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
+    lengths = conditions.body.lengths
     x = places[..., 0]
-    if ground.ground == "rough":
-        centres, heights, radii = _bumps(ground, lengths)
+    if conditions.ground == "rough":
+        centres, heights, radii = _bumps(conditions)
         off = np.linalg.norm(places[..., None, :] - centres, axis=-1)
         caps = np.sqrt(np.maximum(radii**2 - off**2, 0.0)) - (radii - heights)
         return np.maximum(caps.max(axis=-1), 0.0)
-    end = np.inf if ground.ground == "step" else ground.ground_at + ground.ground_length
-    height = {"flat": 0.0, "gap": -lengths.shortest_leg}.get(ground.ground, ground.ground_height)
-    return np.where((x > ground.ground_at) & (x < end), height, 0.0)
+    end = np.inf if conditions.ground == "step" else conditions.ground_at + conditions.ground_length
+    height = {"flat": 0.0, "gap": -lengths.shortest_leg}.get(conditions.ground, conditions.ground_height)
+    return np.where((x > conditions.ground_at) & (x < end), height, 0.0)
 
 
-def beyond_the_ground(ground: Ground, lengths: Lengths, feet: np.ndarray) -> np.ndarray:
+def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
     """Whether feet, spheres around (..., 3) in the world [mm], are beyond the ends of the pieces that were laid, (...).
 
     There the ground is another than it is told, of those `WITH_ENDS`.
     """
-    x, y, near, far = feet[..., 0], feet[..., 1], ground.ground_at, lengths.ground_reach
-    if ground.ground not in WITH_ENDS:
+    lengths = conditions.body.lengths
+    x, y, near, far = feet[..., 0], feet[..., 1], conditions.ground_at, lengths.ground_reach
+    if conditions.ground not in WITH_ENDS:
         return np.zeros(x.shape, dtype=bool)
-    past = {"hurdle": near + ground.ground_length, "gap": near + ground.ground_length + far, "step": near + far}
-    begin, end = -far if ground.ground == "gap" else near, past[ground.ground]
+    past = {"hurdle": near + conditions.ground_length, "gap": near + conditions.ground_length + far, "step": near + far}
+    begin, end = -far if conditions.ground == "gap" else near, past[conditions.ground]
     aside = (np.abs(y) > lengths.ground_half_width) & (x > begin) & (x < end)
-    return aside | ((x > end) & (ground.ground != "hurdle")) | ((x < begin) & (ground.ground == "gap"))
+    return aside | ((x > end) & (conditions.ground != "hurdle")) | ((x < begin) & (conditions.ground == "gap"))
 
 
-def depth_in_ground(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
     """How deep feet, spheres of a radius around (..., 3) in the world [mm], are in the ground, (...) [mm].
 
     It is what MuJoCo measures along the normal; negative above the ground.
     """
+    lengths = conditions.body.lengths
     z = feet[..., 2]
-    if ground.ground == "flat":
+    if conditions.ground == "flat":
         return radius - z
-    x, near, length = feet[..., 0], ground.ground_at, ground.ground_length
-    if ground.ground == "rough":
-        return np.maximum(radius - z, _depth_in_bumps(ground, lengths, feet, radius))
+    x, near, length = feet[..., 0], conditions.ground_at, conditions.ground_length
+    if conditions.ground == "rough":
+        return np.maximum(radius - z, _depth_in_bumps(conditions, feet, radius))
     off_middle = np.abs(x - near - length / 2)
-    outside = {"step": near - x, "hurdle": off_middle - length / 2, "gap": length / 2 - off_middle}[ground.ground]
-    above = z - (0.0 if ground.ground == "gap" else ground.ground_height)
+    outside = {"step": near - x, "hurdle": off_middle - length / 2, "gap": length / 2 - off_middle}[conditions.ground]
+    above = z - (0.0 if conditions.ground == "gap" else conditions.ground_height)
     from_block = np.hypot(np.maximum(outside, 0.0), np.maximum(above, 0.0)) + np.minimum(np.maximum(outside, above), 0)
-    floor = -lengths.shortest_leg if ground.ground == "gap" else 0.0
+    floor = -lengths.shortest_leg if conditions.ground == "gap" else 0.0
     return radius - np.minimum(from_block, z - floor)
 
 
-def _depth_in_bumps(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: float) -> np.ndarray:
+def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
     """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
-    centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(ground, lengths))
+    lengths = conditions.body.lengths
+    centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(conditions))
     corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
     depth = np.full(feet.shape[:-1], -np.inf)
     for along, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -113,16 +120,18 @@ def _depth_in_bumps(ground: Ground, lengths: Lengths, feet: np.ndarray, radius: 
     return depth
 
 
-def end_of_bumps(ground: Ground, lengths: Lengths) -> float:
+def end_of_bumps(conditions: Conditions) -> float:
     """Where rough ground ends, and the plane follows, ahead of O at the start [mm]."""
-    return ground.ground_at + 2 * lengths.highest_bump + lengths.bump_spacing * (BUMPS[0] - 1)
+    lengths = conditions.body.lengths
+    return conditions.ground_at + 2 * lengths.highest_bump + lengths.bump_spacing * (BUMPS[0] - 1)
 
 
-def _bumps(ground: Ground, lengths: Lengths) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bumps(conditions: Conditions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
+    lengths = conditions.body.lengths
     along, across = BUMPS
-    x = ground.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)
+    x = conditions.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)
     y = lengths.bump_spacing * (np.arange(across) - (across - 1) / 2)
-    heights = ground.ground_height * np.random.default_rng(ground.ground_seed).random(along * across)
+    heights = conditions.ground_height * np.random.default_rng(conditions.ground_seed).random(along * across)
     centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return centres, heights, (lengths.highest_bump**2 + heights**2) / (2 * heights)

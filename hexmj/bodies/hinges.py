@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.numeric import Bools, Floats, HingeChains, over_tips
 from hexmj.bodies.reading import joint_numbers
+from hexmj.body import Body
 from hexmj.jitted import jitted
 from hexmj.legs import SIDE
 

@@ -11,11 +11,11 @@ from hexmj.bodies.additions import complete
 from hexmj.bodies.check_described import check_described
 from hexmj.bodies.check_finished import check_finished
 from hexmj.bodies.compiled import CompiledBody, measured
-from hexmj.bodies.description import Body
 from hexmj.bodies.gains import gains
 from hexmj.bodies.grounds import lay_ground
 from hexmj.bodies.reading import posed
-from hexmj.conditions import ROUNDING, Conditions, Masses
+from hexmj.body import Body
+from hexmj.conditions import ROUNDING, Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.storage.mjcf import content
@@ -71,12 +71,12 @@ def _plain_model(body: Body, files: bytes) -> mujoco.MjModel:
 
 def check_home(compiled: CompiledBody) -> None:
     """Refuse a body that is not as described in posture home: its feet, and its centre of mass, which is at O unless
-    `Masses.centre_of_mass` says how far ahead.
+    `Conditions.centre_of_mass` says how far ahead.
 
     Raises:
         InputError: it is not.
     """
-    body, masses = compiled.body, compiled.conditions.masses
+    body, conditions = compiled.body, compiled.conditions
     allowed = HOME_TOLERANCE * body.lengths.shortest_leg
     tips = compiled.forward(compiled.home[compiled.columns.qpos].reshape(6, -1))
     expected = np.stack([body.lines.origin, body.lines.y, 6 * [-body.standing_height]], axis=-1)
@@ -88,7 +88,7 @@ def check_home(compiled: CompiledBody) -> None:
             f" expected it on the origin of its line, a standing height below the root, {expected[leg].tolist()}"
         )
     own, aside, _ = _centre_of_mass(plain_model(body), body)
-    if masses.centre_of_mass == 0.0 and abs(own) > allowed:
+    if conditions.centre_of_mass == 0.0 and abs(own) > allowed:
         raise InputError(
             f"body {body.name!r}: at {body.home!r} its centre of mass lies {own:.4g} mm ahead of O; expected it at O,"
             f" or centre_of_mass = {own:.4g} among the conditions, to leave it there"
@@ -114,27 +114,27 @@ def gravity(body: Body) -> float:
 @lru_cache(maxsize=16)
 def _compiled(conditions: Conditions, looks: bool, pushes: bool, files: bytes) -> CompiledBody:
     """The body under some conditions, for its files as they are now."""
-    body, masses, contact = conditions.body, conditions.masses, conditions.contact
+    body = conditions.body
     plain, spec = _plain_model(body, files), _spec(body)
     spec.compiler.discardvisual = not looks
     try:
         complete(spec, plain, body, gains(plain, body), pushes)
-        lay_ground(spec, conditions.ground, body)
-        if masses.load:
-            _add_load(spec, body, masses.load)
-        if contact.grasp:
-            _add_grasp(spec, body, contact.grasp * body.mass * gravity(body))
+        lay_ground(spec, conditions)
+        if conditions.load:
+            _add_load(spec, body, conditions.load)
+        if conditions.grasp:
+            _add_grasp(spec, body, conditions.grasp * body.mass * gravity(body))
         model = spec.compile()
     except ValueError as error:
-        under = f"ground = {conditions.ground.ground!r}, load = {masses.load:g}, grasp = {contact.grasp:g}"
+        under = f"ground = {conditions.ground!r}, load = {conditions.load:g}, grasp = {conditions.grasp:g}"
         raise InputError(f"body {body.name!r} with {under} cannot be built: {_sentence(error)}") from None
-    model.pair_friction[:, :2] = contact.friction
+    model.pair_friction[:, :2] = conditions.friction
     feet = [model.site(foot).id for foot in body.feet]
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
     model.site_size[feet, 0] = radius + radius / 10  # around the foot: touch is felt inside the site alone
     check_finished(model, conditions)
-    if masses.leg_mass != 1.0 or masses.centre_of_mass != 0.0:
-        _redistribute(model, body, masses)
+    if conditions.leg_mass != 1.0 or conditions.centre_of_mass != 0.0:
+        _redistribute(model, conditions)
     return measured(model, conditions)
 
 
@@ -176,22 +176,26 @@ def _add_grasp(spec: mujoco.MjSpec, body: Body, force: float) -> None:
         )
 
 
-def _redistribute(model: mujoco.MjModel, body: Body, masses: Masses) -> None:
+def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
     """Give the legs their share of the mass, and move the trunk's masses until the centre of mass lies there."""
+    body = conditions.body
     legs = [model.body(part).id for leg in body.legs for part in leg.parts]
     trunk = [model.body(part).id for part in body.trunk]
     in_legs, in_trunk = model.body_mass[legs].sum(), model.body_mass[trunk].sum()
-    if not in_legs * masses.leg_mass < in_legs + in_trunk:
+    if not in_legs * conditions.leg_mass < in_legs + in_trunk:
         raise InputError(
-            f"body {body.name!r}: leg_mass = {masses.leg_mass:g}; expected below {1.0 + in_trunk / in_legs:.4g}, or"
+            f"body {body.name!r}: leg_mass = {conditions.leg_mass:g}; expected below {1.0 + in_trunk / in_legs:.4g}, or"
             " nothing is left of the trunk"
         )
-    for bodies, factor in ((legs, masses.leg_mass), (trunk, 1.0 + in_legs / in_trunk * (1.0 - masses.leg_mass))):
+    for bodies, factor in (
+        (legs, conditions.leg_mass),
+        (trunk, 1.0 + in_legs / in_trunk * (1.0 - conditions.leg_mass)),
+    ):
         model.body_mass[bodies] *= factor
         model.body_inertia[bodies] *= factor
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
-    offset = masses.centre_of_mass - _centre_of_mass(model, body)[0]
+    offset = conditions.centre_of_mass - _centre_of_mass(model, body)[0]
     in_all = np.where(model.body_rootid == model.body(body.root).id, model.body_mass, 0.0).sum()
     ahead = posed(model, model.qpos0).xmat[trunk, :3]  # the root's x in the frame of each part
     model.body_ipos[trunk] += offset * in_all / model.body_mass[trunk].sum() * ahead

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.newton import reach
 from hexmj.bodies.reading import joint_numbers, posed
+from hexmj.body import Body
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QPOS, Body
+from hexmj.body import ROOT_QPOS, Body
 
 
 def joint_numbers(model: mujoco.MjModel, body: Body) -> np.ndarray:

@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import table
-from hexmj.conditions import Conditions, Ground
+from hexmj.conditions import Conditions
 from hexmj.storage.results import save_text
 from hexmj.studies.biology import study as biology
 from hexmj.studies.biology.figure import biology_figure
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TABLE = "biology.md"
+HIDDEN = ("grasp", "ground", "ground_height", "ground_at", "ground_length", "ground_seed")
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Biology(StudyCommand):
     out: Path = Path("results/biology")
     walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "All walk so many periods.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), ["grasp", *vars(Ground())])
+    conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), HIDDEN)
     outputs = Outputs("walking beside the animal", "biology.nc", {"biology.png": biology_figure}, others=(TABLE,))
 
     def study(self) -> biology.Biology:

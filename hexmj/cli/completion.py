@@ -27,7 +27,7 @@ def _told(options: str, commands: Mapping[str, str]) -> str:
 
 def _words() -> dict[str, tuple[str, ...]]:
     """Option that names no file -> the words that it may be, as far as they are known."""
-    from hexmj.bodies.stick_insect import STICK_INSECT
+    from hexmj.body import STICK_INSECT
     from hexmj.controllers.cruse1998 import READINGS, Order
     from hexmj.timing import WINDOWS
 

@@ -168,7 +168,8 @@ def hiding(usual: Options, names: Collection[str], about: str = "") -> Options:
     values = {one.name: getattr(usual, one.name) for one in fields(whole)}
     parts = {name: hiding(value, names) for name, value in values.items() if is_dataclass(value) and name != "body"}
     if isinstance(usual, Conditions):
-        return replace(usual, **parts)
+        kind = type("Conditions", (Conditions,), {"HIDDEN": tuple(names), "__doc__": usual.__doc__})
+        return cast(Any, kind)(**values)
     hidden = [(name, Annotated[type(values[name]), Fixed, Suppress], values[name]) for name in names if name in values]
     namespace = {"__doc__": about or usual.__doc__}
     kind = make_dataclass(base.__name__, hidden, bases=(base,), namespace=namespace, frozen=True) if hidden else base

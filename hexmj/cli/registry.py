@@ -1,7 +1,7 @@
 """How types of this package are read from the command line, and which options are not as usual."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any, get_type_hints
 
 from tyro.constructors import (
@@ -13,8 +13,7 @@ from tyro.constructors import (
     StructTypeInfo,
 )
 
-from hexmj.conditions import Conditions, Ground, vain
-from hexmj.errors import InputError
+from hexmj.conditions import Conditions, check_ground
 from hexmj.legs import GEOMETRIES, Geometry
 
 registry = ConstructorRegistry()
@@ -37,28 +36,28 @@ def _named_geometry(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Geometr
 
 
 @registry.struct_rule
-def _conditions_by_name(info: StructTypeInfo) -> StructConstructorSpec | None:
-    """On the command line conditions are given one by one, and hold for the stick insect."""
-    if info.type is not Conditions:
+def _conditions(info: StructTypeInfo) -> StructConstructorSpec | None:
+    """On the command line conditions hold for the stick insect; those that `hiding` hides keep their values."""
+    if not (isinstance(info.type, type) and issubclass(info.type, Conditions)):
         return None
     usual = info.default if isinstance(info.default, Conditions) else Conditions()
-    hints = get_type_hints(Conditions, include_extras=True)
-    parts = [one.name for one in fields(Conditions) if one.name != "body"]
+    hints = get_type_hints(Conditions)
+    shown = [name for name in usual.values() if name not in getattr(info.type, "HIDDEN", ())]
 
     def conditions(**given: Any) -> Conditions:
-        if type(ground := given["ground"]) is Ground and (names := vain(ground)):
-            name = names[0].replace("_", "-")
-            raise InputError(f"--{name} with --ground {ground.ground}; expected it with a ground that has it")
-        return Conditions.of(**{name: value for part in given.values() for name, value in asdict(part).items()})
+        chosen = Conditions(**(usual.values() | given))
+        if {"ground", "ground_seed"} <= given.keys():
+            check_ground(chosen)
+        return chosen
 
     return StructConstructorSpec(
-        conditions, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in parts)
+        conditions, tuple(StructFieldSpec(name, hints[name], getattr(usual, name)) for name in shown)
     )
 
 
 def changed(given: Any, usual: Any) -> Iterator[str]:
     """Names of the options, of their parts too, that are not as usual; both are of one dataclass."""
-    for name in (one.name for one in fields(given)):
+    for name in (one.name for one in fields(given) if one.name != "body"):
         value, other = getattr(given, name), getattr(usual, name)
         if value != other:
             yield from changed(value, other) if is_dataclass(value) and not isinstance(value, Geometry) else [name]

@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
-from hexmj.conditions import Conditions, Ground
+from hexmj.conditions import Conditions
 from hexmj.measures.captions import starts_in_words
 from hexmj.studies.terrain import study as terrain
 from hexmj.studies.terrain.figure import terrain_figure
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
 
 TABLED = ("flss", "flss_low", "flss_high", "reached", "crossed")
 """What is printed as JSON of every obstacle, grasp and velocity."""
-
-
-@dataclass(frozen=True)
-class _Ground(Ground):
-    """What lies ahead, beside the lists."""
-
-    ground_at: float = FARTHER.ground.ground_at
-    """Where obstacles begin, ahead of O at the start [mm]."""
-    ground_length: float = Ground.ground_length
-    """Length of hurdles along the way [mm]."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +44,7 @@ class Terrain(StudyCommand):
     out: Path = Path("results/terrain")
     walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "Each start walks a distance instead of a time.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = hiding(replace(FARTHER, ground=_Ground()), VARIED)
+    conditions: OmitArgPrefixes[Conditions] = hiding(FARTHER, VARIED)
     outputs = Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
 
     def study(self) -> terrain.Terrain:
@@ -91,7 +81,7 @@ class Terrain(StudyCommand):
     def _on_the_roughest(self) -> Conditions:
         """With the ground, where one is rough, whose bumps some walks may get past."""
         ground = {"ground": "rough", "ground_height": max(self.heights)} if "rough" in self.grounds else {}
-        return replace(self.conditions, ground=replace(self.conditions.ground, **ground))
+        return replace(self.conditions, **ground)
 
 
 def _table(result: "xr.Dataset", trunk: tuple[str, ...]) -> "Table":

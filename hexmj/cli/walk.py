@@ -1,7 +1,7 @@
 """`hexmj walk`."""
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,9 @@ from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import four_digits, print_json, save_figure, show
 from hexmj.cli.walking_command import WalkingCommand
-from hexmj.conditions import FootPath, TimeScale
 from hexmj.storage.results import results_folder
 
-SHOWN = tuple(one.name for part in (TimeScale, FootPath) for one in fields(part))
+SHOWN = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
 """Conditions that the puppet of a plan shows too."""
 
 TIMES = ("planned loss", "measured loss", "fall")
@@ -62,7 +61,7 @@ class Walk(WalkingCommand):
             print_json(summary | {"settings": told, "searched": self.searched, "files": files})
         else:
             lines = [f"{key}: {_told(key, value)}" for key, value in summary.items() if value is not None]
-            beyond = () if self.physical else self.conditions.flat().keys() - {*SHOWN}  # what a puppet obeys
+            beyond = () if self.physical else self.conditions.values().keys() - {*SHOWN}  # what a puppet obeys
             show(title, *lines, self.conditions_line(varied=beyond), *map(str, files))
 
 

@@ -13,7 +13,7 @@ from hexmj.checks import numbers
 from hexmj.cli.loaded import seeds_of_searches
 from hexmj.cli.options import Accelerating, Controlled, Walks
 from hexmj.cli.registry import changed
-from hexmj.conditions import Conditions, Numerics, unusual
+from hexmj.conditions import Conditions, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 from hexmj.legs import GEOMETRIES
@@ -87,7 +87,7 @@ class WalkingCommand:
         line += "".join(f"; {name}: {told}" for name in self.names if (told := self.controlled.brought(name)))
         line += "; feedback" if self.controlled.feedback else ""
         if physical:
-            values = self.conditions.flat()
+            values = self.conditions.values()
             told = {*TOLD, *unusual(values)} - {*varied}
             shown = (key for key in values if key in told)
             line += "; " + ", ".join(f"{key} {values[key]}" for key in shown)
@@ -99,14 +99,14 @@ class WalkingCommand:
         from hexmj.bodies.grounds import end_of_bumps
         from hexmj.studies.terrain.study import reach
 
-        ground = self.conditions.ground
-        if ground.ground == "flat":
+        conditions = self.conditions
+        if conditions.ground == "flat":
             return ""
         farthest = self.farthest() if walked is None else walked
         foremost = farthest + reach(self.walks.stride)[0]
-        if not foremost > ground.ground_at:
+        if not foremost > conditions.ground_at:
             return f"; nobody gets to what lies ahead: {farthest:g} mm are walked at most"
-        if ground.ground == "rough" and foremost > (end := end_of_bumps(ground, self.conditions.body.lengths)):
+        if conditions.ground == "rough" and foremost > (end := end_of_bumps(conditions)):
             return f"; the bumps end {end:g} mm ahead, and the plane follows"
         return ""
 
@@ -142,8 +142,8 @@ class WalkingCommand:
         from hexmj.controllers.checked_plans import begin
         from hexmj.starts import checked_list, draw_starts
 
-        gap, stride = self.conditions.numerics.contact_gap, self.walks.stride
-        if gap != Numerics.contact_gap:
+        gap, stride = self.conditions.contact_gap, self.walks.stride
+        if gap != Conditions.contact_gap:
             starts, acceleration = draw_starts(1, self.walks.seed, stride), self.accelerating.procedure
             v = checked_list(np.unique(numbers("velocities", self.commanded)).tolist())[:1]
             plans = (begin(one, starts, v, stride, acceleration, threads=1) for one in controllers)

@@ -56,7 +56,7 @@ class Sensed:
     tips: np.ndarray
     """(n, leg, axis) where the joint angles put the tips in the root frame: forward, left, up of O [mm]."""
     contact: np.ndarray
-    """(n, leg) whether the ground carried the foot within the last `Numerics.contact_gap`."""
+    """(n, leg) whether the ground carried the foot within the last `Conditions.contact_gap`."""
     gained: np.ndarray
     """(n, leg) contact now, and none a step before."""
     lost: np.ndarray

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.jitted import jitted, part
 from hexmj.stability import margins
 

@@ -106,7 +106,7 @@ def spaces_of(compiled: CompiledBody, task: Task) -> tuple[Any, spaces.Box]:
 
 def metadata_of(task: Task) -> dict[str, Any]:
     """What Gymnasium wants to know; frames are drawn in real time if one is drawn after each step."""
-    fps = max(1, round(1.0 / task.conditions.time.seconds(task.stride)))
+    fps = max(1, round(1.0 / task.conditions.seconds(task.stride)))
     return {"render_modes": RENDER_MODES[1:], "render_fps": fps}
 
 

@@ -13,8 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hexmj.bodies.description import Body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import NO_ARRAY, numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
@@ -138,7 +137,7 @@ class OffsetPlan:
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self._policy, self.made_for = plan, policy, conditions
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
-        self._tips = standing_tips(plan.starts, conditions.path.standing_height, plan.stride)
+        self._tips = standing_tips(plan.starts, conditions.standing_height, plan.stride)
         self._stance = np.ones(plan.starts.shape)
         self._felt, self._told = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
 
@@ -172,11 +171,11 @@ class OffsetPlan:
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
         rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
         x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)  # where legs step, or the plan itself goes
-        height = up + self.made_for.path.standing_height
+        height = up + self.made_for.standing_height
         return replace(step, x=x[None], y=y[None], height=height[None])
 
     def _upright(self, velocity: np.ndarray) -> np.ndarray:
         """What is felt on paper."""
         still = np.zeros((len(self.starts), 3))
-        ahead = np.stack([velocity * self.made_for.time.vp, still[:, 0], still[:, 0]], axis=1)
+        ahead = np.stack([velocity * self.made_for.vp, still[:, 0], still[:, 0]], axis=1)
         return felt(self.made_for.body, still[:, :2], ahead, still, self._stance, self._stance, self._tips)

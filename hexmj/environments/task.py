@@ -14,7 +14,7 @@ Observations, all float64 and cut off at their bounds (`observation_bounds`):
 - angular_velocity: of the root, in its own frame [rad/s]
 - clearance: height of the trunk's lowest point, (1,) [mm]
 - tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `Numerics.contact_gap`, as the last physics step
+- contact: (leg,) 1 where the ground carried the foot within the last `Conditions.contact_gap`, as the last physics step
   began
 - margin: measured stability margin, (1,) [mm], from the feet in contact and the insect's own centre of mass;
   `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
@@ -40,7 +40,7 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.checks import check_types, numbers
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -87,7 +87,7 @@ class Task:
                 f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p"
             )
         check_controller_type(self.controller)
-        check_obeyed(self.conditions)
+        check_ground(self.conditions)
         steps_within(self.duration, self.stride)
 
     @property
@@ -103,7 +103,7 @@ class Task:
     @property
     def command(self) -> float:
         """Velocity to walk at [mm/s]."""
-        return self.velocity * self.conditions.time.vp
+        return self.velocity * self.conditions.vp
 
 
 def task_of(settings: Mapping[str, Any]) -> Task:

@@ -77,8 +77,8 @@ class Walkers:
         self._task, self._compiled, self._threads = task, compiled, threads
         self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
-        self._grasps = task.conditions.contact.grasp > 0
-        self._ends = task.conditions.ground.ground in WITH_ENDS
+        self._grasps = task.conditions.grasp > 0
+        self._ends = task.conditions.ground in WITH_ENDS
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
@@ -121,7 +121,7 @@ class Walkers:
         else:
             self._senses.restart(ids, settled)
         self._joints[ids] = settled.ctrl[:, self._compiled.columns.ctrl].reshape(len(ids), 6, -1)
-        standing = standing_tips(settled.starts, task.conditions.path.standing_height, task.stride)
+        standing = standing_tips(settled.starts, task.conditions.standing_height, task.stride)
         for shown, now in zip(self._planned, (1.0, standing, 0.0), strict=True):
             shown[ids] = now
         self._done[ids], self._walking[ids] = 0, True
@@ -190,7 +190,7 @@ class Walkers:
         any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, said)
         if self._ends:
             feet, conditions = self.places.sensors[ids, self._compiled.columns.foot], self._task.conditions
-            beyond = beyond_the_ground(conditions.ground, conditions.body.lengths, feet.reshape(-1, 6, 3)).any(axis=1)
+            beyond = beyond_the_ground(conditions, feet.reshape(-1, 6, 3)).any(axis=1)
             acted.truncated[ids] |= beyond & ~acted.terminated[ids]
             any_over |= bool(acted.truncated.any())
         if any_over:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from hexmj.checks import check_types, given, printable, short, typed
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
@@ -67,7 +67,7 @@ class Comparison:
             printable("a controller's name", name)
             settings_of(controller)  # now, not after the work
         check_draw(self.n_starts, self.seed)
-        check_obeyed(self.conditions)
+        check_ground(self.conditions)
         _ = self.observed
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.checks import given, typed
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.checked_plans import begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
 from hexmj.diagrams import footfall_html
@@ -138,7 +138,7 @@ def physical_walk(
         InputError, SimulationError: see `settling.settle` and `drive.drive`.
     """
     stride, conditions = given("stride", stride, Stride), given("conditions", conditions, Conditions)
-    check_obeyed(conditions)
+    check_ground(conditions)
     with shown(progress, "walking") as told:
         how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
         planned = walk(starts, controller, velocity, duration, **how)

@@ -25,7 +25,7 @@ def grounded(walk: PhysicalWalk, share: float = GROUNDED) -> Walk:
     Raises:
         InputError: it is no physical walk.
     """
-    near = typed("walk", walk, PhysicalWalk).height <= share * walk.conditions.path.standing_height
+    near = typed("walk", walk, PhysicalWalk).height <= share * walk.conditions.standing_height
     return replace(walk.measured, stance=walk.measured.stance | near)
 
 

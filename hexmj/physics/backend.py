@@ -101,7 +101,7 @@ class MujocoBatch:
         self._batch = Batch(model, count, thread_count(threads))
         self._timestep, self._contact = self._batch.expand("opt.timestep"), self._batch.expand("pair_solref")
         self._disabled, self._corners = self._batch.expand("opt.disableflags"), compiled.trunk_corners
-        flat = compiled.conditions.ground.ground == "flat"
+        flat = compiled.conditions.ground == "flat"
         self._clear = CLEAR * compiled.body.standing_height if flat else np.inf
         self._state = [self._batch.bind(name) for name in STATE]
         self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]

@@ -43,7 +43,7 @@ class Chunk:
     sensors: np.ndarray
     """(n, substep, column), see `compiled.Columns`; the ground's forces are means over a step in parts."""
     standing: np.ndarray
-    """(n, substep, leg) whether the ground carried the foot within the last `Numerics.contact_gap`."""
+    """(n, substep, leg) whether the ground carried the foot within the last `Conditions.contact_gap`."""
     load: np.ndarray
     """(n, substep, leg) force of the ground on the foot along its normal, adhesion taken off [g mm/s^2]."""
     targets: np.ndarray
@@ -119,17 +119,17 @@ class Insects:
 
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
         """Refuse walks, (n, substep, column) until they fall, that lead beyond the ground that was laid."""
-        conditions, body = self.settled.conditions, self.settled.conditions.body
-        if conditions.ground.ground not in WITH_ENDS:
+        conditions = self.settled.conditions
+        if conditions.ground not in WITH_ENDS:
             return
         feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
-        beyond = beyond_the_ground(conditions.ground, body.lengths, feet).any(axis=2)
+        beyond = beyond_the_ground(conditions, feet).any(axis=2)
         beyond &= np.arange(sensors.shape[1]) < valid[:, None]
         if beyond.any():
             row, substep = np.argwhere(beyond)[0]
             x, y, _ = feet[row, substep].mean(axis=0).round().tolist()
             raise InputError(
-                f"start {ids[row]} walks off the {conditions.ground.ground} at x = {x:g} mm, y = {y:g} mm;"
+                f"start {ids[row]} walks off the {conditions.ground} at x = {x:g} mm, y = {y:g} mm;"
                 " expected shorter walks, in which no start leaves it"
             )
 
@@ -161,8 +161,8 @@ class Insects:
         if self._push:
             self._batch.push[:] = 0.0
         if self._push and self._push.impulse.any():
-            stride, seconds = self.settled.stride, self.settled.conditions.time.seconds(self.settled.stride)
-            first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions.time, stride)
+            stride, seconds = self.settled.stride, self.settled.conditions.seconds(self.settled.stride)
+            first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions, stride)
             begin = self._push.begins(stride)
             now = (begin <= first) & (first < begin + lasts)
             self._batch.push[:] = now * (self._push.impulse / (lasts * seconds))

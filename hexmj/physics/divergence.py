@@ -15,9 +15,8 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch
@@ -30,7 +29,9 @@ STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
 
 def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
     """The error of an insect that diverged while it was `doing` something, at a time [time units]."""
-    state = error.state | {"conditions": np.array(json.dumps(conditions.flat(), default=lambda number: number.item()))}
+    state = error.state | {
+        "conditions": np.array(json.dumps(conditions.values(), default=lambda number: number.item()))
+    }
     sentence = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
     return SimulationError(sentence, state, f"diverged-start-{error.start}.npz")
 
@@ -88,7 +89,7 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
         with np.load(io.BytesIO(content)) as file:
             saved = dict(file)
         conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
-        compiled = compile_body(Conditions.of(body=body, **conditions), float(saved["timestep"]))
+        compiled = compile_body(Conditions(body=body, **conditions), float(saved["timestep"]))
         compiled.model.pair_solref[:, 0] = saved["contact"]
         data = mujoco.MjData(compiled.model)
         for name in STATE:

@@ -49,8 +49,8 @@ def drive(
         StillThrown: the observation time ends before a push is over, after the last chunk.
     """
     if push:
-        push.check_within(duration, settled.conditions.time, settled.stride, len(settled.starts))
-    divisor = push.divisor(settled.conditions.time, settled.stride) if push else 0
+        push.check_within(duration, settled.conditions, settled.stride, len(settled.starts))
+    divisor = push.divisor(settled.conditions, settled.stride) if push else 0
     insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
     total = int(steps_within(duration, settled.stride)) * settled.substeps
     told, walking = 0.0, np.arange(len(settled.starts))

@@ -46,7 +46,11 @@ def explosion(
         settled: what the walks began with.
     """
     most, tumbling = most_energy(settled, impulse), TUMBLING * settled.compiled.body.lengths.shortest_leg
-    top, timestep, twice_g = settled.conditions.ground.top, settled.compiled.model.opt.timestep, _twice_gravity(settled)
+    top, timestep, twice_g = (
+        settled.conditions.highest_ground,
+        settled.compiled.model.opt.timestep,
+        _twice_gravity(settled),
+    )
     row, t = _first_odd((qpos, centre), valid, impulse != 0.0, (most, tumbling), (top, timestep, twice_g))
     if row < 0:
         return None
@@ -96,7 +100,7 @@ def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: n
     Raises:
         StillThrown: the first of them.
     """
-    speed, height = np.linalg.norm(qvel[:, :3], axis=1), qpos[:, 2] - settled.conditions.ground.top
+    speed, height = np.linalg.norm(qvel[:, :3], axis=1), qpos[:, 2] - settled.conditions.highest_ground
     energy, most = height + speed**2 / _twice_gravity(settled), most_energy(settled, np.zeros(1))[0]
     thrown = np.flatnonzero((energy > most) & (impulse != 0.0))
     if len(thrown):
@@ -110,7 +114,7 @@ def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: n
 def most_energy(settled: Settled, impulse: np.ndarray) -> np.ndarray:
     """Greatest energy after a push, (n,) [g mm/s], as a height, (n,) [mm]."""
     body = settled.compiled.body
-    fastest = settled.conditions.time.vp + np.abs(impulse) / body.mass
+    fastest = settled.conditions.vp + np.abs(impulse) / body.mass
     return MOST_ENERGY * body.lengths.shortest_leg + fastest**2 / _twice_gravity(settled)
 
 

@@ -111,7 +111,7 @@ class FineSteps:
 
 def allowed_depth(compiled: CompiledBody) -> float:
     """How deep a foot of a body may be in the ground [mm]."""
-    return SINK * compiled.conditions.path.standing_height
+    return SINK * compiled.conditions.standing_height
 
 
 def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:

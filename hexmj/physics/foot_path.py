@@ -1,7 +1,7 @@
 """From the planned walk to the tips that the legs must follow, physics step by physics step.
 
 The plan says where a tip is and whether it swings; where it leaves the height to the body, a foot is raised in
-`FootPath.lift_time` as its leg begins to protract, and lowered over the last `FootPath.landing_time` before the AEP
+`Conditions.lift_time` as its leg begins to protract, and lowered over the last `Conditions.landing_time` before the AEP
 that the plan names, so that it meets the ground where the plan lets it stand.  Where a swing ends elsewhere it is
 lowered from then on.  These are times of the physical world: both transitions vanish against the stride as V_p goes to
 zero.
@@ -33,8 +33,8 @@ class TipTargets:
         self._stance = np.ones(starts.shape, dtype=bool)
         self._lift, self._height = np.zeros(starts.shape), np.zeros(starts.shape)
         self._conditions, self._substeps = conditions, conditions.substeps(stride)
-        path, substep = conditions.path, 1000.0 * conditions.time.seconds(stride) / self._substeps
-        self._rates = substep / path.lift_time, substep / path.landing_time, path.landing_distance(conditions.time)
+        substep = 1000.0 * conditions.seconds(stride) / self._substeps
+        self._rates = substep / conditions.lift_time, substep / conditions.landing_time, conditions.landing_distance
         self._origin = np.array(stride.geometry.origin)
 
     def follow(self, plan: PlannedWalk, ids: np.ndarray) -> np.ndarray:
@@ -42,12 +42,14 @@ class TipTargets:
 
         They are those of some starts, (n,), in the next steps of their plan, which is of all starts.
         """
-        m, path = self._substeps, self._conditions.path
+        m, conditions = self._substeps, self._conditions
         tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
         planned = plan.x, plan.y, plan.stance, plan.aep, plan.height
         wanted = tuple(map(np.ascontiguousarray, planned))  # of one layout, for it would be compiled for each
         last = self._x, self._y, self._stance, self._lift, self._height
-        _follow(wanted, ids, last, m, self._rates, (path.step_height, path.standing_height), self._origin, tips)
+        _follow(
+            wanted, ids, last, m, self._rates, (conditions.step_height, conditions.standing_height), self._origin, tips
+        )
         for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
             old[ids] = values[-1, ids]
         return tips

@@ -69,7 +69,7 @@ class OrdersFromPlan:
         self._chunk, self._planned = steps_in_chunk(settled.substeps, multiple), list[PlannedWalk]()
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
-        self.tips = standing_tips(settled.starts, settled.conditions.path.standing_height, settled.stride)
+        self.tips = standing_tips(settled.starts, settled.conditions.standing_height, settled.stride)
 
     def steps_ahead(self) -> int:
         """Steps of the plan in the next chunk, 0 where the walk has ended."""
@@ -92,7 +92,7 @@ class OrdersFromPlan:
         tips = np.concatenate([self.tips[ids, None], tips], axis=1)  # the insect is shown before each substep
         self.tips[ids] = tips[:, -1]
         control = joints.reshape(*joints.shape[:2], -1)
-        if self._settled.conditions.contact.grasp:
+        if self._settled.conditions.grasp:
             control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
         if self._done == self._steps:  # one substep more shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
@@ -122,7 +122,7 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
         made_for = getattr(plan, "made_for", None)
     if isinstance(made_for, Conditions):
         here, there = conditions.settings(), made_for.settings()
-        for name in (*vars(conditions.time), *vars(conditions.path), "body"):
+        for name in ("vp", "step_height", "standing_height", "lift_time", "landing_time", "body"):
             if here[name] != there[name]:
                 raise InputError(
                     f"the plan is made for {name} = {there[name]}; expected that of the conditions, {here[name]}"

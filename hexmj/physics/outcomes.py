@@ -107,7 +107,7 @@ class OutcomesSoFar:
         never = np.full(size, np.inf)
         self._sums = _Sums(never, np.ones(size), never.copy(), slid, contacts, saturated, shown, misses)
         self._before = np.zeros((size, compiled.model.nsensordata))
-        columns, ground = compiled.columns, -settled.conditions.path.standing_height
+        columns, ground = compiled.columns, -settled.conditions.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
         self._scale = ground, lengths.tracking_bin
 

@@ -6,7 +6,7 @@ from math import gcd
 import numpy as np
 
 from hexmj.checks import numbers
-from hexmj.conditions import TimeScale
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.timing import Stride, steps_within
 
@@ -14,21 +14,21 @@ PUSH_LASTS = 0.025
 """How long a push lasts [s]."""
 
 
-def steps_pushed(time: TimeScale, stride: Stride) -> int:
+def steps_pushed(conditions: Conditions, stride: Stride) -> int:
     """Steps of the plan that a push lasts.
 
     Raises:
         InputError: not even one.
     """
-    if not can_push(time, stride):
-        told = f"{1e3 * time.seconds(stride):g} ms; expected less than {2e3 * PUSH_LASTS:g} ms"
+    if not can_push(conditions, stride):
+        told = f"{1e3 * conditions.seconds(stride):g} ms; expected less than {2e3 * PUSH_LASTS:g} ms"
         raise InputError(f"steps of the plan last {told}, since a push lasts {1e3 * PUSH_LASTS:g} ms")
-    return round(PUSH_LASTS / time.seconds(stride))
+    return round(PUSH_LASTS / conditions.seconds(stride))
 
 
-def can_push(time: TimeScale, stride: Stride, window: float = np.inf) -> bool:
+def can_push(conditions: Conditions, stride: Stride, window: float = np.inf) -> bool:
     """Whether steps of the plan are short enough for a push, and a window [time units] holds it."""
-    return 0 < round(PUSH_LASTS / time.seconds(stride)) <= window / stride.dt + 1e-6
+    return 0 < round(PUSH_LASTS / conditions.seconds(stride)) <= window / stride.dt + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,16 +51,16 @@ class Push:
         """(start,) steps of the plan before it."""
         return np.floor(self.time / stride.dt + 1e-9).astype(int)
 
-    def divisor(self, time: TimeScale, stride: Stride) -> int:
+    def divisor(self, conditions: Conditions, stride: Stride) -> int:
         """The most steps of which beginnings and ends are multiples: chunks of these cut no push; 0 without one.
 
         Raises:
             InputError: see `steps_pushed`.
         """
         begins = self.begins(stride)[self.impulse != 0.0]
-        return gcd(steps_pushed(time, stride), *begins.tolist()) if begins.size else 0
+        return gcd(steps_pushed(conditions, stride), *begins.tolist()) if begins.size else 0
 
-    def check_within(self, duration: float, time: TimeScale, stride: Stride, n_starts: int) -> None:
+    def check_within(self, duration: float, conditions: Conditions, stride: Stride, n_starts: int) -> None:
         """Refuse a push that is not of so many starts, or not all within a duration [time units].
 
         Raises:
@@ -70,7 +70,7 @@ class Push:
             if values.shape != (n_starts,):
                 raise InputError(f"a push's {name} has the shape {values.shape}; expected one of {n_starts} starts")
         steps, pushed = int(steps_within(duration, stride)), self.impulse != 0.0
-        lasts = steps_pushed(time, stride) if pushed.any() else 0
+        lasts = steps_pushed(conditions, stride) if pushed.any() else 0
         beside = pushed & ((self.time < 0.0) | (self.begins(stride) + lasts > steps))
         if beside.any():
             start = int(np.argmax(beside))

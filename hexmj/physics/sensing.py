@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QPOS, ROOT_QVEL
+from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.conditions import ROUNDING
 from hexmj.controllers.protocol import Sensed
 from hexmj.jitted import jitted
@@ -14,13 +14,13 @@ from hexmj.rotations import heading, lean, turned
 
 
 class Senses:
-    """Of settled starts, as they walk; a foot stands that the ground carried within the last `Numerics.contact_gap`."""
+    """Senses of settled starts; a foot stands if the ground carried it within the last `Conditions.contact_gap`."""
 
     def __init__(self, settled: Settled) -> None:
         """All feet stand."""
         self._compiled = settled.compiled
         self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
-        gap = settled.conditions.numerics.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
+        gap = settled.conditions.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
         self._longest_gap = math.floor(gap * (1.0 + ROUNDING))  # substeps
         self._before = np.ones(settled.starts.shape, dtype=bool)
         self._load, self._torques = settled.load.copy(), settled.torques.copy()

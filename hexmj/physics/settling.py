@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.description import ROOT_QPOS
 from hexmj.bodies.loading import check_home, compile_body
+from hexmj.body import ROOT_QPOS
 from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, OutOfReach, SimulationError
@@ -95,7 +95,7 @@ class Settling:
             InputError, SimulationError: see `settle`.
         """
         conditions, stride, compiled = self._conditions, self._stride, self._compiled
-        height, settling_time = conditions.path.standing_height, conditions.numerics.settling_time
+        height, settling_time = conditions.standing_height, conditions.settling_time
         x = checked_starts(starts, stride)
         names = np.arange(len(x)) if names is None else names
         check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
@@ -118,7 +118,7 @@ class Settling:
         except Diverged as error:
             error.start = int(names[error.start])
             raise walk_error(error, "settling", 0.0, conditions) from None
-        if conditions.contact.grasp:
+        if conditions.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
         touch, trunk = batch.sensors[:, columns.touch], batch.sensors[:, columns.trunk]
         load = compiled.carried(batch.sensors, batch.force)
@@ -172,7 +172,7 @@ def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:
     Raises:
         InputError: it does.
     """
-    if conditions.contact.grasp > 0:
+    if conditions.grasp > 0:
         with suppress(OutOfReach, SimulationError):  # whether this start comes to rest is asked where it walks
             settle(draw_starts(1, seed, stride), conditions, stride, threads=1)
 
@@ -182,10 +182,10 @@ def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
 
     Every step would be taken finely then, on contacts so hard that they throw the insect off.
     """
-    deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.contact.grasp
-    allowed = RESTING * SINK * compiled.conditions.path.standing_height
+    deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.grasp
+    allowed = RESTING * SINK * compiled.conditions.standing_height
     if deepest > allowed:
-        load = compiled.conditions.masses.load
+        load = compiled.conditions.load
         raise InputError(
             f"grasp = {grasp:g}; expected at most about {grasp * allowed / deepest:.2g}"
             f"{f' with a load of {load:g}' if load else ''}: it presses feet"

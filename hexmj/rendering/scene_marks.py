@@ -5,7 +5,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from hexmj.bodies.description import Marks
+from hexmj.body import Marks
 
 STABLE = (0.05, 0.55, 0.32)
 UNSTABLE = (0.84, 0.24, 0.02)

@@ -47,15 +47,16 @@ def body_shape(model: mujoco.MjModel) -> Shape:
 
 def ground_shape(compiled: CompiledBody) -> Shape:
     """What lies on the plane or ahead of the feet, without the plane itself."""
-    model, ground, lengths = compiled.model, compiled.conditions.ground, compiled.conditions.body.lengths
+    model, conditions = compiled.model, compiled.conditions
+    lengths = conditions.body.lengths
     laid = (i for i in range(model.ngeom) if not model.geom_bodyid[i] and model.geom_type[i] == KINDS.mjGEOM_BOX)
     shapes = [geom_shape(model, i) for i in laid]
-    if ground.ground == "rough":
+    if conditions.ground == "rough":
         spacing, margin = lengths.bump_spacing, lengths.highest_bump
         along, across = (spacing * (count - 1) + 2 * margin for count in BUMPS)
         x, y = (np.arange(0.0, length + spacing / FINE, spacing / FINE) for length in (along, across))
-        places = np.stack(np.meshgrid(x + ground.ground_at, y - across / 2, indexing="ij"), axis=-1)
-        shapes.append(surface(places, ground_level(ground, lengths, places)))
+        places = np.stack(np.meshgrid(x + conditions.ground_at, y - across / 2, indexing="ij"), axis=-1)
+        shapes.append(surface(places, ground_level(conditions, places)))
     return joined(shapes)
 
 

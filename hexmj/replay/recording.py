@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.description import ROOT_QPOS, Body
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.checks import path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
@@ -91,7 +90,7 @@ def record_plan(
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((len(plan.time), ROOT_QPOS))
     root[:, 0] = np.cumsum(planned.velocity[:, 0]) * stride.dt
-    root[:, 2] = conditions.path.standing_height + compiled.foot_radius
+    root[:, 2] = conditions.standing_height + compiled.foot_radius
     root[:, 3] = 1.0
     joints, reachable = compiled.inverse(tips)
     standing, stands = compiled.inverse(first)
@@ -150,8 +149,8 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
     if (found := recording.sizes["position"]) != (expected := ROOT_QPOS + len(body.joints)):
         raise InputError(f"the recording has {found} positions; expected {expected} of the body {name!r}")
     check_settings(recording)
-    told = {name: type(value)(recording.attrs[name]) for name, value in Conditions().flat().items()}
-    return Conditions.of(body=body, **told)
+    told = {name: type(value)(recording.attrs[name]) for name, value in Conditions().values().items()}
+    return Conditions(body=body, **told)
 
 
 def _check(recording: xr.Dataset) -> None:
@@ -168,7 +167,7 @@ def _dataset(
     typed("title", title, str)
     values |= {
         "time": planned.time,
-        "seconds": planned.time / conditions.time.vp,
+        "seconds": planned.time / conditions.vp,
         "velocity": planned.velocity[:, 0],
         "planned_x": planned.x[:, 0],
         "planned_y": planned.y[:, 0],
@@ -190,4 +189,4 @@ def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -
     x = planned.x[0] + planned.velocity[0, :, None] * stride.dt  # all legs retract in the first step
     tips = TipTargets(x, conditions, stride).follow(planned, np.array([0]))[0]
     m = conditions.substeps(stride)
-    return tips[m - 1 :: m], standing_tips(x[0], conditions.path.standing_height, stride)
+    return tips[m - 1 :: m], standing_tips(x[0], conditions.standing_height, stride)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.description import ROOT_QPOS
+from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions
 from hexmj.errors import LONGEST, InputError
 from hexmj.legs import LEGS, Geometry

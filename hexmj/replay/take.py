@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.grounds import ground_level
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.replay.recording import recorded_conditions
@@ -65,7 +64,7 @@ class Take:
         few, conditions = recording.isel(step=shown), recorded_conditions(recording, body)
         if physical and not -1 <= (part := int(recording["fall_part"])) < len(body.trunk):
             raise InputError(f"a recording has fall_part = {part}; expected 0 to {len(body.trunk) - 1}, or -1 for none")
-        centre, vp = few["centre_of_mass"].values, conditions.time.vp
+        centre, vp = few["centre_of_mass"].values, conditions.vp
         step = float(recording.attrs["dt"]) / vp
         ahead = few[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
         seen = np.stack([ahead, few[f"{kind}_y"].values], axis=-1)
@@ -122,4 +121,4 @@ def support_on_ground(
     """
     corners = support_polygon(feet, stance)
     below = np.vstack([corners, centre[:2]])
-    return corners, float(ground_level(conditions.ground, conditions.body.lengths, below).max())
+    return corners, float(ground_level(conditions, below).max())

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hexmj.checks import check_types, numbers, typed
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
@@ -65,7 +65,7 @@ class Problem:
         if self.feedback and not self.conditions:
             raise InputError("feedback without conditions; expected it with physical walks only")
         if self.conditions:
-            check_obeyed(self.conditions)
+            check_ground(self.conditions)
         if self.over != "usual" and not isinstance(self.form, NetworkForm):
             raise InputError(
                 f"over = {self.over!r} with {self.form!r:.80}; expected it with the 1998 network, whose rules vary"

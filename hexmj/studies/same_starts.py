@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from hexmj.checks import check_types
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import settings
@@ -42,9 +42,9 @@ class SameStarts:
         settings_of(self.controller)  # now, not after the work
         check_types(self)
         check_draw(self.n_starts, self.seed)
-        given, usual = self.conditions.flat(), Conditions().flat()
+        given, usual = self.conditions.values(), Conditions().values()
         if "ground" not in self.lists:
-            check_obeyed(self.conditions)
+            check_ground(self.conditions)
         for name, several in self.lists.items():
             if given[name] != usual[name]:
                 raise InputError(f"{name} = {given[name]}; expected {usual[name]}: {several} has all that are tried")

@@ -113,10 +113,10 @@ class BrowserView:
             v = walk.velocity
             velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="from the next step on")
             velocity.on_update(lambda _: self._wish(lambda walk: walk.steer(velocity=velocity.value)))
-            now = walk.conditions.time.vp
+            now = walk.conditions.vp
             vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="the walk begins again")
             vp.on_update(
-                lambda _: self._wish(lambda walk: walk.begin(conditions=walk.conditions.but(vp=float(vp.value))))
+                lambda _: self._wish(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
             )
             self.controls |= {"V": velocity, "V_p": vp}
             paused = gui.add_checkbox("pause", False)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.bodies.description import ROOT_QPOS
+from hexmj.body import ROOT_QPOS
 from hexmj.checks import given, numbers, typed
-from hexmj.conditions import Bound, Conditions, check_obeyed
+from hexmj.conditions import Bound, Conditions, check_ground
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
@@ -106,7 +106,7 @@ class LiveWalk:
         """
         start = self.start if start is None else numbers("start", in_order(start))
         wanted: Conditions = typed("conditions", self.conditions if conditions is None else conditions, Conditions)
-        check_obeyed(wanted)
+        check_ground(wanted)
         settled = settle(start[np.newaxis], wanted, self.stride, threads=1)
         plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
@@ -158,8 +158,8 @@ class LiveWalk:
             InputError: one of more than 80, or see `pushes.steps_pushed`.
         """
         PUSHES.check("impulse", impulse := typed("impulse", impulse, float))
-        self._lasts = steps_pushed(self.conditions.time, self.stride)
-        self._push.impulse[:] = impulse * self.conditions.body.mass * self.conditions.time.vp
+        self._lasts = steps_pushed(self.conditions, self.stride)
+        self._push.impulse[:] = impulse * self.conditions.body.mass * self.conditions.vp
         self._push.time[:] = (self._plan.done // self._lasts + 1) * self._lasts * self.stride.dt
 
     def advance(self, seconds: float) -> Moment:
@@ -176,7 +176,7 @@ class LiveWalk:
         AT_ONCE.check("seconds", seconds := typed("seconds", seconds, float))
         self._left += seconds
         self.trace = []
-        step = self.conditions.time.seconds(self.stride)
+        step = self.conditions.seconds(self.stride)
         steps = int(self._left / step + 1e-9)
         self._left -= steps * step
         while steps > 0 and not self.fell_on:
@@ -218,7 +218,7 @@ class LiveWalk:
         for n, column in enumerate(columns[columns < chunk.valid[0]]):
             step = column // self.settled.substeps
             yield Moment(
-                seconds=float(walk.time[n]) / self.conditions.time.vp,
+                seconds=float(walk.time[n]) / self.conditions.vp,
                 velocity=float(plan.velocity[step, 0]),
                 qpos=chunk.qpos[0, column],
                 feet=feet[column],

@@ -28,7 +28,7 @@ from pydrake.all import (  # pyright: ignore[reportMissingImports]
 )
 from pydrake.common.eigen_geometry import Quaternion  # pyright: ignore[reportMissingImports]
 
-from hexmj.bodies.description import ROOT_QPOS
+from hexmj.body import ROOT_QPOS
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.intervals import wilson_interval
@@ -119,10 +119,10 @@ class DrakeInsect:
         context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
         joints, reference = np.zeros(len(self._joints)), settled.compiled.model.qpos0[ROOT_QPOS:]
         joints[self._order] = settled.ctrl[start, : len(joints)] - reference
-        height = settled.conditions.path.standing_height + settled.compiled.foot_radius
+        height = settled.conditions.standing_height + settled.compiled.foot_radius
         plant.SetPositions(context, np.concatenate([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, height], joints]))
         h = settled.compiled.model.opt.timestep
-        resting = round(settled.conditions.numerics.settling_time / 1000.0 / h)
+        resting = round(settled.conditions.settling_time / 1000.0 / h)
         desired, (corners, radii) = np.zeros(2 * len(joints)), settled.compiled.trunk_corners
         port = plant.get_desired_state_input_port(plant.GetModelInstanceByName("DefaultModelInstance"))
         for step in range(resting + len(control)):
@@ -162,7 +162,7 @@ def main(count: int) -> None:
         agreed = int((fell == other).sum())
         low, high = wilson_interval(agreed, count)
         both = fell & other
-        apart = np.abs(ours[both] / settled.conditions.time.vp - theirs[both])
+        apart = np.abs(ours[both] / settled.conditions.vp - theirs[both])
         print(
             f"V = {velocity:g}: {fell.sum()} of {count} fall in MuJoCo, {other.sum()} in Drake, the same answer for"
             f" {agreed} ({low:.2f}-{high:.2f}); of the {both.sum()} that fall in both, half within"

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 import hexmj
-from hexmj.bodies.description import Body
+from hexmj.body import Body
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998, Weights
 from hexmj.controllers.protocol import Controller
@@ -62,9 +62,9 @@ def tried(seed: int, n_starts: int = STARTS) -> Account:
     values, factor = _conditions(rng), float(rng.choice([0.0, 0.0, 0.9, 0.95, 1.05, 1.15]))
     account = Account(Counter(drawn=n_starts), process=os.getpid())
     try:
-        conditions = hexmj.Conditions.of(body=_body(factor), **values) if factor else hexmj.Conditions.of(**values)
+        conditions = hexmj.Conditions(body=_body(factor), **values) if factor else hexmj.Conditions(**values)
         settled = settle(hexmj.draw_starts(n_starts, seed), conditions, threads=1)
-        impulse = rng.uniform(-80.0, 80.0, n_starts) * conditions.body.mass * conditions.time.vp
+        impulse = rng.uniform(-80.0, 80.0, n_starts) * conditions.body.mass * conditions.vp
         push = Push(impulse, rng.uniform(0.0, duration, n_starts)) if rng.random() < 0.2 else None
         plan = begin(controller, settled.starts, velocity, settled.stride, None, 1)
         lost = hexmj.first_loss(settled.starts, controller, velocity, duration, threads=1)

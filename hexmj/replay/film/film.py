@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from hexmj.bodies.description import Body
+from hexmj.body import Body
 from hexmj.checks import check_types
 from hexmj.errors import InputError
 

@@ -82,9 +82,9 @@ class Overlay:
         known = seconds < take.fell and not told
         margin = margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown"
         fields = (
-            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.time.vp:.1f} time units, {self._speed}",
+            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
             "V = ?" if told else f"V = {take.velocity[row]:.2f}",
-            f"Vₚ = {take.conditions.time.vp:g} mm/s",
+            f"Vₚ = {take.conditions.vp:g} mm/s",
             margin,
         )
         for place, text in zip((0.0, 0.51, 0.615, 0.79), fields, strict=True):

@@ -10,9 +10,8 @@ import mujoco
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.description import Body
 from hexmj.bodies.loading import compile_body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from hexmj.bodies.description import Body
-from hexmj.bodies.stick_insect import STICK_INSECT
+from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
 from hexmj.replay.page.page_data import shown

@@ -41,14 +41,14 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "physical": take.physical,
         "conditions": told_conditions(take.conditions, take.physical),
         "legs": LEGS,
-        "vp": take.conditions.time.vp,
+        "vp": take.conditions.vp,
         "step": take.step,
         "happened": happened(take),
         "lost": _or_none(take.lost),
         "fell": _or_none(take.fell),
         "part": take.part,
         "plane": float(compiled.model.geom(body.ground).pos[2]),
-        "gap": take.conditions.ground.ground == "gap",
+        "gap": take.conditions.ground == "gap",
         "marks": {"tip": body.marks.tip, "outline": body.marks.outline, "centre": body.marks.rim[0]},
         **_packed_parts(recording, PLANNED),
         "rows": packed(rows, "i4"),
@@ -65,11 +65,11 @@ def shown(recording: xr.Dataset, take: Take) -> dict[str, Any]:
 
 def told_conditions(conditions: Conditions, physical: bool) -> str:
     """What body walked, at which V_p, and under which conditions that are not the usual ones."""
-    values = conditions.flat()
+    values = conditions.values()
     body = conditions.body.name.replace("_", " ")
     who = f"{body} in physics" if physical else f"the plan, shown by a {body} that follows it"
     values_told = (f"{name.replace('_', ' ')} {values[name]}" for name in unusual(values) if name != "vp")
-    return ", ".join([who, f"V_p = {conditions.time.vp:g} mm/s", *values_told])
+    return ", ".join([who, f"V_p = {conditions.vp:g} mm/s", *values_told])
 
 
 def happened(take: Take) -> str:

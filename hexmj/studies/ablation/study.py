@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.checks import check_types, typed, whole
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
@@ -98,7 +98,7 @@ class Ablation:
 
     def __post_init__(self) -> None:
         check_types(self)
-        check_obeyed(self.conditions)
+        check_ground(self.conditions)
         check_counts(self, "n_physical")
         whole("periods", self.periods, CYCLES + 2)
         if not self.models:

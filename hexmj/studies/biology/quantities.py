@@ -131,7 +131,7 @@ def _posture(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     front ones."""
     coxae = _coxae(compiled)
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
-    below = [ground_level(compiled.conditions.ground, compiled.body.lengths, places[:, leg, :2]) for leg in range(6)]
+    below = [ground_level(compiled.conditions, places[:, leg, :2]) for leg in range(6)]
     height = places[..., 2] - compiled.foot_radius
     rise = height.reshape(-1, 2, 3).mean(axis=1)[:, [0, 2]] @ [1.0, -1.0]
     pitch = np.degrees(np.arcsin(rise / np.linalg.norm((coxae[0] - coxae[2])[[0, 2]])))
@@ -154,7 +154,7 @@ def _work(strides: Strides, compiled: CompiledBody) -> dict[str, Any]:
     centre = np.stack([_seen(one, FRAME / strides.step) for one in strides.centre.T], axis=1)
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=1) / strides.step
     gained = np.maximum(np.diff(0.5 * speed**2 + gravity * centre[1:, 2]), 0.0).sum()
-    gained *= 1.0 + compiled.conditions.masses.load  # which moves with it
+    gained *= 1.0 + compiled.conditions.load  # which moves with it
     return {
         "cost of transport, positive work": positive,
         "cost of transport, all work": np.abs(power).sum(axis=1).mean() / rate,

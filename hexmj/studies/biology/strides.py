@@ -111,7 +111,7 @@ def strides_between(settled: Settled, chunks: Sequence[Chunk], start: int, begun
 def rows_of_a_hop(settled: Settled) -> float:
     """Physics steps off the ground beyond which a foot swings, see `HOP`."""
     stride, step = settled.stride, settled.compiled.model.opt.timestep
-    return HOP * (stride.aep0 - stride.pep0) / settled.conditions.time.vp / step
+    return HOP * (stride.aep0 - stride.pep0) / settled.conditions.vp / step
 
 
 def onsets(standing: np.ndarray, hop: float) -> np.ndarray:

@@ -37,28 +37,28 @@ class Biology(SameStarts):
     def __post_init__(self) -> None:
         super().__post_init__()
         whole("periods", self.periods, MEASURED + 1, 1000)
-        vp = self.conditions.time.vp
+        vp = self.conditions.vp
         if not max(SPEEDS) < vp:
             raise InputError(f"vp = {vp}; expected more than {max(SPEEDS):g} mm/s, the fastest walk that is compared")
-        if (kind := self.conditions.ground.ground) != "flat":
+        if (kind := self.conditions.ground) != "flat":
             raise InputError(
                 f"ground = {kind}; expected flat: the last strides are measured, far beyond what lies ahead"
             )
-        if self.conditions.contact.grasp:
-            raise InputError(f"grasp = {self.conditions.contact.grasp}; expected 0, since adhesion is no ground force")
+        if self.conditions.grasp:
+            raise InputError(f"grasp = {self.conditions.grasp}; expected 0, since adhesion is no ground force")
 
     def cells(self) -> list[Cell]:
         """A cell for each speed; see `sweeps.Study`."""
         from hexmj.studies.biology.quantities import quantity_table
 
         def cell(speed: float) -> Cell:
-            velocity = speed / self.conditions.time.vp
+            velocity = speed / self.conditions.vp
             period = float(self.stride.periods(velocity))
             walks = self.walks(velocity, self.periods * period, self.conditions)
             own = {"walks": walks, "measured": MEASURED * period}
             return Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity)
 
-        check_velocities(self.controller, np.divide(SPEEDS, self.conditions.time.vp).tolist(), self.stride)
+        check_velocities(self.controller, np.divide(SPEEDS, self.conditions.vp).tolist(), self.stride)
         return [cell(speed) for speed in SPEEDS]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -117,7 +117,7 @@ class StableWalks:
         lost = np.where(first > 0, first * self.stride.dt, np.inf)
         times = {"time": time, "back": back[which], "planned_loss": lost}
         if conditions:
-            push = Push(np.full(len(time), case.impulse * conditions.body.mass * conditions.time.vp), time)
+            push = Push(np.full(len(time), case.impulse * conditions.body.mass * conditions.vp), time)
             settled = settle(starts, conditions, self.stride, threads)
             walks = ReadsLegs(disturbed) if isinstance(self.controller, ReadsLegs) else disturbed
             plan = begin(walks, starts, self.velocity, self.stride, recovery, threads=1)

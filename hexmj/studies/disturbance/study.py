@@ -5,7 +5,7 @@ seed's first starts whose plan is stable until then.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,7 +49,7 @@ class DisturbedWalks(SameStarts):
     recovery: Acceleration = RECOVERY
     """Of the strategy 'slow_down', from its low velocity to V."""
     adhesion: float = 1.0
-    """As `FootContact.grasp`, of the strategy 'grasp'."""
+    """As `Conditions.grasp`, of the strategy 'grasp'."""
     physical: bool = True
     """Walk in MuJoCo too."""
     n_starts: int = field(default=40, kw_only=True)
@@ -70,14 +70,14 @@ class DisturbedWalks(SameStarts):
                 f"recovery: V and the window after it take {longest:g} time units; expected at most {MOST_STEPS * dt:g}"
             )
         if self.physical and "push" in self.disturbances:
-            lasts = steps_pushed(self.conditions.time, self.stride)
+            lasts = steps_pushed(self.conditions, self.stride)
             if (steps_within(window, self.stride) < lasts).any():
                 raise InputError(
                     f"window = {self.window!r}, {window.min():g} time units; expected at least {lasts * dt:g}, which a"
                     " push lasts"
                 )
-        self.conditions.but(grasp=self.adhesion)
-        if "grasp" in self.strategies and (grasp := self.conditions.contact.grasp):
+        replace(self.conditions, grasp=self.adhesion)
+        if "grasp" in self.strategies and (grasp := self.conditions.grasp):
             raise InputError(f"grasp = {grasp:g}; expected 0, since the strategy 'grasp' has its own, adhesion")
         _ = self._cells()
 
@@ -97,7 +97,7 @@ class DisturbedWalks(SameStarts):
 
         check_velocities(self.controller, self.velocities, self.stride)
         if self.physical and "grasp" in self.strategies:
-            check_adhesion(self.conditions.but(grasp=self.adhesion), self.stride, self.seed)
+            check_adhesion(replace(self.conditions, grasp=self.adhesion), self.stride, self.seed)
         return self._cells()
 
     def _cells(self) -> list[Cell]:
@@ -107,7 +107,7 @@ class DisturbedWalks(SameStarts):
             return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
 
         def cell(walks: StableWalks, case: Case, window: float) -> Cell:
-            grasping = self.conditions.but(grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
+            grasping = replace(self.conditions, grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
             settings = {
                 "case": case,
                 "window": window,

@@ -1,7 +1,7 @@
 """The league: every entrant on paper, in physics, and in every trial; a cell for each."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,7 +92,7 @@ class League:
             raise InputError("no controller was given; expected at least one")
         for name, entrant in self.entrants.items():
             typed(f"entrants[{name!r}]", entrant, Entrant)
-        given, usual = self.conditions.flat(), Conditions().flat()
+        given, usual = self.conditions.values(), Conditions().values()
         for name in ("load", "ground", "ground_height", "ground_at", "ground_length"):
             if given[name] != usual[name]:
                 raise InputError(f"{name} = {given[name]!r}; expected {usual[name]!r}, since trials have their own")
@@ -118,8 +118,8 @@ class League:
             random = () if entrant.ideal else (self.tried_at, RANGE[1], *([FINAL] if self.accelerating else []))
             check_velocities(entrant.controller, (*self.observed[0].tolist(), *random), self.stride)
         tried = any(not entrant.ideal for entrant in self.entrants.values())
-        for load in (self.conditions.masses.load, *([LOAD] if tried else [])):
-            check_adhesion(self.conditions.but(load=load), self.stride, self.seed)
+        for load in (self.conditions.load, *([LOAD] if tried else [])):
+            check_adhesion(replace(self.conditions, load=load), self.stride, self.seed)
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
@@ -172,7 +172,7 @@ class League:
         window = float(observation_time(self.window, self.tried_at, self.stride))
         for trial in TRIALS:
             case = DISTURBED.get(trial)
-            if case and case.kind == "push" and not can_push(self.conditions.time, self.stride, window):
+            if case and case.kind == "push" and not can_push(self.conditions, self.stride, window):
                 continue
             if case and entrant.steerable:
                 how = {"case": case, "conditions": self.conditions, "grid": GRID}

@@ -1,6 +1,6 @@
 """What walks meet in the league, at one velocity: what disturbs them, and what a robot meets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.leg_lost import LegLost
@@ -79,13 +79,13 @@ def walking(name: str, entrant: Entrant, conditions: Conditions, velocity: float
     controller, body = entrant.controller, conditions.body
     if name in GROUNDS:
         near, high = body.lengths.nearest_obstacle, HEIGHT * body.standing_height
-        return Walking(controller, conditions.but(ground=name, ground_height=high, ground_at=near))
+        return Walking(controller, replace(conditions, ground=name, ground_height=high, ground_at=near))
     if name == "load":
-        return Walking(controller, conditions.but(load=LOAD))
+        return Walking(controller, replace(conditions, load=LOAD))
     if name in LEGS_LOST:
-        held = HELD * max(conditions.path.standing_height, body.standing_height)
+        held = HELD * max(conditions.standing_height, body.standing_height)
         return Walking(LegLost(controller, LEGS_LOST[name], held), conditions)
-    late, reading = DELAY * conditions.time.vp, entrant.reading(velocity, stride)
+    late, reading = DELAY * conditions.vp, entrant.reading(velocity, stride)
     if reading is None or (name == "late" and not round(late / stride.dt)):
         return None
     senses = (reading, PoorSenses(reading, noise=NOISE), PoorSenses(reading, delay=late))

@@ -40,4 +40,4 @@ def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
 
 def froude(conditions: Conditions, velocity: np.ndarray) -> np.ndarray:
     """The Froude number (V V_p)^2 / (g h) at each V_r, (velocity,); h is the standing height."""
-    return (velocity * conditions.time.vp) ** 2 / (gravity(conditions.body) * conditions.path.standing_height)
+    return (velocity * conditions.vp) ** 2 / (gravity(conditions.body) * conditions.standing_height)

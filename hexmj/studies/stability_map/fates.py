@@ -41,7 +41,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
     parts = [part for block in blocks for part in _within_reach(walks, block, threads)]
     if not parts:
-        value = conditions.flat()[over]
+        value = conditions.values()[over]
         raise InputError(
             f"{over} = {value:g}; none of {n_starts} starts stands on six feet there and reaches its tips"
             f" at V = {walks.velocity:g}"

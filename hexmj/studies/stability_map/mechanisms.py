@@ -58,7 +58,7 @@ def mechanisms(walk: PhysicalWalk, tipped: float = TIPPED) -> np.ndarray:
     steps = _time_constant(walk)
     upright = _long_upright(tilt < tipped, steps)
     caught = _caught(walk)
-    narrow = NARROW * walk.conditions.path.standing_height
+    narrow = NARROW * walk.conditions.standing_height
     names = np.full(len(fell), _NUMBER["never_lost"])
     for start, end in enumerate(known):
         one = slice(end), start
@@ -83,8 +83,8 @@ def fall_direction(walk: PhysicalWalk) -> np.ndarray:
 
 
 def static_plan(walk: PhysicalWalk) -> Walk:
-    """The planned walk seen from the body's own centre of mass at home, which `Masses.centre_of_mass` moves from O."""
-    return replace(walk.planned, x=walk.planned.x - walk.conditions.masses.centre_of_mass)
+    """The planned walk seen from the body's own centre of mass in the home posture."""
+    return replace(walk.planned, x=walk.planned.x - walk.conditions.centre_of_mass)
 
 
 def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
@@ -119,8 +119,8 @@ def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]
 
 def _time_constant(walk: PhysicalWalk) -> int:
     """That of an inverted pendulum of the standing height, sqrt(h / g), in steps of the plan."""
-    seconds = np.sqrt(walk.conditions.path.standing_height / gravity(walk.conditions.body))
-    return int(np.ceil(seconds / walk.conditions.time.seconds(walk.stride)))
+    seconds = np.sqrt(walk.conditions.standing_height / gravity(walk.conditions.body))
+    return int(np.ceil(seconds / walk.conditions.seconds(walk.stride)))
 
 
 def _long_upright(upright: np.ndarray, steps: int) -> np.ndarray:
@@ -135,7 +135,7 @@ def _caught(walk: PhysicalWalk) -> np.ndarray:
     One that is lowered to its AEP lands; where the plan names none, no foot is lowered in the air.
     """
     stance, stands = walk.planned.stance, walk.measured.stance
-    landing = walk.conditions.path.landing_distance(walk.conditions.time)
+    landing = walk.conditions.landing_distance
     held = ~stance & ~(walk.planned.x >= walk.planned.aep - landing)
     step = np.arange(len(stance), dtype=np.int32)[:, None, None]
     planned_down = np.maximum.accumulate(np.where(stance, step, -1), axis=0)

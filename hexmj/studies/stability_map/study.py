@@ -1,7 +1,7 @@
 """Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -84,7 +84,7 @@ class StabilityMap(SameStarts):
     @property
     def varied(self) -> list[Conditions]:
         """The conditions at each of them."""
-        return [self.conditions.but(**{self.over: value}) for value in self.chosen]
+        return [replace(self.conditions, **{self.over: value}) for value in self.chosen]
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +97,7 @@ class StabilityMap(SameStarts):
         from hexmj.studies.stability_map.fates import fates
 
         def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
-            name = f"{self.over}-{conditions.flat()[self.over]:g}-V-{velocity:g}"
+            name = f"{self.over}-{conditions.values()[self.over]:g}-V-{velocity:g}"
             work = time * conditions.substeps(self.stride)
             return Cell(name, fates, {"walks": self.walks(velocity, time, conditions), "over": self.over}, work)
 
@@ -123,7 +123,7 @@ class StabilityMap(SameStarts):
         from hexmj.studies.stability_map.differences import froude, with_differences
 
         table = self._over_values(data)
-        usual = Conditions().flat()[self.over]
+        usual = Conditions().values()[self.over]
         reference = usual if usual in self.chosen else self.chosen[0]
         numbers = np.array([froude(one, self.observed[0]) for one in self.varied])
         table = with_differences(table, reference).assign(froude=(("value", "velocity"), numbers, {"units": "1"}))

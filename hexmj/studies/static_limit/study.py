@@ -5,7 +5,7 @@ as the paper has them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 VARIED = {"vp": "vps", "leg_mass": "leg_masses"}
 """Conditions that are given as lists, and the lists."""
 
-FINE = Conditions.of(longest_substep=0.5)
+FINE = Conditions(longest_substep=0.5)
 """Light legs need physics steps of 0.5 ms or less."""
 
 
@@ -37,7 +37,7 @@ class StaticLimit(SameStarts):
     vps: Sequence[float] = (400.0, 200.0, 100.0, 50.0, 25.0)
     """Velocities V_p of a protracting tip [mm/s], each once."""
     leg_masses: Sequence[float] = (1.0, 0.01)
-    """As `Masses.leg_mass`, each once."""
+    """As `Conditions.leg_mass`, each once."""
     n_starts: int = field(default=200, kw_only=True)
     conditions: Conditions = field(default=FINE, kw_only=True)
 
@@ -55,7 +55,7 @@ class StaticLimit(SameStarts):
     @property
     def varied(self) -> list[Conditions]:
         """The conditions at each mass of the legs and V_p."""
-        return [self.conditions.but(leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
+        return [replace(self.conditions, leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
 
     @property
     def duration(self) -> float:
@@ -68,7 +68,7 @@ class StaticLimit(SameStarts):
         from hexmj.studies.static_limit.distances import distance_table
 
         def cell(conditions: Conditions) -> Cell:
-            name = f"leg-mass-{conditions.masses.leg_mass:g}-vp-{conditions.time.vp:g}"
+            name = f"leg-mass-{conditions.leg_mass:g}-vp-{conditions.vp:g}"
             walks = self.walks(self.velocity, self.duration, conditions)
             return Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride))
 

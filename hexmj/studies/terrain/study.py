@@ -5,7 +5,7 @@ walk so far that the hindmost foot could be one stride beyond the longest obstac
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
-"""Kinds of ground that are not flat, see `Ground.ground`."""
+"""Kinds of ground that are not flat, see `Conditions.ground`."""
 
 VARIED = {"ground": "grounds", "ground_height": "heights", "grasp": "grasps"}
 """Conditions that are given as lists, and the lists."""
@@ -35,7 +35,7 @@ OUTCOMES = {  # units, long_name
 }
 """What stands in the result of every walk, of `physics.outcomes.Outcomes`."""
 
-FARTHER = Conditions.of(ground_at=80.0)
+FARTHER = Conditions(ground_at=80.0)
 """Walks have found their gait before they come to an obstacle."""
 
 SIZED = {"heights": {"step", "hurdle", "rough"}, "lengths": {"gap"}}
@@ -58,7 +58,7 @@ class Terrain(SameStarts):
     lengths: Sequence[float] = (2.5, 5.0, 10.0)
     """Of gaps [mm], each once."""
     grasps: Sequence[float] = (0.0, 1.0)
-    """As `FootContact.grasp`, each once."""
+    """As `Conditions.grasp`, each once."""
     n_starts: int = field(default=30, kw_only=True)
     conditions: Conditions = field(default=FARTHER, kw_only=True)
     window: str = field(default="distance", init=False)
@@ -77,10 +77,10 @@ class Terrain(SameStarts):
                 one = " or ".join(sorted(grounds))
                 raise InputError(f"{name} = {getattr(self, name)}; expected {one} among the grounds")
         for name, ground in TOLD.items():
-            if ground not in self.grounds and (told := self.conditions.flat()[name]) != FARTHER.flat()[name]:
+            if ground not in self.grounds and (told := self.conditions.values()[name]) != FARTHER.values()[name]:
                 raise InputError(f"{name} = {told}; expected {ground} among the grounds")
         for grasp in self.grasps:
-            self.conditions.but(grasp=grasp)
+            replace(self.conditions, grasp=grasp)
         _ = self.obstacles
 
     @property
@@ -96,7 +96,7 @@ class Terrain(SameStarts):
             name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
             for size in sizes:
                 told = f"{ground} {float(size)}".removesuffix(".0")
-                named[f"{told} mm"] = self.conditions.but(ground=ground, **{name: size})
+                named[f"{told} mm"] = replace(self.conditions, ground=ground, **{name: size})
         return named
 
     @property
@@ -113,13 +113,13 @@ class Terrain(SameStarts):
         before = self.obstacles
 
         def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
-            name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", before[obstacle].but(grasp=grasp)
+            name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", replace(before[obstacle], grasp=grasp)
             walks = self.walks(velocity, self.distance / velocity, conditions)
             return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
 
         check_velocities(self.controller, self.velocities, self.stride)
         for grasp in self.grasps:
-            check_adhesion(self.conditions.but(grasp=grasp), self.stride, self.seed)
+            check_adhesion(replace(self.conditions, grasp=grasp), self.stride, self.seed)
         return [cell(one, grasp, v) for one in before for grasp in self.grasps for v in checked_list(self.velocities)]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
@@ -132,7 +132,7 @@ class Terrain(SameStarts):
             are beyond, on rough ground wherever they stand.  Over starts too: `OUTCOMES`, the `distance` walked [mm],
             and `after`, whether the start fell after it had reached the obstacle.
         """
-        (ahead, behind), at = reach(self.stride), self.conditions.ground.ground_at
+        (ahead, behind), at = reach(self.stride), self.conditions.ground_at
         table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
         return self.labelled(table, "terrain", window=f"{self.distance:g} / V", distance=self.distance)
 
@@ -144,7 +144,7 @@ class Terrain(SameStarts):
         grasp = {"units": "1", "long_name": "adhesion of a foot over the insect's weight"}
         table = over_axes(sizes, [one[list(OUTCOMES)] for one in data]).assign_coords(
             obstacle=list(before),
-            ground=("obstacle", [one.ground.ground for one in before.values()]),
+            ground=("obstacle", [one.ground for one in before.values()]),
             size=("obstacle", [_size(one) for one in before.values()], {"units": "mm"}),
             end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
             grasp=("grasp", list(self.grasps), grasp),
@@ -163,11 +163,9 @@ def reach(stride: Stride) -> tuple[float, float]:
 
 def _end(conditions: Conditions) -> float:
     """Where an obstacle ends, ahead of O at the start [mm]; a step where it has been climbed."""
-    ground = conditions.ground
-    return ground.ground_at + (ground.ground_length if ground.ground in ("gap", "hurdle") else 0.0)
+    return conditions.ground_at + (conditions.ground_length if conditions.ground in ("gap", "hurdle") else 0.0)
 
 
 def _size(conditions: Conditions) -> float:
     """What an obstacle is called by: the length of a gap, the height of anything else [mm]; 0 for flat ground."""
-    ground = conditions.ground
-    return {"flat": 0.0, "gap": ground.ground_length}.get(ground.ground, ground.ground_height)
+    return {"flat": 0.0, "gap": conditions.ground_length}.get(conditions.ground, conditions.ground_height)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.checks import check_types, given, printable, typed
-from hexmj.conditions import Conditions, check_obeyed
+from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
 from hexmj.intervals import wilson_intervals
@@ -53,7 +53,7 @@ class Variants:
         check_types(self)
         check_draw(self.n_starts, self.seed)
         if self.conditions:
-            check_obeyed(self.conditions)
+            check_ground(self.conditions)
         if not self.networks:
             raise InputError("no network was given; expected at least one")
         for name, networks in self.networks.items():

@@ -1,18 +1,17 @@
-"""The description of a six-legged body: its MJCF, the names in it, and the lengths that limits are made of.
+"""Description of a six-legged body: its MJCF, the names in it, the lengths behind its limits; and the stick insect.
 
-Units mm, g, s, rad; forces in g mm/s^2.  The MJCF of a body uses them too.
+Units are mm, g, s and rad, forces g mm/s^2, in the MJCF too.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from hexmj.checks import check_types, printable, typed
 from hexmj.errors import InputError
-from hexmj.legs import LEGS, Geometry
-from hexmj.storage.files import read_text
+from hexmj.legs import FIG1, LEGS, Geometry
 
 ROOT_QPOS = 7
 """Numbers of `qpos` before the joints: the free root's position (3) and unit quaternion (4)."""
@@ -35,8 +34,6 @@ class Leg:
     parts: tuple[str, ...]
     """The bodies whose mass is the leg's; the foot's is one of them."""
 
-    __post_init__ = check_types
-
 
 @dataclass(frozen=True)
 class Servo:
@@ -50,7 +47,6 @@ class Servo:
     """Significant digits of the gains."""
 
     def __post_init__(self) -> None:
-        check_types(self)
         _check_positive("Servo", step=(self.step, "s"), damping_ratio=(self.damping_ratio, ""))
         if not 1 <= self.digits <= 17:
             raise InputError(f"Servo: digits = {self.digits}; expected 1 to 17")
@@ -101,7 +97,6 @@ class Lengths:
     since no leg reaches so far."""
 
     def __post_init__(self) -> None:
-        check_types(self)
         positive = {field.name: (getattr(self, field.name), "") for field in fields(self)}
         positive["no_foot_margin"] = (-self.no_foot_margin, "with the sign turned")
         _check_positive("Lengths", **positive)
@@ -117,7 +112,7 @@ class Lengths:
 
     def scaled(self, factor: float) -> "Lengths":
         """The lengths of a body so many times as large; speeds grow with them, the number of bins does not."""
-        values = {field.name: getattr(self, field.name) * typed("factor", factor, float) for field in fields(self)}
+        values = {field.name: getattr(self, field.name) * factor for field in fields(self)}
         return Lengths(**(values | {"tracking_bins": self.tracking_bins}))
 
 
@@ -137,8 +132,6 @@ class Marks:
     """Radius and half height of the disc below the centre of mass."""
     tip: float
     """Radius of the ball at a planned tip."""
-
-    __post_init__ = check_types
 
 
 @dataclass(frozen=True)
@@ -181,8 +174,6 @@ class Body:
         return f"Body({self.name!r}, {self.mjcf.name})"
 
     def __post_init__(self) -> None:
-        check_types(self)
-        printable("a body's name", self.name)
         _check_positive(
             f"body {self.name!r}",
             mass=(self.mass, "g"),
@@ -221,12 +212,8 @@ class Body:
         return tuple(leg.foot for leg in self.legs)
 
     def text(self) -> str:
-        """Its MJCF.
-
-        Raises:
-            InputError: it is gone, longer than 100 MB, or no text in UTF-8.
-        """
-        return read_text(self.mjcf, most=100_000_000)
+        """Text of its MJCF."""
+        return self.mjcf.read_text(encoding="utf-8")
 
 
 def _check_positive(what: str, **values: tuple[Any, str]) -> None:
@@ -234,3 +221,64 @@ def _check_positive(what: str, **values: tuple[Any, str]) -> None:
     for name, (value, unit) in values.items():
         if not 0 < value < math.inf:
             raise InputError(f"{what}: {name} = {value}; expected a finite number above 0 {unit}".rstrip())
+
+
+JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
+"""A leg's joints from the body outwards; their angles are protraction, levation, the knee's inner angle."""
+
+PARTS = ("coxa", "femur", "tibia")
+"""A leg's parts from the body outwards; the tibia includes the tarsus."""
+
+
+def _mjcf() -> Path:
+    """The file in the wheel, else in the repository."""
+    packaged = Path(str(files("hexmj"))) / "assets"
+    folder = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
+    return folder / "stick_insect.xml"
+
+
+STICK_INSECT = Body(
+    name="stick_insect",
+    mjcf=_mjcf(),
+    root="mesothorax",
+    trunk=("head", "prothorax", "mesothorax", "metathorax", "abdomen"),
+    legs=tuple(
+        Leg(
+            joints=tuple(f"{leg}_{joint}" for joint in JOINTS),
+            foot=f"{leg}_foot",
+            parts=tuple(f"{leg}_{part}" for part in PARTS),
+        )
+        for leg in LEGS
+    ),
+    ground="ground",
+    home="home",
+    cameras=("following", "side", "top", "front"),
+    lines=FIG1,
+    standing_height=10.0,
+    longest_step=0.000625,
+    mass=1.0,
+    servo=Servo(step=0.001, damping_ratio=1.0, digits=2),
+    lengths=Lengths(
+        highest_lift=14.0,
+        highest_stand=14.0,
+        slowest_swing=0.1,
+        fastest_swing=2000.0,
+        shortest_leg=31.0,
+        farthest_centre_of_mass=30.0,
+        load_gyration=2.0,
+        nearest_obstacle=45.0,
+        farthest_obstacle=10000.0,
+        longest_obstacle=1000.0,
+        highest_bump=8.0,
+        bump_spacing=12.0,
+        ground_half_width=200.0,
+        ground_reach=1000.0,
+        speed_at_rest=5.0,
+        tracking_bin=0.01,
+        tracking_bins=2000,
+        largest_tip_offset=5.0,
+        no_foot_margin=-100.0,
+    ),
+    marks=Marks(fill_height=0.05, outline=0.45, plumb_line=0.12, rim=(2.4, 0.3), centre=(1.6, 0.4), tip=1.0),
+)
+"""The insect of this package; standing height and times of `hexmj.conditions` are usual for it."""
