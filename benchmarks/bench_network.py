@@ -12,7 +12,7 @@ from benchmarks.peers import numba_first_loss, numpy_first_loss
 from benchmarks.table import ONE_CORE
 from hexmj import HWS, LDVS, Acceleration, Stride, draw_starts, first_loss
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.timing import observation_time, steps_within
+from hexmj.timing import observation_duration, steps_within
 
 STARTS = draw_starts(70_000, 0)
 STRIDE = Stride()
@@ -35,7 +35,7 @@ def plain(starts: np.ndarray, velocity: float, duration: float) -> None:
 @pytest.mark.parametrize("velocity", [0.1, 0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize("who", ["hexmj", *SLOWER])
 def test_constant_velocity(measure, velocity, who):
-    duration = float(observation_time("walk", np.array(velocity), STRIDE))
+    duration = float(observation_duration("walk", np.array(velocity), STRIDE))
     most = {"hexmj": 70_000} | SLOWER
     starts = STARTS[: most[who] if velocity > 0.3 or who == "readable Python" else most[who] // 8]
     work = {
@@ -45,7 +45,7 @@ def test_constant_velocity(measure, velocity, who):
         "readable Python": lambda: plain(starts, velocity, duration),
     }[who]
     amount = start_steps(first_loss(starts, LDVS, velocity, duration), duration)
-    what = f"FLSS, LDVS, V = {velocity}, window walk"
+    what = f"FLSS, LDVS, V = {velocity}, observation time walk"
     measure(work, what, who, amount=amount, unit="million start-steps/s", bar=150.0, rounds=5)
 
 
@@ -54,7 +54,7 @@ def test_constant_velocity(measure, velocity, who):
 def test_acceleration(measure, controller, who):
     loss = {"hexmj": first_loss, "plain Numba loop": numba_first_loss}[who]
     starts, acceleration = STARTS[: SLOWER.get(who, 7000)], Acceleration()
-    duration = float(observation_time("start", np.array(0.9), STRIDE, acceleration))
+    duration = float(observation_duration("start", np.array(0.9), STRIDE, acceleration))
     amount = start_steps(first_loss(starts, controller, 0.9, duration, acceleration=acceleration), duration)
     work = partial(loss, starts, controller, 0.9, duration, acceleration=acceleration, threads=2)
     what = f"FLSS, {controller.name.upper()}, accelerating to V = 0.9"
@@ -73,7 +73,7 @@ def test_one_core(measure):
 def test_memory(measure, benchmark, who):
     """Ten million starts in a process of their own."""
     program = {
-        "hexmj": "from hexmj import *; flss(LDVS, [0.5], n_starts=10_000_000, window='start')",
+        "hexmj": "from hexmj import *; flss(LDVS, [0.5], n_starts=10_000_000, observation time='start')",
         "all starts in memory": "from hexmj import *; first_loss(draw_starts(10_000_000, 0), LDVS, 0.5, 40.0)",
     }[who] + "; print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"
     command = [sys.executable, "-c", program]

@@ -76,11 +76,11 @@ def test_closed_loop(measure, settled, who):
     )
 
 
-@pytest.mark.parametrize(("window", "bar"), [("start", 50.0), ("walk", 240.0)])
-def test_curve(measure, window, bar):
+@pytest.mark.parametrize(("observation_time", "bar"), [("start", 50.0), ("walk", 240.0)])
+def test_curve(measure, observation_time, bar):
     measure(
-        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], n_starts=1000, window=window, threads=2),
-        f"physical FLSS, 1000 starts, V = 0.1 to 0.9, window {window}",
+        lambda: compare(LDVS, [v / 10 for v in range(1, 10)], n_starts=1000, observation_time=observation_time, threads=2),
+        f"physical FLSS, 1000 starts, V = 0.1 to 0.9, observation time {observation_time}",
         bar=bar,
         rounds=1,
         warm=False,

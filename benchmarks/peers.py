@@ -11,7 +11,7 @@ from numba import njit
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.legs import MIRROR, N2, N4
-from hexmj.process.threads import run_blocks
+from hexmj.threads import run_blocks
 from hexmj.timing import Acceleration, Stride, steps_within
 
 STRIDE = Stride()

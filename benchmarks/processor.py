@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from hexmj.controllers.cruse1998 import kernel
-from hexmj.process.threads import cores
+from hexmj.threads import cores
 
 ARITHMETIC = r"v(add|sub|mul|div|min|max|cmp\w*|blendm|and|or|xor|andn)p[ds]"
 WIDTHS = {"zmm": 8, "ymm": 4, "xmm": 2}

@@ -21,8 +21,9 @@ from scipy.optimize import nnls
 from benchmarks.processor import description
 from hexmj import LDVS, Conditions, Stride, draw_starts, first_loss, flss, physical_flss
 from hexmj.measures.figures import MEASURE_COLOURS
-from hexmj.process.threads import thread_count
-from hexmj.storage.results import json_text, results_folder, save_figure, save_text
+from hexmj.threads import thread_count
+from hexmj.files import write_text
+from hexmj.io import json_text, results_folder, save_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +51,7 @@ class Work:
 
     starts: int
     t: float = 40.0
-    """Observation time [time units]; 40 is the window 'start'."""
+    """Observation time [time units]; 40 is the observation time 'start'."""
     velocity: float = 0.5
     velocities: int = 1
     """How many, 0.001 apart, so that each costs the same."""
@@ -144,7 +145,7 @@ def timed(measure: str, work: Work) -> tuple[float, float]:
     seconds = []
     while True:
         begin = perf_counter()
-        result = FLSS[measure](LDVS, work.each_velocity(), n_starts=work.starts, window=work.t, threads=work.threads)
+        result = FLSS[measure](LDVS, work.each_velocity(), n_starts=work.starts, observation_time=work.t, threads=work.threads)
         seconds.append(perf_counter() - begin)
         if len(seconds) == 3 or seconds[0] > CHEAP:
             return median(seconds), kinematic_steps(work) if measure == "kinematic" else physical_steps(work, result)
@@ -246,7 +247,7 @@ def draw(curve: Curve, axes: "Axes") -> None:
 def warm_up() -> None:
     """Compile, load and start all that is not to be measured."""
     for measure in FLSS.values():
-        measure(LDVS, [0.5], n_starts=600, window=1.0)
+        measure(LDVS, [0.5], n_starts=600, observation_time=1.0)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -268,7 +269,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console.print(table(all_curves))
     points = [asdict(curve) | curve.summary() for curve in all_curves]
     text = json_text({"machine": description(), "share": options.share, "controller": LDVS.name, "curves": points})
-    save_text(text + "\n", folder / DATA)
+    write_text(folder / DATA, text + "\n")
     save_figure(figure(all_curves), folder / FIGURE, dpi=200)
     console.print(f"{folder / FIGURE}, {folder / DATA}")
 

@@ -23,10 +23,11 @@ import numpy as np
 from benchmarks.table import print_table
 from hexmj import LDVS, Conditions, SimulationError, Stride, draw_starts
 from hexmj.bodies.loading import compile_body
-from hexmj.intervals import wilson_interval
+from hexmj.stats import wilson_interval
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settling import Settled, settle
-from hexmj.storage.results import json_text, save_text
+from hexmj.files import write_text
+from hexmj.io import json_text
 
 VELOCITY, DURATION = 0.5, 40.0
 FINEST = "time step / 4"
@@ -148,7 +149,7 @@ def main(folder: str = "results/bench", starts: str = "400") -> None:
     columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
     print_table(columns, rows(results))
     text = json_text(results)
-    save_text(text, Path(folder) / "solver_settings.json")
+    write_text(Path(folder) / "solver_settings.json", text)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.processor import clock, description, operations
-from hexmj.storage.results import save_text
+from hexmj.files import write_text
 
 COLUMNS = ["what", "hexmj", "bar", "peer", "ratio"]
 ONE_CORE = "FLSS, LDVS, V = 0.1, one core"
@@ -97,7 +97,7 @@ def main(folder: str) -> None:
     print_table(COLUMNS, lines)
     print(f"{machine}\n{sentence}")
     text = f"{machine}\n\n{markdown(COLUMNS, lines)}\n{sentence}\n"
-    save_text(text, Path(folder) / "table.md")
+    write_text(Path(folder) / "table.md", text)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import hexmj
 
 for load in (0.0, 2.0):
     by_itself, reading = (
-        hexmj.compare(controller, [0.5], n_starts=10, window=100.0, conditions=hexmj.Conditions(load=load))
+        hexmj.compare(controller, [0.5], n_starts=10, observation_time=100.0, conditions=hexmj.Conditions(load=load))
         for controller in (hexmj.LDVS, hexmj.ReadsLegs(hexmj.LDVS))
     )
     other = np.isfinite(by_itself.fall.values) != np.isfinite(reading.fall.values)

@@ -54,7 +54,7 @@ if __name__ == "__main__":
     for height in (0.0, 2.0, 4.0):
         ground = hexmj.Conditions(ground="step", ground_height=height) if height else hexmj.Conditions()
         result = hexmj.compare(
-            {"feeler": Feeler(), "ldvs": hexmj.LDVS}, [0.5], n_starts=6, window=150.0, conditions=ground
+            {"feeler": Feeler(), "ldvs": hexmj.LDVS}, [0.5], n_starts=6, observation_time=150.0, conditions=ground
         )
         fell = {name: result.physical.sel(controller=name).item() for name in ("feeler", "ldvs")}
         print(

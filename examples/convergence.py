@@ -4,11 +4,11 @@ from pathlib import Path
 
 import hexmj
 from hexmj.studies.static_limit.study import StaticLimit
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 
 folder = Path("results/converge/walks")  # keeps finished walks, where `hexmj converge` keeps them
-study = StaticLimit(hexmj.LDVS, velocity=0.5, vps=(400.0, 100.0, 25.0), n_starts=12, window="start")
-result = conduct(study, folder)
+study = StaticLimit(hexmj.LDVS, velocity=0.5, vps=(400.0, 100.0, 25.0), n_starts=12, observation_time="start")
+result = run_study(study, folder)
 print("legs' mass  V_p [mm/s]  kinematic  physical  agreement  margins apart [mm]  centre of mass from O [mm]")
 for mass in result.leg_mass.values:
     for vp in result.vp.values:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import hexmj
 from hexmj.studies.stability_map.study import StabilityMap
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 
 folder = Path("results/map/walks")  # keeps finished walks, where `hexmj map` keeps them
 study = StabilityMap(hexmj.LDVS, "vp", values=[20.0, 320.0], velocities=[0.5], n_starts=20)
-result = conduct(study, folder)
+result = run_study(study, folder)
 for vp in result.value.values:
     one = result.sel(value=vp, velocity=0.5)
     print(f"V_p = {vp:g} mm/s, Froude number {one.froude.item():.2g}:", end=" ")

@@ -1,4 +1,4 @@
-"""Walk ten random starts through the network alone and through MuJoCo, without a window."""
+"""Walk ten random starts through the network alone and through MuJoCo, without a observation time."""
 
 import numpy as np
 

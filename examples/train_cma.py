@@ -17,7 +17,7 @@ import hexmj
 from hexmj.environments.learned import STANCE, TILT, TURNING, WithOffsets, felt_in
 
 FOUND = Path(__file__).with_name("reflexes.toml")
-VELOCITY, WINDOW = 0.6, 40.0  # V_r, and the window `start` [time units]
+VELOCITY, WINDOW = 0.6, 40.0  # V_r, and the observation time `start` [time units]
 MOST_LOST = 0.07
 POPULATION, STARTS, GENERATIONS = 12, 32, 25
 
@@ -79,7 +79,7 @@ def main() -> None:
     rows = [", ".join(f"{number:.3f}" for number in row) for row in search.mean.reshape(3, 5)]
     FOUND.write_text("weights = [\n" + "".join(f"    [{row}],\n" for row in rows) + "]\n", encoding="utf-8")
     print(f"{FOUND} after {time.monotonic() - began:.0f} s")
-    result = hexmj.compare({"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, window="start", seed=77)
+    result = hexmj.compare({"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, observation_time="start", seed=77)
     for name, falls in zip(("ldvs", "reflexes"), result.physical.values[:, 0], strict=True):
         print(f"{name}: physical FLSS of the start at V = {VELOCITY:g} is {falls:.2f} of 200 fresh starts")
 

@@ -16,7 +16,7 @@ import hexmj
 from hexmj.environments.learned import TILT, TURNING, WithOffsets
 
 FOUND = Path(__file__).with_name("righting.json")
-VELOCITY, WINDOW, STARTS = 0.6, 40.0, 200  # V_r, the window `start` [time units], and fresh starts to judge by
+VELOCITY, WINDOW, STARTS = 0.6, 40.0, 200  # V_r, the observation time `start` [time units], and fresh starts to judge by
 STRIDE, HELD = hexmj.Stride(dt=0.2), 50  # time step while learning [time units], and steps that an action lasts
 INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # so many actions of each insect between two updates
 SPREAD = 0.2  # of the gains that are tried; it stays
@@ -77,7 +77,7 @@ def main() -> None:
     spent = f"{time.monotonic() - began:.0f} s, {time.process_time() - cpu:.0f} s of processor time"
     print(f"{FOUND} after {agent.num_timesteps} actions in {spent}")
     both = {"ldvs": hexmj.LDVS, "righting": found()}
-    result = hexmj.compare(both, [VELOCITY], n_starts=STARTS, window="start", seed=77)
+    result = hexmj.compare(both, [VELOCITY], n_starts=STARTS, observation_time="start", seed=77)
     ends = (result[name].values[:, 0] for name in ("physical", "physical_low", "physical_high"))
     for name, falls, low, high in zip(both, *ends, strict=True):
         print(f"{name}: {falls:.2f} ({low:.2f} to {high:.2f}) fall at V = {VELOCITY:g}, of {STARTS} fresh starts")

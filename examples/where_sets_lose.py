@@ -1,4 +1,4 @@
-"""Where do parameter sets lose static stability?  The period and the posture of every first loss (window `walk`)."""
+"""Where do parameter sets lose static stability?  The period and the posture of every first loss (observation time `walk`)."""
 
 import numpy as np
 

@@ -7,16 +7,11 @@ unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import hexmj.process.early_stops  # first of all
-import hexmj.registering
-import hexmj.user_code.opened_files  # from now on
-import hexmj.user_code.sources_as_run  # noqa: F401
-
 if TYPE_CHECKING:
     from hexmj import controllers as controllers
     from hexmj import environments as environments
     from hexmj import gaits as gaits
-    from hexmj import sweeps as sweeps
+    from hexmj import sweep as sweep
     from hexmj.body import STICK_INSECT as STICK_INSECT
     from hexmj.body import Body as Body
     from hexmj.conditions import Conditions as Conditions
@@ -31,6 +26,9 @@ if TYPE_CHECKING:
     from hexmj.controllers.reads_legs import ReadsLegs as ReadsLegs
     from hexmj.errors import InputError as InputError
     from hexmj.errors import SimulationError as SimulationError
+    from hexmj.io import load as load
+    from hexmj.io import save as save
+    from hexmj.io import settings as settings
     from hexmj.legs import CENTRED as CENTRED
     from hexmj.legs import FIG1 as FIG1
     from hexmj.legs import Geometry as Geometry
@@ -59,9 +57,6 @@ if TYPE_CHECKING:
     from hexmj.stability import support_polygon as support_polygon
     from hexmj.stability import walk_margin as walk_margin
     from hexmj.starts import draw_starts as draw_starts
-    from hexmj.storage.attributes import settings as settings
-    from hexmj.storage.results import load as load
-    from hexmj.storage.results import save as save
     from hexmj.timing import Acceleration as Acceleration
     from hexmj.timing import Stride as Stride
     from hexmj.version import __version__ as __version__
@@ -74,6 +69,7 @@ _MODULES = {
     "controllers.named": ("load_controller",),
     "controllers.reads_legs": ("ReadsLegs",),
     "errors": ("InputError", "SimulationError"),
+    "io": ("load", "save", "settings"),
     "legs": ("CENTRED", "FIG1", "Geometry"),
     "measures.compare": ("compare", "physical_flss"),
     "measures.kinematic": ("first_loss", "flss", "flss_over_range", "walk"),
@@ -89,13 +85,11 @@ _MODULES = {
     "search.stages": ("Effort",),
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),
     "starts": ("draw_starts",),
-    "storage.attributes": ("settings",),
-    "storage.results": ("load", "save"),
     "timing": ("Acceleration", "Stride"),
     "version": ("__version__",),
     "walks": ("Walk",),
 }
-_PARTS = ("controllers", "environments", "gaits", "sweeps")
+_PARTS = ("controllers", "environments", "gaits", "sweep")
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
@@ -106,8 +100,6 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'hexmj' has no attribute {name!r}; it has {', '.join(__dir__())}")
     value = getattr(import_module(f"hexmj.{_HOME[name]}"), name)
-    if hasattr(value, "__dataclass_fields__") and isinstance(value, type):
-        import_module("hexmj.field_docs").tell_fields(value)
     globals()[name] = value
     return value
 

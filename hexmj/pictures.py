@@ -32,6 +32,11 @@ def picture(width: float, height: float) -> Picture:
     return Picture(figsize=(width, height), layout="constrained")
 
 
+def in_figure(text: str) -> str:
+    """A text for figures, in which dollars do not begin a formula."""
+    return text.replace("$", r"\$")
+
+
 def head(figure: Figure, *lines: str) -> None:
     """The title of a figure, in lines that are broken where they do not fit."""
     figure.suptitle("\n".join(filter(None, lines)), fontsize=10, wrap=True)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hexmj.checks import typed
 from hexmj.errors import InputError
-from hexmj.measures.drawable_parts import check_axes, check_window, what_parts_may_lack
+from hexmj.measures.drawable_parts import check_axes, check_observation_time, what_parts_may_lack
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +45,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
 
     Raises:
         InputError: a dataset that no figure belongs to, no such figure, a part of a result that shows too little, or
-            results joined whose controllers or windows are not those that their settings tell.
+            results joined whose controllers or observation times are not those that their settings tell.
     """
     import xarray as xr
 
@@ -68,5 +68,5 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Picture":
     with what_parts_may_lack(result, f"the figure {chosen!r} cannot be drawn"):
         if study != RECORDING:
             check_axes(result)
-            check_window(result)
+            check_observation_time(result)
         return draw(result.compute())  # as it may have been opened lazily

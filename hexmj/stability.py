@@ -14,7 +14,7 @@ from hexmj.checks import numbers, states
 from hexmj.errors import InputError
 from hexmj.jitted import jitted
 from hexmj.legs import ordered
-from hexmj.process.threads import run_blocks
+from hexmj.threads import run_blocks
 from hexmj.walks import Walk, check_time_grows, checked_walk
 
 ROUNDING = 4.0 * 2.0**-53

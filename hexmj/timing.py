@@ -14,8 +14,8 @@ from hexmj.checks import check_types, numbers, typed
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
 
-WINDOWS = ("walk", "start")
-"""Named observation times, see `observation_time`."""
+OBSERVATION_TIMES = ("walk", "start")
+"""Named observation times, see `observation_duration`."""
 
 MOST_STEPS = 10**7
 """Longest walk [steps]; far beyond any use."""
@@ -109,31 +109,33 @@ def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acce
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
         raise InputError(
-            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, the window ends at {end:g}; expected a"
+            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, the observation time ends at {end:g}; expected a"
             " longer one, or walk or start, which are counted from then"
         )
 
 
-def observation_time(
-    window: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
+def observation_duration(
+    observation_time: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:
     """The time t of Eq. 7 for each velocity [time units], which the paper leaves open.
 
     'walk' is three periods of a single leg oscillator, 3 (AEP_0 - PEP_0) (1 + 1/V); 'start' is
-    2 (AEP_0 - PEP_0) / V_p.  When accelerating, a named window is counted from the time at which V is
+    2 (AEP_0 - PEP_0) / V_p.  When accelerating, a named observation time is counted from the time at which V is
     reached; a number is always the whole time.
 
     Raises:
-        InputError: no such window, or V = 0 with the window 'walk'.
+        InputError: no such observation time, or V = 0 with the observation time 'walk'.
     """
     v = numbers("velocity", velocity)
-    if not isinstance(typed("window", window, str | float), str):
-        return np.full(v.shape, float(window))
-    if window not in WINDOWS:
-        raise InputError(f"window = {window!r}; valid names: {', '.join(WINDOWS)}, or a number of time units")
-    if window == "walk" and (odd := v[~(v > 0)]).size:
-        raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the window 'walk'")
-    time = stride.periods(v, 3.0) if window == "walk" else np.full(v.shape, 2.0 * (stride.aep0 - stride.pep0))
+    if not isinstance(typed("observation_time", observation_time, str | float), str):
+        return np.full(v.shape, float(observation_time))
+    if observation_time not in OBSERVATION_TIMES:
+        raise InputError(
+            f"observation time = {observation_time!r}; valid names: {', '.join(OBSERVATION_TIMES)}, or a number of time units"
+        )
+    if observation_time == "walk" and (odd := v[~(v > 0)]).size:
+        raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the observation time 'walk'")
+    time = stride.periods(v, 3.0) if observation_time == "walk" else np.full(v.shape, 2.0 * (stride.aep0 - stride.pep0))
     return time + acceleration.duration(v) if acceleration else time
 
 

@@ -52,7 +52,7 @@ def compared(seed: int, feedback: bool = False) -> Arrays:
     controllers = {"ldvs": hexmj.LDVS, "uncoordinated": hexmj.UNCOORDINATED}
     if feedback:
         controllers = {name: hexmj.ReadsLegs(one) for name, one in controllers.items()}
-    return _table(hexmj.compare(controllers, [0.3, 0.6], n_starts=8, window=60.0, seed=seed))
+    return _table(hexmj.compare(controllers, [0.3, 0.6], n_starts=8, observation_time=60.0, seed=seed))
 
 
 def compared_with_feedback(seed: int) -> Arrays:
@@ -66,53 +66,53 @@ def other_conditions(seed: int) -> Arrays:
     )  # fmt: skip
     stride = hexmj.Stride(geometry=hexmj.CENTRED, dt=0.2)
     return _table(
-        hexmj.compare(hexmj.HWS, [0.4], n_starts=6, window=60.0, seed=seed, conditions=conditions, stride=stride)
+        hexmj.compare(hexmj.HWS, [0.4], n_starts=6, observation_time=60.0, seed=seed, conditions=conditions, stride=stride)
     )
 
 
 def disturbed(seed: int) -> Arrays:
     from hexmj.studies.disturbance.study import DisturbedWalks
-    from hexmj.sweeps import conduct
+    from hexmj.sweep import run_study
 
-    few: Any = {"velocities": [0.6], "n_starts": 4, "window": 30.0, "seed": seed}
-    return _table(conduct(DisturbedWalks(hexmj.LDVS, impulses=[40.0], **few)))
+    few: Any = {"velocities": [0.6], "n_starts": 4, "observation_time": 30.0, "seed": seed}
+    return _table(run_study(DisturbedWalks(hexmj.LDVS, impulses=[40.0], **few)))
 
 
 def disturbed_with_feedback(seed: int) -> Arrays:
     from hexmj.studies.disturbance.study import DisturbedWalks
-    from hexmj.sweeps import conduct
+    from hexmj.sweep import run_study
 
-    few: Any = {"velocities": [0.6], "n_starts": 3, "window": 30.0, "seed": seed}
+    few: Any = {"velocities": [0.6], "n_starts": 3, "observation_time": 30.0, "seed": seed}
     halted = DisturbedWalks(hexmj.ReadsLegs(hexmj.LDVS), disturbances=["halt"], strategies=["reorganise"], **few)
-    return _table(conduct(halted))
+    return _table(run_study(halted))
 
 
 def terrain(seed: int) -> Arrays:
     from hexmj.studies.terrain.study import Terrain
-    from hexmj.sweeps import conduct
+    from hexmj.sweep import run_study
 
     few: Any = {"velocities": [0.6], "heights": [3.0], "lengths": [5.0], "n_starts": 4, "seed": seed}
-    return _table(conduct(Terrain(hexmj.LDVS, **few)))
+    return _table(run_study(Terrain(hexmj.LDVS, **few)))
 
 
 def mapped(seed: int) -> Arrays:
     from hexmj.studies.stability_map.study import StabilityMap
-    from hexmj.sweeps import conduct
+    from hexmj.sweep import run_study
 
     chosen: Any = {"vp": [40.0, 160.0], "centre_of_mass": [-5.0, 0.0]}
-    few: Any = {"velocities": [0.5], "n_starts": 6, "window": 60.0, "seed": seed}
+    few: Any = {"velocities": [0.5], "n_starts": 6, "observation_time": 60.0, "seed": seed}
     out = {}
     for over, values in chosen.items():
-        data = conduct(StabilityMap(hexmj.LDVS, over, values, **few))
+        data = run_study(StabilityMap(hexmj.LDVS, over, values, **few))
         out |= {f"{over} {name}": numbers for name, numbers in _table(data).items()}
     return out
 
 
 def converged(seed: int) -> Arrays:
     from hexmj.studies.static_limit.study import StaticLimit
-    from hexmj.sweeps import conduct
+    from hexmj.sweep import run_study
 
-    return _table(conduct(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, window="start", seed=seed)))
+    return _table(run_study(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, observation_time="start", seed=seed)))
 
 
 def searched(seed: int) -> Arrays:
@@ -123,7 +123,7 @@ def searched(seed: int) -> Arrays:
     ways: Any = (("evolution", "hws", None), ("cmaes", "mirrored", None), ("cmaes", "ldvs", "body"))
     for algorithm, form, body in ways:
         conditions = hexmj.Conditions() if body else None
-        problem = hexmj.Problem(NetworkForm(form), 0.4, 0.5, window=30.0, conditions=conditions)
+        problem = hexmj.Problem(NetworkForm(form), 0.4, 0.5, observation_time=30.0, conditions=conditions)
         few = 4 if body else 60
         effort = hexmj.Effort(
             algorithm=algorithm, population=4, starts=few, budget=12, refine_starts=few, refine_budget=6,

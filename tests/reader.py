@@ -16,7 +16,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.storage.files import read_sealed
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
 
@@ -122,7 +122,7 @@ def computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., t
     def computed(gain: str, file: str = "", **how: object) -> tuple[float, int]:
         (tmp_path / "reader.py").write_text(READER.format(gain=gain))
         cell = Cell("reader", importable("reader.py").Reader(file=file).cell, {})
-        data = run([cell], Path("kept"), **how)[0]  # pyright: ignore[reportArgumentType]
+        data = run_cells([cell], Path("kept"), **how)[0]  # pyright: ignore[reportArgumentType]
         return float(data.gain), os.stat("calls").st_size
 
     return computed

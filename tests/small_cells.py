@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hexmj.process.progress import Progress
-from hexmj.sweeps import Cell
+from hexmj.progress import Progress
+from hexmj.sweep import Cell
 
 PATHS = ".", *(str(folder) for folder in Path(__file__).parents[:2])
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PATHS)}

@@ -19,7 +19,7 @@ from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
 from hexmj.studies.ablation.figure import FEWER, NONE, ablation_figure
 from hexmj.studies.ablation.study import Ablation, switched, wholes
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 
 
 def test_what_can_be_switched_is_what_makes_a_difference() -> None:
@@ -141,7 +141,7 @@ def test_whether_a_contact_gap_is_read_is_asked_of_walks_that_accelerate_where_t
 @pytest.mark.thorough
 def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     study = Ablation({"walknet": switched("walknet")}, (0.5,), n_starts=20, n_physical=2, periods=12)
-    result = conduct(study)
+    result = run_study(study)
     assert not result.more.sel(controller="walknet").any()
     starts = hexmj.draw_starts(20, study.seed)
     lost = [

@@ -24,7 +24,7 @@ from hexmj.studies.biology.quantities import _course, quantities
 from hexmj.studies.biology.strides import Strides, last_strides, onsets, rows_of_a_hop, strides_between
 from hexmj.studies.biology.study import MEASURED, Biology
 from hexmj.studies.biology.table import rows
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 from hexmj.timing import Stride
 from tiers import few_of
 
@@ -277,7 +277,7 @@ def test_every_row_is_a_quantity_with_a_source_and_a_range_or_none():
 @pytest.fixture(scope="module")
 def falling(tmp_path_factory):
     """Short walks, of which some fall."""
-    return conduct(Biology(UNCOORDINATED, 4, n_starts=5), tmp_path_factory.mktemp("biology"), threads=1)
+    return run_study(Biology(UNCOORDINATED, 4, n_starts=5), tmp_path_factory.mktemp("biology"), threads=1)
 
 
 def test_starts_that_fall_count_nowhere(falling):
@@ -320,7 +320,7 @@ def test_a_course_does_not_hang_on_where_its_strides_begin(walking):
 
 
 def test_threads_change_no_bit(falling):
-    assert conduct(Biology(UNCOORDINATED, 4, n_starts=5), threads=2).identical(falling)
+    assert run_study(Biology(UNCOORDINATED, 4, n_starts=5), threads=2).identical(falling)
 
 
 @pytest.mark.parametrize(
@@ -340,7 +340,7 @@ def test_what_makes_no_sense_is_refused(wrong, said):
 
 def test_strides_that_do_not_fit_into_memory_are_refused_before_anybody_walks():
     with pytest.raises(InputError, match=r"the last strides of 1000000 starts take .* GB; expected at most"):
-        conduct(Biology(LDVS, n_starts=10**6))
+        run_study(Biology(LDVS, n_starts=10**6))
 
 
 @pytest.mark.slow
@@ -352,7 +352,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     names = {"biology.nc", "biology.png", "biology.md", "manifest.json", "walks"}
     assert {path.name for path in tmp_path.iterdir()} == names
     assert len(answer["name"]) == len(answer["verdict"]) == len(ANIMALS)
-    assert answer["settings"]["window"] == "4 periods"
+    assert answer["settings"]["observation_time"] == "4 periods"
     code, text, _ = run(*words)
     assert code == 0
     table = (tmp_path / "biology.md").read_text()
@@ -362,7 +362,7 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     assert f"{answer['mean'][0]:.3g} (" in text and f"{answer['mean'][0]:.3g} (" in table
     assert table.count("\n| ") >= len(ANIMALS)
     assert all(f"- {row.source}: " in table for row in ANIMALS if row.source)
-    for option in ("--window", "--grasp", "--acceleration"):
+    for option in ("--observation time", "--grasp", "--acceleration"):
         assert run(*words, option, 1)[0] == 2
 
 
@@ -384,4 +384,4 @@ def test_phases_around_zero_have_their_mean_there():
     drawn: Any = biology_figure(result).axes[2].collections[-2]
     length = np.ptp(drawn.get_segments()[0][:, 1])
     assert_allclose(length, 2 * 0.333 / np.sqrt(2), rtol=1e-6)  # divided by one start less
-    assert "window 6 periods" in biology_figure(result).get_suptitle()
+    assert "observation time 6 periods" in biology_figure(result).get_suptitle()

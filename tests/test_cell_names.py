@@ -15,7 +15,7 @@ import hexmj
 from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
 from hexmj.storage.files import digest_of
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 from hexmj.sweeps.code import code
 from hexmj.user_code.loaded import importable
 from small_cells import MINE, WITHOUT_DASK, Wave, odd_bits, told_how
@@ -117,7 +117,7 @@ def test_a_controllers_module_may_import_the_program_that_runs_it(tmp_path: Path
 
 
 PRINT_MAIN = """
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 from toy.study import cell
 print(Cell("toy", cell, {"controller": Tripod()}).record())
 """

@@ -22,7 +22,7 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.errors import InputError
 from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import flss
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 from hexmj.sweeps.cluster import workers_of
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, counted_cells, odd_cells
@@ -33,7 +33,7 @@ WORKERS = ("--nworkers", "2", "--nthreads", "1", "--no-dashboard", "--death-time
 FORGIVING = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
 """A cell that kills two workers is given up, after four otherwise."""
 
-RANGES = ("flss", "--velocities", "0.7", "--window", "start", "--starts", "20000", "--range-of", "400")
+RANGES = ("flss", "--velocities", "0.7", "--observation time", "start", "--starts", "20000", "--range-of", "400")
 
 
 @contextmanager
@@ -110,13 +110,13 @@ def test_a_local_cluster_gives_the_bits_of_one_process(tmp_path: Path, cluster: 
     from distributed import Client
 
     def odd(**how: Any) -> xr.Dataset:
-        return xr.concat(run(odd_cells(4), **how), "cell")
+        return xr.concat(run_cells(odd_cells(4), **how), "cell")
 
     def ranges(**how: Any) -> xr.Dataset:
-        return flss(LDVS, [0.5, 0.7], n_starts=2500, window="start", range_of=700, **how)
+        return flss(LDVS, [0.5, 0.7], n_starts=2500, observation_time="start", range_of=700, **how)
 
     def walks(**how: Any) -> xr.Dataset:
-        return compare(LDVS, [0.3, 0.5], n_starts=2, window=5.0, **how)
+        return compare(LDVS, [0.3, 0.5], n_starts=2, observation_time=5.0, **how)
 
     with workers_of(cluster) as ours, Client(cluster) as client:
         for found in (odd, ranges, walks):
@@ -130,7 +130,7 @@ def test_a_local_cluster_gives_the_bits_of_one_process(tmp_path: Path, cluster: 
 
 @pytest.mark.thorough
 def test_a_command_waits_for_workers_and_says_nothing_else(tmp_path: Path) -> None:
-    words = ("flss", "--velocities", "0.5", "0.7", "--starts", "2500", "--window", "start", "--json")
+    words = ("flss", "--velocities", "0.5", "0.7", "--starts", "2500", "--observation time", "start", "--json")
     with scheduler(tmp_path) as (address, _):
         out = ("--range-of", 700, "--scheduler", address, "--out", tmp_path / "cluster")
         with started(*command(*words, *out), output=subprocess.PIPE) as program:
@@ -186,7 +186,7 @@ def dies_once(log: str, number: int) -> xr.Dataset:
 def test_a_worker_that_is_killed_in_the_middle_of_a_cell(tmp_path: Path, cluster: str) -> None:
     cells = [Cell(f"{i}", dies_once, {"log": str(tmp_path), "number": i}) for i in range(6)]
     with workers_of(cluster) as executor:
-        found = run(cells, tmp_path / "kept", executor=executor)
+        found = run_cells(cells, tmp_path / "kept", executor=executor)
     assert (tmp_path / "died").exists()
     assert [one.number.item() for one in found] == [i / 3 for i in range(6)]
     assert len(contents(tmp_path / "kept")) == 6
@@ -206,9 +206,9 @@ def test_a_cell_that_kills_its_workers_is_a_sentence(tmp_path: Path, cluster: st
         ),
         workers_of(cluster) as executor,
     ):
-        run(cells, tmp_path / "kept", executor=executor)
+        run_cells(cells, tmp_path / "kept", executor=executor)
     with ThreadPoolExecutor(1) as pool:
-        assert len(run(cells[:3], tmp_path / "kept", executor=pool)) == 3
+        assert len(run_cells(cells[:3], tmp_path / "kept", executor=pool)) == 3
     assert sorted({*calls(tmp_path)}) == ["0", "1", "2"]
 
 
@@ -217,7 +217,7 @@ def test_an_executor_that_is_shut_down_meanwhile_is_a_sentence(tmp_path: Path) -
     with ThreadPoolExecutor(1) as pool:
         threading.Timer(0.5, lambda: pool.shutdown(wait=False, cancel_futures=True)).start()
         with pytest.raises(InputError, match="what computed cells has gone away"):
-            run(cells, tmp_path / "kept", executor=pool)
+            run_cells(cells, tmp_path / "kept", executor=pool)
     assert 1 <= len(contents(tmp_path / "kept")) < 6
 
 
@@ -225,7 +225,7 @@ def test_an_executor_that_gives_no_future_is_a_sentence(tmp_path: Path) -> None:
     with ThreadPoolExecutor(1) as pool:
         pool.submit = lambda *asked: 3  # pyright: ignore[reportAttributeAccessIssue]
         with pytest.raises(InputError, match=r"gave 3; expected a concurrent\.futures\.Future"):
-            run(counted_cells(tmp_path, 2), tmp_path / "kept", executor=pool)
+            run_cells(counted_cells(tmp_path, 2), tmp_path / "kept", executor=pool)
 
 
 @pytest.mark.slow
@@ -257,7 +257,7 @@ def test_a_command_that_loses_its_scheduler_or_is_stopped_keeps_what_is_finished
     assert before.items() <= contents(out / "walks").items()
     assert not [name for name in contents(out / "walks") if not name.endswith(".nc")]
     with xr.open_dataset(out / "flss.nc", engine="h5netcdf") as found:
-        whole = flss(LDVS, [0.7], n_starts=20_000, window="start")
+        whole = flss(LDVS, [0.7], n_starts=20_000, observation_time="start")
         assert all(found[name].equals(whole[name]) for name in whole.variables)
 
 
@@ -280,7 +280,7 @@ def test_workers_with_other_code_are_refused(tmp_path: Path) -> None:
                 ),
                 workers_of(address) as executor,
             ):
-                flss(LDVS, [0.7], n_starts=10, window="start", folder=folder, executor=executor)
+                flss(LDVS, [0.7], n_starts=10, observation_time="start", folder=folder, executor=executor)
     assert not [*(tmp_path / "kept").iterdir()]
 
 
@@ -307,9 +307,9 @@ def test_a_worker_that_does_not_see_the_folder_computes_nothing(tmp_path: Path) 
     with pytest.raises(
         InputError, match=r"a worker on \S+ does not see the folder .*there/kept; expected it to be shared"
     ):
-        run(counted_cells(tmp_path, 2), here / "kept", executor=Elsewhere(here, there))
+        run_cells(counted_cells(tmp_path, 2), here / "kept", executor=Elsewhere(here, there))
     assert (contents(here / "kept"), contents(there / "kept"), calls(tmp_path)) == ({}, {}, [])
-    assert len(run(counted_cells(tmp_path, 2), here / "kept", executor=Elsewhere(here, here))) == 2
+    assert len(run_cells(counted_cells(tmp_path, 2), here / "kept", executor=Elsewhere(here, here))) == 2
 
 
 def test_a_relative_folder_is_one_place_for_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -323,7 +323,7 @@ def test_a_relative_folder_is_one_place_for_all(tmp_path: Path, monkeypatch: pyt
                 (future := Future[xr.Dataset]()).set_result(fn(*args, **kwargs))
             return future
 
-    run(counted_cells(tmp_path, 2), Path("kept"), executor=Moved())
+    run_cells(counted_cells(tmp_path, 2), Path("kept"), executor=Moved())
     assert len(contents(tmp_path / "kept")) == 2
 
 
@@ -368,7 +368,7 @@ def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_words_that_make_no_sense(run, tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
-    code, out, error = run(*words, "--out", tmp_path / "out")
+    code, out, error = run_cells(*words, "--out", tmp_path / "out")
     *before, last = error.splitlines()
     assert (code, out) == (2, "") and last.startswith(f"hexmj: {sentence}")
     assert before in ([], [f"hexmj: connecting to the scheduler at {words[2]}"]), "and no line of progress"
@@ -377,7 +377,7 @@ def test_words_that_make_no_sense(run, tmp_path: Path, words: tuple[str, ...], s
 
 def test_without_dask_one_sentence_says_how_it_is_installed(run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    code, _, error = run("flss", "--scheduler", "tcp://127.0.0.1:8786")
+    code, _, error = run_cells("flss", "--scheduler", "tcp://127.0.0.1:8786")
     assert (code, error.count("\n")) == (2, 1)
     assert "distributed, which a scheduler needs, is not installed" in error
     assert 'pip install ".[dask]"' in error

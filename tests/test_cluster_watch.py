@@ -5,7 +5,7 @@ from types import MappingProxyType, SimpleNamespace
 
 import pytest
 
-from hexmj.sweeps import cluster
+from hexmj.sweep import cluster
 
 
 def test_it_is_said_that_the_last_worker_has_gone_while_cells_wait(

@@ -11,7 +11,7 @@ from hexmj.cli.tables import difference, four_digits, interval
 from hexmj.studies.disturbance.figure import disturbed_figure
 from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
 from hexmj.studies.stability_map.study import StabilityMap
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 
 
 def test_what_nobody_reached_has_no_frequency() -> None:
@@ -34,7 +34,7 @@ def test_a_number_of_four_digits_is_never_rounded_before_its_point(number: float
 
 @pytest.mark.thorough
 def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:
-    words = ["--velocities", 0.5, "--starts", 2, "--disturbances", "push", "--impulses", 40, "--window", 45]
+    words = ["--velocities", 0.5, "--starts", 2, "--disturbances", "push", "--impulses", 40, "--observation time", 45]
     code, text, _ = run("disturb", *words, "--strategies", "slow_down", "--out", tmp_path / "out")
     assert code == 0
     planned, walked = text.split("physical FLSS", 1)
@@ -52,8 +52,8 @@ def test_pushes_have_no_rows_on_paper(tmp_path, run) -> None:
 @pytest.mark.slow
 def test_a_map_tells_how_many_starts_stand_at_every_value() -> None:
     """Of twelve starts one falls at rest where the centre of mass lies 15 mm ahead."""
-    study = StabilityMap(LDVS, "centre_of_mass", (0.0, 15.0), (0.3,), n_starts=12, window=20.0)
-    result = conduct(study, threads=1)
+    study = StabilityMap(LDVS, "centre_of_mass", (0.0, 15.0), (0.3,), n_starts=12, observation_time=20.0)
+    result = run_study(study, threads=1)
     for draw in (map_figure, mechanisms_figure):
         assert draw(result).get_suptitle().endswith("; 11 of them stand and reach nine of ten tips at every value")
-        assert "of them" not in draw(conduct(replace(study, values=(0.0,)), threads=1)).get_suptitle()
+        assert "of them" not in draw(run_study(replace(study, values=(0.0,)), threads=1)).get_suptitle()

@@ -23,13 +23,13 @@ from hexmj.studies.disturbance.study import DisturbedWalks
 from hexmj.studies.stability_map.study import StabilityMap
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.studies.terrain.study import Terrain
-from hexmj.sweeps import Cell, conduct
+from hexmj.sweep import Cell, run_study
 from tiers import few_of
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
-FEW: dict[str, Any] = {"n_starts": 3, "window": 10.0}
-PUSHED: dict[str, Any] = FEW | {"window": 60.0}
-WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "6", "--window", "30"]
+FEW: dict[str, Any] = {"n_starts": 3, "observation_time": 10.0}
+PUSHED: dict[str, Any] = FEW | {"observation_time": 60.0}
+WORDS = ["compare", "--velocities", "0.5", "0.6", "0.7", "--starts", "6", "--observation time", "30"]
 
 
 @pytest.fixture(scope="module")
@@ -91,10 +91,10 @@ STUDIES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", few_of(STUDIES, "compare", "reading", "map", "terrain", "converge"))
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
-    here = conduct(STUDIES[name], threads=2)
-    assert conduct(STUDIES[name], executor=two_processes).identical(here)
+    here = run_study(STUDIES[name], threads=2)
+    assert run_study(STUDIES[name], executor=two_processes).identical(here)
     with ThreadPoolExecutor(2) as executor:
-        assert conduct(STUDIES[name], executor=executor).identical(here)
+        assert run_study(STUDIES[name], executor=executor).identical(here)
 
 
 @pytest.mark.thorough
@@ -134,14 +134,14 @@ class Nobody:
         ({"nobody": Nobody()}, {}, "expected a controller, a frozen dataclass"),
         (LDVS, {"n_starts": 0}, "starts = 0; expected a whole number"),
         (LDVS, {"seed": -1}, "seed = -1; expected"),
-        (LDVS, {"window": "long"}, "valid names: walk, start"),
+        (LDVS, {"observation_time": "long"}, "valid names: walk, start"),
         (LDVS, {"velocities": [0.5, 0.5]}, "none of them twice"),
         (LDVS, {"velocities": [1.0]}, "0 <= V < 1"),
         (LDVS, {"velocities": [0.05], "acceleration": hexmj.Acceleration()}, r"expected at least V_r\(0\)"),
     ],
 )
 def test_what_makes_no_sense_is_refused_before_anything_walks(tmp_path, controllers, changed, said):
-    given: dict[str, Any] = {"velocities": [0.5], "n_starts": 2, "window": 5.0} | changed
+    given: dict[str, Any] = {"velocities": [0.5], "n_starts": 2, "observation_time": 5.0} | changed
     with pytest.raises(InputError, match=said):
         compare(controllers, **given, folder=tmp_path / "walks")
     assert not (tmp_path / "walks").exists()
@@ -174,4 +174,4 @@ def test_arguments_that_nobody_knows_are_refused():
     with pytest.raises(
         InputError, match="argument 'condition'; valid names: those that the call's help shows, and executor"
     ):
-        compare(LDVS, [0.3], n_starts=2, window=5.0, condition=1)  # pyright: ignore[reportCallIssue]
+        compare(LDVS, [0.3], n_starts=2, observation_time=5.0, condition=1)  # pyright: ignore[reportCallIssue]

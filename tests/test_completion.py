@@ -17,7 +17,7 @@ def test_bash_completes_commands_and_options_and_nothing_else(run, tmp_path):
     for words, known in (
         ("ren", {"render"}),
         ("flss --st", {"--starts", "--step-height", "--standing-height"}),
-        ("flss --window ", {"walk", "start"}),
+        ("flss --observation time ", {"walk", "start"}),
         ("walk --order un", {"undelayed"}),
         ("view --host ", set()),
         ("flss --out hexmj.", {"hexmj.bash"}),

@@ -20,7 +20,7 @@ from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.storage import netcdf
 from hexmj.storage.files import PART, prepare, remove_leftovers, replacing
-from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.sweep import Cell, CachedValues, run_cells
 from small_cells import ENVIRONMENT, moves, numbers, squares
 from tests.soak.counted import LOG, Counted
 from tests.soak.crashes import Nursery
@@ -82,10 +82,10 @@ def test_a_folder_that_can_only_be_read(nursery: Nursery, job: str) -> None:
 
 def test_what_is_finished_is_read_from_such_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cell = Cell("numbers", numbers, {"seed": 0})
-    (whole,) = run([cell], tmp_path)
+    (whole,) = run_cells([cell], tmp_path)
     for name in ("prepare", "write"):
         monkeypatch.setattr(f"hexmj.sweeps.grid.{name}", None)
-    assert run([cell], tmp_path)[0].identical(whole)
+    assert run_cells([cell], tmp_path)[0].identical(whole)
 
 
 # What the killed left behind
@@ -95,7 +95,7 @@ def test_the_next_run_removes_what_a_killed_writer_left(tmp_path: Path) -> None:
     left, own = tmp_path / f"{PART}{'0' * 32}.nc", tmp_path / f"{PART}of-a-users.nc"
     for path in (left, own):
         path.write_bytes(b"half")
-    run([Cell("numbers", numbers, {"seed": 0})], tmp_path)
+    run_cells([Cell("numbers", numbers, {"seed": 0})], tmp_path)
     assert not left.exists()
     assert own.exists()
 
@@ -197,7 +197,7 @@ def test_a_folder_that_is_renamed_in_the_middle(tmp_path: Path) -> None:
     folder, to = tmp_path / "kept", tmp_path / "renamed"
     cells = [Cell(f"{seed}", moves, {"folder": str(folder), "to": str(to), "seed": seed}) for seed in (0, 1)]
     with pytest.raises(InputError, match=r"kept was removed or renamed while it was in use; nothing more is written"):
-        run(cells, folder)
+        run_cells(cells, folder)
     assert not folder.exists()
     assert [path.name[:2] for path in to.iterdir()] == ["0-"]
 
@@ -206,14 +206,14 @@ def test_a_folder_that_goes_away_as_a_cell_is_encoded(tmp_path: Path, monkeypatc
     encode, folder = netcdf.encode, tmp_path / "kept"
     monkeypatch.setattr(netcdf, "encode", lambda data: [encode(data), folder.rmdir()][0])
     with pytest.raises(InputError, match=r"kept was removed or renamed while it was in use; nothing more is written"):
-        run([Cell("numbers", numbers, {"seed": 0})], folder)
+        run_cells([Cell("numbers", numbers, {"seed": 0})], folder)
     assert not folder.exists()
 
 
 @pytest.mark.parametrize("gone", ["folder", "file"])
 def test_evaluations_that_are_removed_in_the_middle(tmp_path: Path, gone: str) -> None:
     rows, cell, folder = np.eye(4), Cell("squares", squares, {}), tmp_path / "kept"
-    values = KeptValues(cell, folder)
+    values = CachedValues(cell, folder)
     values(rows[:2])
     (path,) = folder.iterdir()
     path.unlink()
@@ -221,28 +221,28 @@ def test_evaluations_that_are_removed_in_the_middle(tmp_path: Path, gone: str) -
         folder.rmdir()
     with pytest.raises(InputError, match=r"\.jsonl cannot be written: (it was removed|No such file)"):
         values(rows)
-    assert KeptValues(cell, folder)(rows).tolist() == [1.0] * 4
-    assert KeptValues(cell, folder).known == 4
+    assert CachedValues(cell, folder)(rows).tolist() == [1.0] * 4
+    assert CachedValues(cell, folder).known == 4
 
 
 @pytest.mark.parametrize("odd", [[[1.0, 2.0], [3.0]], [1.0, 2.0]])
 def test_rows_that_are_none_are_refused(odd: Any) -> None:
     with pytest.raises(InputError, match=r"^rows .*; expected"):
-        KeptValues(Cell("squares", squares, {}))(odd)
+        CachedValues(Cell("squares", squares, {}))(odd)
 
 
 def test_no_rows_have_no_values() -> None:
-    assert KeptValues(Cell("squares", squares, {}))(np.array([])).tolist() == []
+    assert CachedValues(Cell("squares", squares, {}))(np.array([])).tolist() == []
 
 
 def test_a_line_after_one_that_was_torn_stands_by_itself(tmp_path: Path) -> None:
     rows, cell = np.eye(4), Cell("squares", squares, {})
-    values = KeptValues(cell, tmp_path)
+    values = CachedValues(cell, tmp_path)
     values(rows[:2])
     (path,) = tmp_path.iterdir()
     path.write_bytes(path.read_bytes()[:-9])
     values(rows)
-    assert KeptValues(cell, tmp_path).known == 3
+    assert CachedValues(cell, tmp_path).known == 3
 
 
 def test_a_search_has_its_folder_alone_as_a_function_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

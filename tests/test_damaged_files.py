@@ -30,8 +30,8 @@ from hexmj.replay.take import takes_of
 from hexmj.starts import draw_starts
 from hexmj.storage import netcdf
 from hexmj.storage.files import MARK, opened, read_sealed, sealed, unsealed
-from hexmj.storage.results import results_folder, save_dataset
-from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.io import results_folder, save
+from hexmj.sweep import Cell, CachedValues, run_cells
 from hexmj.timing import Stride
 from small_cells import squares
 
@@ -56,12 +56,12 @@ def flipped(good: bytes, count: int) -> list[bytes]:
 
 
 def test_no_bit_of_a_recording_or_a_cell_can_change_unseen(recording, tmp_path):
-    run([CELL], tmp_path / "cells")
+    run_cells([CELL], tmp_path / "cells")
     (cell,) = (tmp_path / "cells").iterdir()
     path = save_recording(recording, tmp_path / "recording.nc")
     readers: dict[Path, Callable[[], Any]] = {
         path: lambda: load_recording(path),
-        cell: lambda: run([CELL], cell.parent),
+        cell: lambda: run_cells([CELL], cell.parent),
     }
     for file, read in readers.items():
         good = file.read_bytes()
@@ -232,12 +232,12 @@ def test_odd_files_are_one_sentence_and_no_hang(tmp_path, kind):
             read(path)
         assert "\n" not in str(error.value)
     kept = tmp_path / "kept"
-    KeptValues(ledger := Cell("squares", squares, {}), kept)
+    CachedValues(ledger := Cell("squares", squares, {}), kept)
     (lines,) = kept.iterdir()
     lines.unlink()
     lines.symlink_to(path)
     with pytest.raises(InputError):
-        KeptValues(ledger, kept)
+        CachedValues(ledger, kept)
 
 
 def test_a_file_that_nobody_may_read(tmp_path, monkeypatch):
@@ -271,7 +271,7 @@ def test_texts_that_no_person_would_write(tmp_path, text, said):
 
 
 def test_a_seed_of_any_size_is_written(tmp_path):
-    path = save_dataset(xr.Dataset(attrs={"seed": 2**70, "other": -(2**63) + 1}), tmp_path / "a.nc")
+    path = save(xr.Dataset(attrs={"seed": 2**70, "other": -(2**63) + 1}), tmp_path / "a.nc")
     assert xr.load_dataset(path).attrs == {"seed": str(2**70), "other": -(2**63) + 1}
 
 
@@ -290,7 +290,7 @@ def test_a_damaged_state_is_not_replayed(tmp_path):
         with pytest.raises(InputError, match=r"state\.npz is damaged"):
             replay(path)
     with pytest.raises(InputError, match=r"a\.nc is no state that a simulation left; expected a file of arrays, \.npz"):
-        replay(save_dataset(xr.Dataset(), tmp_path / "a.nc"))
+        replay(save(xr.Dataset(), tmp_path / "a.nc"))
 
 
 def test_names_are_shown_as_they_are(run, tmp_path, monkeypatch):
@@ -298,7 +298,7 @@ def test_names_are_shown_as_they_are(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path(f"{name}.toml").write_text("[symmetric]\np1_i = 1.0\n")
     words = ["flss", "--model", f"{name}.toml", "--starts", "5", "--velocities", "0.5", "--out", name]
-    code, out, error = run(*words)
+    code, out, error = run_cells(*words)
     assert code == 0, error
     assert f"{name}/flss.nc" in "".join(out.split("\n"))
     assert xr.load_dataset(Path(name) / "flss.nc", engine="h5netcdf").attrs["model"] == f"{name}.toml"
@@ -307,7 +307,7 @@ def test_names_are_shown_as_they_are(run, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["a\nb", "\x1b[31mred", "\udcff", "x" * 5000], ids=["line", "colour", "bytes", "book"])
 def test_words_that_nobody_reads_are_refused(run, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    code, _, error = run("flss", "--model", name)
+    code, _, error = run_cells("flss", "--model", name)
     assert code == 2
     assert error.count("\n") == 1
     assert error.strip().isprintable()
@@ -332,4 +332,4 @@ def test_folders_that_cannot_take_results(tmp_path, monkeypatch):
     results_folder(tmp_path / "new" / "and below", ["data.nc"])
     assert sorted(tmp_path.iterdir()) == before, "trying leaves nothing"
     monkeypatch.chdir(tmp_path)
-    assert save_dataset(xr.Dataset(), Path("x" * 252 + ".nc")).is_file(), "the longest name there is"
+    assert save(xr.Dataset(), Path("x" * 252 + ".nc")).is_file(), "the longest name there is"

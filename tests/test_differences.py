@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hexmj.intervals import paired_difference
+from hexmj.stats import paired_difference
 from hexmj.studies.league.standings import ranks
 
 

@@ -19,7 +19,7 @@ from hexmj.studies.disturbance.disturbances import SETTLED, TooFewStable, find_s
 from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 from hexmj.timing import Acceleration
 
 STRIDE, V, GRID = Stride(), 0.5, 20
@@ -97,13 +97,13 @@ def test_only_losses_after_the_disturbance_and_within_the_window_count():
     )
     result = with_flss_after(table).isel(velocity=0)
     assert result.kinematic_reached.values.tolist() == [5, 6]
-    np.testing.assert_allclose(result.kinematic.sel(window="short"), [1 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic.sel(window="whole"), [3 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic_buys.sel(window="whole")[1], 2 / 5)  # of the five that reach both
+    np.testing.assert_allclose(result.kinematic.sel(observation_time="short"), [1 / 5, 1 / 6])
+    np.testing.assert_allclose(result.kinematic.sel(observation_time="whole"), [3 / 5, 1 / 6])
+    np.testing.assert_allclose(result.kinematic_buys.sel(observation_time="whole")[1], 2 / 5)  # of the five that reach both
     assert (result.kinematic_low <= result.kinematic).all() and (result.kinematic <= result.kinematic_high).all()
 
 
-FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "window": 30.0}
+FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "observation_time": 30.0}
 
 
 @pytest.mark.thorough
@@ -112,26 +112,26 @@ def test_disturbed_walks_can_read_their_legs():
         "disturbances": ["halt"],
         "strategies": ["reorganise"],
         "n_starts": 2,
-        "window": 15.0,
+        "observation_time": 15.0,
     }
-    alone, reading = (conduct(DisturbedWalks(one, **halted)) for one in (LDVS, ReadsLegs(LDVS)))
-    assert np.isfinite(reading.physical.sel(window="whole")).all()
+    alone, reading = (run_study(DisturbedWalks(one, **halted)) for one in (LDVS, ReadsLegs(LDVS)))
+    assert np.isfinite(reading.physical.sel(observation_time="whole")).all()
     assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
 
 
 @pytest.mark.thorough
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
-    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "window": 45.0}
+    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "observation_time": 45.0}
     study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)
-    result = conduct(study, tmp_path, threads=1)
+    result = run_study(study, tmp_path, threads=1)
     assert result.physical_reached.values.tolist() == [[4, 4]]
-    assert result.physical.sel(window="whole").values.tolist() == [[0.0, 0.25]]
+    assert result.physical.sel(observation_time="whole").values.tolist() == [[0.0, 0.25]]
     assert (result.planned_loss.isel(case=0) == result.planned_loss.isel(case=1)).all()
     files = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     assert len(files) == 2
-    assert conduct(study, tmp_path, threads=2).identical(result)
+    assert run_study(study, tmp_path, threads=2).identical(result)
     assert files == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    other = conduct(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
+    other = run_study(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
     assert other.fall[0, 2].equals(result.fall[0, 1])
 
 
@@ -148,12 +148,12 @@ def test_windows_that_hold_no_push_or_recovery_are_refused_before_the_work():
     def study(**other: Any) -> DisturbedWalks:
         return DisturbedWalks(LDVS, **{**FEW, **other})
 
-    with pytest.raises(InputError, match=r"window = 1.9, 1.9 time units; expected at least 2, which a push lasts"):
-        study(window=1.9)
-    study(window=2.0)
-    study(window=1.9, disturbances=["halt"])
+    with pytest.raises(InputError, match=r"observation time = 1.9, 1.9 time units; expected at least 2, which a push lasts"):
+        study(observation_time=1.9)
+    study(observation_time=2.0)
+    study(observation_time=1.9, disturbances=["halt"])
     slow = Acceleration(rate=1e-7)
-    with pytest.raises(InputError, match=r"recovery: V and the window after it take .* units; expected at most 1e\+06"):
+    with pytest.raises(InputError, match=r"recovery: V and the observation time after it take .* units; expected at most 1e\+06"):
         study(recovery=slow)
     study(recovery=slow, strategies=["grasp"])
     firm = Conditions(grasp=3.0)
@@ -195,8 +195,8 @@ def test_any_weights_can_be_disturbed():
     """General weights have no hash."""
     controller = Cruse1998(general(HWS.weights))
     study = DisturbedWalks(controller, disturbances=["halt"], strategies=["reorganise"], physical=False, **FEW)
-    result = conduct(study)
-    assert np.isfinite(result.kinematic.sel(window="whole")).all()
+    result = run_study(study)
+    assert np.isfinite(result.kinematic.sel(observation_time="whole")).all()
     assert "V_p" not in caption(result), "nobody has walked"
     assert "V_p" in caption(result.assign_attrs(physical=1))
 

@@ -14,7 +14,7 @@ from hexmj.cli.machine_checks import CHECKS, Unfit, examine
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.errors import SimulationError
 from hexmj.measures import physical
-from hexmj.process import threads
+from hexmj import threads
 from hexmj.rendering import gl
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, KeptValues, module_sources, packages
+from hexmj.sweep import Cell, CachedValues, module_sources, packages
 from hexmj.sweeps.code import code
 from hexmj.user_code import parsing
 from hexmj.user_code.loaded import importable
@@ -103,7 +103,7 @@ USED = """
 import sys
 from pathlib import Path
 import used, controller
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 from toy.study import cell
 
 def record():
@@ -137,7 +137,7 @@ def test_a_module_that_was_edited_as_it_was_used_counts_as_it_ran(tmp_path: Path
 
 LATE = """
 from pathlib import Path
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 import late_cells
 late_cells.record()
 Path("helper.py").write_text("GAIN = 7.0")
@@ -161,7 +161,7 @@ def test_a_module_that_is_edited_before_a_cell_imports_it_is_refused(tmp_path: P
 
 FOUND_LATE = """
 from pathlib import Path
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 import late_cells
 run([Cell("late", late_cells.cell, {})], Path("kept"))
 """
@@ -185,7 +185,7 @@ def test_a_module_that_is_found_only_as_a_cell_is_computed_is_refused(tmp_path: 
 STALE = """
 import sys
 if sys.argv[1] == "before": import stale
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 import stale
 from toy.study import cell
 print(Cell("toy", cell, {"controller": stale.Tripod()}).record())
@@ -210,7 +210,7 @@ def test_bytecode_of_another_source_is_refused(tmp_path: Path, when: str) -> Non
 SOUND = """
 import sys
 from hexmj.user_code.loaded import importable
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 import sound
 print(Cell("sound", sound.cell, {"controller": importable("mine.py").Tripod()}).record())
 """
@@ -247,7 +247,7 @@ def edited_rows(rows: np.ndarray, data: str) -> np.ndarray:
 
 def test_evaluations_during_which_a_file_is_edited_are_not_kept(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
-    values = KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept")
+    values = CachedValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept")
     with pytest.raises(InputError, match="rows: data of settings has changed while it was in use; start again"):
         values(np.eye(2))
-    assert KeptValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept").known == 0
+    assert CachedValues(Cell("rows", edited_rows, {"data": str(data)}), tmp_path / "kept").known == 0

@@ -194,7 +194,7 @@ def test_nonsensical_actions_are_refused(action: np.ndarray):
 
 @pytest.mark.parametrize("policy", [None, lambda step: ZEROS])
 def test_the_viewers_runtime_runs_it(policy):
-    """The viewer without its window: ticks, a pause, single steps, the end of an episode and a restart."""
+    """The viewer without its observation time: ticks, a pause, single steps, the end of an episode and a restart."""
     walking = dm.load(actions="tips", duration=5.0)
     runtime, errors = Runtime(walking, policy), []
     runtime.on_error += errors.append

@@ -12,7 +12,7 @@ from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Poten
 from hexmj.controllers.rivals.lifted import Legs
 from hexmj.gaits import gait
 from hexmj.search.samples import Sample
-from hexmj.storage.files import read_toml
+from hexmj.files import read_toml
 from hexmj.timing import Stride
 
 L2 = 1
@@ -67,7 +67,7 @@ def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     problem = options_of(shlex.split(found["command"])[1:])._problem()
     assert problem.controller(problem.form.vector(EVOLVED)) == EVOLVED
     few = found["fresh_few"]
-    (flss,) = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED}).flss.sel(window=problem.window)
+    (flss,) = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED}).flss.sel(observation_time=problem.observation_time)
     assert flss * few["starts"] == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
 
 

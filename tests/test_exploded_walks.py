@@ -118,7 +118,7 @@ def test_an_insect_that_a_push_still_throws_as_the_window_ends_is_no_outcome():
     settled = settle(draw_starts(2, 5))
     plan = [begin(LDVS, settled.starts, 0.5, settled.stride) for _ in range(2)]
     hard, none = (Push(np.array([0.0, push]), np.full(2, 10.0)) for push in (3200.0, 0.0))
-    with pytest.raises(StillThrown, match="start 1 is still thrown by its push as the window ends: its root is"):
+    with pytest.raises(StillThrown, match="start 1 is still thrown by its push as the observation time ends: its root is"):
         outcomes_of_plan(settled, plan[0], 14.0, np.full(2, np.inf), push=hard)
     assert np.isinf(outcomes_of_plan(settled, plan[1], 14.0, np.full(2, np.inf), push=none).fall).all()
 

@@ -18,7 +18,7 @@ def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):
     """As the module of numba raises it that keeps and finds code."""
     (tmp_path / "caching.py").write_text("def load(*_, **__): raise EOFError('Ran out of input')")
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", importable(tmp_path / "caching.py").load)
-    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    code, text, error = run("flss", "--starts", 5, "--observation time", 10)
     assert (code, text) == (2, "")
     assert "hexmj: numba cannot find or keep compiled code; delete its files" in error
     assert "(EOFError: Ran out of input)" in error
@@ -29,7 +29,7 @@ def test_a_library_that_cannot_be_loaded_is_not_blamed_on_the_output(run, monkey
         raise OSError("Could not find/load shared object file")
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", fail)
-    code, _, error = run("flss", "--starts", 5, "--window", 10)
+    code, _, error = run("flss", "--starts", 5, "--observation time", 10)
     assert (code, error) == (2, "hexmj: the system: Could not find/load shared object file\n")
 
 
@@ -42,7 +42,7 @@ def test_a_folder_that_goes_meanwhile_is_not_blamed_on_the_output(run, monkeypat
         os.getcwd()
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", fail)
-    code, _, error = run("flss", "--starts", 5, "--window", 10)
+    code, _, error = run("flss", "--starts", 5, "--observation time", 10)
     assert (code, error) == (2, "hexmj: the current folder is no longer there; expected one that is\n")
 
 
@@ -59,7 +59,7 @@ def test_memory_that_runs_out_is_a_sentence(run, monkeypatch, failed, why):
         raise failed
 
     monkeypatch.setattr("hexmj.measures.kinematic.first_loss", run_out)
-    code, text, error = run("flss", "--starts", 5, "--window", 10)
+    code, text, error = run("flss", "--starts", 5, "--observation time", 10)
     assert (code, text) == (2, "")
     assert f"hexmj: the memory does not suffice ({why}); expected more of it, or fewer starts" in error
 
@@ -95,13 +95,13 @@ def test_the_state_of_a_simulation_that_diverged_is_kept_with_the_results(run, t
 
 def test_an_answer_that_can_go_nowhere_is_a_sentence(run, monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
-    code, _, error = run("flss", "--starts", 5, "--window", 10, "--json")
+    code, _, error = run("flss", "--starts", 5, "--observation time", 10, "--json")
     assert (code, error) == (2, "hexmj: standard output is closed; expected it open, for the answer\n")
 
 
 @pytest.mark.slow
 def test_nothing_but_the_answer_is_on_standard_output_where_the_other_one_is_closed(run, tmp_path):
-    words = ["flss", "--starts", 5, "--window", 10, "--out", tmp_path / "out", "--velocities"]
+    words = ["flss", "--starts", 5, "--observation time", 10, "--out", tmp_path / "out", "--velocities"]
     assert "this has taken its place" not in run(*words, 0.3)[2]
     assert "this has taken its place" in run(*words, 0.5)[2]
     command = [sys.executable, "-m", "hexmj", *map(str, words), "0.7"]

@@ -8,7 +8,7 @@ from hexmj.measures.compare import physical_flss
 from hexmj.physics.outcomes import TOPPLED
 from hexmj.rotations import lean
 
-FEW = {"n_starts": 20, "window": 60.0}
+FEW = {"n_starts": 20, "observation_time": 60.0}
 
 
 @pytest.fixture(scope="module")

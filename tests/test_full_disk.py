@@ -23,8 +23,9 @@ from hexmj.cli.manifest import save_manifest
 from hexmj.errors import InputError
 from hexmj.replay.film.encoder import encoder
 from hexmj.storage.files import is_as_written, replacing, write_whole
-from hexmj.storage.results import save_dataset, save_figure, save_text
-from hexmj.sweeps import Cell, KeptValues, run
+from hexmj.files import write_text
+from hexmj.io import save, save_figure
+from hexmj.sweep import Cell, CachedValues, run_cells
 from small_cells import squares
 from tiers import few_of
 
@@ -69,11 +70,11 @@ def noise(path: Path) -> None:
 
 
 WRITERS: dict[str, Callable[[Path], object]] = {
-    "data.nc": lambda path: save_dataset(numbers(0, 10_000), path),
+    "data.nc": lambda path: save(numbers(0, 10_000), path),
     "figure.png": lambda path: save_figure(figure(), path),
     "figure.pdf": lambda path: save_figure(figure(), path, dpi=300),
     "manifest.json": lambda path: save_manifest(Flss(), {"many": list(range(10_000))}, (), path),
-    "found.toml": lambda path: save_text("# long\n" * 10_000, path),
+    "found.toml": lambda path: write_text(path, "# long\n" * 10_000),
     "film.mp4": noise,
 }
 
@@ -122,10 +123,10 @@ def test_another_content_is_told_whatever_its_time(tmp_path):
 
 def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):
     with little_room(), pytest.raises(InputError, match=r"numbers-1-.*\.nc cannot be written: File too large"):
-        run(cells(10_000), tmp_path)
+        run_cells(cells(10_000), tmp_path)
     (kept,) = tmp_path.iterdir()
     before = kept.read_bytes()
-    assert [one.sizes["n"] for one in run(cells(10_000), tmp_path)] == [5, 10_000]
+    assert [one.sizes["n"] for one in run_cells(cells(10_000), tmp_path)] == [5, 10_000]
     assert kept.read_bytes() == before
 
 
@@ -133,15 +134,15 @@ def test_finished_cells_stay_where_the_next_does_not_fit(tmp_path):
 def test_evaluations_go_on_wherever_the_disk_was_full(tmp_path, room):
     rows = np.random.default_rng(1).standard_normal((300, 4))
     with little_room(room), pytest.raises(InputError, match="cannot be written"):
-        KeptValues(Cell("squares", squares, {}), tmp_path)(rows)
-    again = KeptValues(Cell("squares", squares, {}), tmp_path)
+        CachedValues(Cell("squares", squares, {}), tmp_path)(rows)
+    again = CachedValues(Cell("squares", squares, {}), tmp_path)
     assert again(rows).tobytes() == squares(rows).tobytes()
-    held = KeptValues(Cell("squares", squares, {}), tmp_path)
+    held = CachedValues(Cell("squares", squares, {}), tmp_path)
     assert held(rows[::-1]).tobytes() == squares(rows[::-1]).tobytes()
     assert held.replayed == 300
 
 
-WALK = ("walk", "--window", "40", "--velocity", "0.5", "--out")
+WALK = ("walk", "--observation time", "40", "--velocity", "0.5", "--out")
 
 
 @pytest.mark.slow
@@ -160,7 +161,7 @@ def test_every_file_of_a_command_may_be_the_one_that_does_not_fit(run, tmp_path,
             usual(*words)
 
         monkeypatch.setattr(os, call, fill)
-        code, out, error = run(*WALK, out_folder := tmp_path / f"{n}")
+        code, out, error = run_cells(*WALK, out_folder := tmp_path / f"{n}")
         monkeypatch.setattr(os, call, usual)
         assert (code, out) == (2, "")
         assert error.strip() == f"hexmj: {out_folder / files[n]} cannot be written: No space left on device"
@@ -185,7 +186,7 @@ def test_a_disk_that_is_really_full(run, small_disk):
             file.write(bytes(4096))
     for room, left in ((0, []), (100_000, []), (150_000, ["recording.nc"])):
         os.truncate(fill, fill.stat().st_size - room)
-        code, out, error = run(*WALK, small_disk / "out")
+        code, out, error = run_cells(*WALK, small_disk / "out")
         assert (code, out) == (2, "")
         assert "cannot be written" in error
         assert "No space left on device" in error

@@ -17,7 +17,7 @@ import pytest
 
 from hexmj.errors import InputError
 from hexmj.storage.files import digest
-from hexmj.sweeps import packages
+from hexmj.sweep import packages
 from hexmj.sweeps.code import code
 from hexmj.sweeps.packages import NAMES
 from small_cells import WITHOUT_DASK
@@ -203,7 +203,7 @@ def test_a_script_below_installed_packages_is_a_users(tmp_path: Path) -> None:
 AS_A_SCRIPT = """
 from pathlib import Path
 import xarray as xr
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 def gain(): return xr.Dataset({"gain": float(Path(__file__).with_name("gain").read_text())})
 print(float(run([Cell("gain", gain, {})], Path("kept"))[0].gain))
 """
@@ -238,7 +238,7 @@ def test_a_compiled_helper_that_was_made_anew_while_it_ran_is_refused(
 SWEEP = """
 from pathlib import Path
 import xarray as xr
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 import mine
 run([Cell("gain", mine.gain, {"asked": ASKED})], Path("kept"))
 """

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, finish, run
+from hexmj.sweep import Cell, finished_cells, run_cells
 from hexmj.user_code.loaded import importable
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, MINE, assert_same_bits, counted_cells, odd_cells, of_object
@@ -22,7 +22,7 @@ from small_cells import ENVIRONMENT, MINE, assert_same_bits, counted_cells, odd_
 
 def test_a_kept_cell_is_netcdf_that_tells_what_it_depends_on(tmp_path: Path) -> None:
     (cell,) = odd_cells(1)
-    run([cell], tmp_path)
+    run_cells([cell], tmp_path)
     (path,) = tmp_path.iterdir()
     with xr.open_dataset(path, engine="h5netcdf") as data:
         assert json.loads(data.attrs["cell"])["settings"] == {"seed": 0}
@@ -31,7 +31,7 @@ def test_a_kept_cell_is_netcdf_that_tells_what_it_depends_on(tmp_path: Path) -> 
 
 def test_a_damaged_or_foreign_cell_is_never_believed(tmp_path: Path) -> None:
     cell, other = odd_cells(2)
-    run([cell, other], tmp_path)
+    run_cells([cell, other], tmp_path)
     path, foreign = (tmp_path / f"{one.stem(one.record())}.nc" for one in (cell, other))
     good = path.read_bytes()
     draw = np.random.default_rng(0)
@@ -41,13 +41,13 @@ def test_a_damaged_or_foreign_cell_is_never_believed(tmp_path: Path) -> None:
     for content in damaged:
         path.write_bytes(content)
         with pytest.raises(InputError, match=rf"{path.name} is .*; delete it, and it is made anew$"):
-            run([cell], tmp_path)
+            run_cells([cell], tmp_path)
     path.unlink()
     path.symlink_to("nowhere/cell.nc")
     with pytest.raises(InputError, match=rf"{path.name} is a link to nothing; delete it, and it is made anew$"):
-        run([cell], tmp_path)
+        run_cells([cell], tmp_path)
     path.unlink()
-    run([cell], tmp_path)
+    run_cells([cell], tmp_path)
     assert path.read_bytes() == good
 
 
@@ -58,7 +58,7 @@ def test_an_error_cancels_what_has_not_begun_and_keeps_what_is_finished(tmp_path
         *counted_cells(tmp_path, 50, wait=0.05),
     ]
     with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="cell 0 fails"):
-        run(cells, tmp_path / "kept", executor=pool)
+        run_cells(cells, tmp_path / "kept", executor=pool)
     assert 2 <= len(calls(tmp_path)) < 10
     assert len(contents(tmp_path / "kept")) == len(calls(tmp_path))
 
@@ -73,9 +73,9 @@ def test_a_caller_who_goes_away_cancels_what_has_not_begun(tmp_path: Path, end: 
     with ThreadPoolExecutor(1) as pool:
         if end == "ctrl-c":
             with pytest.raises(KeyboardInterrupt):
-                run(cells, tmp_path / "kept", executor=pool, progress=stop)
+                run_cells(cells, tmp_path / "kept", executor=pool, progress=stop)
         else:
-            some = finish(cells, tmp_path / "kept", executor=pool)
+            some = finished_cells(cells, tmp_path / "kept", executor=pool)
             next(some)
             del some
     assert 1 <= len(contents(tmp_path / "kept")) == len(calls(tmp_path)) < 10
@@ -86,7 +86,7 @@ import sys
 from pathlib import Path
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from hexmj.sweeps import run
+from hexmj.sweep import run_cells
 from small_cells import counted_cells
 
 if __name__ == "__main__":
@@ -94,9 +94,9 @@ if __name__ == "__main__":
     cells = counted_cells(log, 30, wait=0.03)
     if workers:
         with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
-            run(cells, folder, executor=pool)
+            run_cells(cells, folder, executor=pool)
     else:
-        run(cells, folder)
+        run_cells(cells, folder)
 """
 
 
@@ -118,11 +118,11 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path, workers: int) -> No
     assert 5 <= len(before) < 30
     cells = counted_cells(tmp_path, 30, wait=0.03)
     with ThreadPoolExecutor(10) as pool:
-        found = run(cells, folder, executor=pool)
+        found = run_cells(cells, folder, executor=pool)
     assert [float(one.number) for one in found] == list(range(30))
     assert before.items() <= contents(folder).items()
     assert len(calls(tmp_path)) <= 30 + max(1, workers)
-    assert_same_bits(found, run(cells, tmp_path / "fresh", executor=ThreadPoolExecutor(30)))
+    assert_same_bits(found, run_cells(cells, tmp_path / "fresh", executor=ThreadPoolExecutor(30)))
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_two_sweeps_share_a_folder(tmp_path: Path) -> None:
 
 def test_a_full_disk_is_one_sentence_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cells = counted_cells(tmp_path, 3)
-    run(cells[:1], tmp_path / "kept")
+    run_cells(cells[:1], tmp_path / "kept")
     before = contents(tmp_path / "kept")
 
     def full(_: int) -> None:
@@ -143,7 +143,7 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_file(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(InputError, match=r"cannot be written: No space left on device$"):
-        run(cells, tmp_path / "kept")
+        run_cells(cells, tmp_path / "kept")
     assert contents(tmp_path / "kept") == before
 
 
@@ -155,9 +155,9 @@ def edits(path: str, text: str) -> xr.Dataset:
 def test_a_file_that_is_edited_while_a_cell_is_computed_is_refused(tmp_path: Path) -> None:
     (data := tmp_path / "gains.toml").write_text("before")
     with pytest.raises(InputError, match="edits: path of settings has changed while it was in use; start again"):
-        run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
+        run_cells([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")
     assert not list(tmp_path.rglob("*.nc"))
-    assert len(run([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1
+    assert len(run_cells([Cell("edits", edits, {"path": str(data), "text": "after"})], tmp_path / "kept")) == 1
 
 
 def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
@@ -178,5 +178,5 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
             return future
 
     with pytest.raises(InputError, match=r"mine\.py was edited while it was in use; start again$"):
-        run([cell], tmp_path / "kept", executor=Late())
+        run_cells([cell], tmp_path / "kept", executor=Late())
     assert not list((tmp_path / "kept").iterdir())

@@ -182,7 +182,7 @@ def test_labelled_parameters_stand_in_order():
     forms = {name: hexmj.NetworkForm(name) for name in FORMS}
     labelled = pd.Series(every, forms["general"].names)
     assert np.array_equal(hexmj.Weights.from_vector(labelled).to_vector(), every)
-    sample = Sample(hexmj.Problem(forms["ldvs"], 0.3, 0.3, window=20.0), 5, 0)
+    sample = Sample(hexmj.Problem(forms["ldvs"], 0.3, 0.3, observation_time=20.0), 5, 0)
     table = ordered.to_frame().T
     wrong_order: Any = table.sort_index(axis="columns")
     tables: list[Any] = [table, Table(table)]

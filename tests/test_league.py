@@ -11,7 +11,7 @@ import xarray as xr
 import hexmj
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
-from hexmj.intervals import paired_difference
+from hexmj.stats import paired_difference
 from hexmj.measures.captions import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
@@ -24,8 +24,8 @@ from hexmj.studies.league.in_physics import walks
 from hexmj.studies.league.on_paper import losses
 from hexmj.studies.league.study import League
 from hexmj.studies.league.table import by_rank, league_markdown, tables
-from hexmj.sweeps import run
-from hexmj.sweeps.plain_settings import plain
+from hexmj.sweep import run_cells
+from hexmj.plain import plain
 from hexmj.timing import Stride
 from standing_still import Still
 
@@ -35,12 +35,12 @@ NAMES = ("wilson", "ldvs", "graham-ideal")
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(takes_part, (0.3, 0.6), 12, 2, 2, window=40.0, accelerating=False, periods=12, seed=0)
+    return League(takes_part, (0.3, 0.6), 12, 2, 2, observation_time=40.0, accelerating=False, periods=12, seed=0)
 
 
 @pytest.fixture(scope="module")
 def data(league: League, tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], xr.Dataset]:
-    found = run(league.cells(), tmp_path_factory.mktemp("league"))
+    found = run_cells(league.cells(), tmp_path_factory.mktemp("league"))
     return dict(zip(league.named_cells(), found, strict=True))
 
 
@@ -51,12 +51,12 @@ def result(league: League, data) -> xr.Dataset:
 
 @pytest.mark.thorough
 def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
-    table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, window=40.0)
+    table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, observation_time=40.0)
     assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)
     assert np.array_equal(result.kinematic_low.sel(entrant="ldvs"), table.low)
-    j_n, _ = flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=12, window=40.0)
+    j_n, _ = flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=12, observation_time=40.0)
     assert result.range.sel(entrant="ldvs") == j_n
-    falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, window=40.0)
+    falls = hexmj.physical_flss(hexmj.load_controller("wilson"), (0.3, 0.6), n_starts=2, observation_time=40.0)
     assert np.array_equal(result.physical.sel(entrant="wilson"), falls.flss)
 
 
@@ -113,8 +113,8 @@ def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League,
 
 def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:
     """It lasts 2 time units."""
-    for window, pushed in ((1.9, False), (2.0, True)):
-        short = replace(league, entrants={"ldvs": league.entrants["ldvs"]}, window=window)
+    for observation_time, pushed in ((1.9, False), (2.0, True)):
+        short = replace(league, entrants={"ldvs": league.entrants["ldvs"]}, observation_time=observation_time)
         assert (("ldvs", "push") in short.named_cells()) == pushed
 
 
@@ -130,10 +130,10 @@ def test_no_more_starts_walk_in_physics_than_on_paper(league: League, name: str)
         replace(league, **how)
 
 
-@pytest.mark.parametrize("window", ["start", 40.0])
-def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(window: str | float) -> None:
+@pytest.mark.parametrize("observation_time", ["start", 40.0])
+def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(observation_time: str | float) -> None:
     eq11, entrant = hexmj.Acceleration(rate=0.01), Entrant(hexmj.load_controller("uncoordinated"))
-    found = losses(entrant, 0.5, window, n_starts=20, seed=0, stride=Stride(), acceleration=eq11)
+    found = losses(entrant, 0.5, observation_time, n_starts=20, seed=0, stride=Stride(), acceleration=eq11)
     lost = first_loss(hexmj.draw_starts(20, 0), hexmj.UNCOORDINATED, 0.5, 80.0, acceleration=eq11)
     assert np.array_equal(found.lost, np.isfinite(lost))
 

@@ -14,7 +14,7 @@ from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import InputError, RenderingError
 from hexmj.studies.league.study import League
 
-SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --window 10 --no-video --out here"
+SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --observation time 10 --no-video --out here"
 
 
 def test_fewer_starts_on_paper_are_all_that_walk_unless_more_are_asked_for() -> None:

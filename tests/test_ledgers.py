@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, KeptValues
+from hexmj.sweep import Cell, CachedValues
 from left_by_cells import calls
 
 
@@ -16,8 +16,8 @@ def squares(rows: np.ndarray, log: str) -> np.ndarray:
     return (rows**2).sum(axis=1) / 3
 
 
-def ledger(tmp_path: Path, folder: Path | None = None) -> KeptValues:
-    return KeptValues(Cell("squares", squares, {"log": str(tmp_path)}), folder or tmp_path / "kept")
+def ledger(tmp_path: Path, folder: Path | None = None) -> CachedValues:
+    return CachedValues(Cell("squares", squares, {"log": str(tmp_path)}), folder or tmp_path / "kept")
 
 
 def test_a_ledger_computes_no_row_twice_and_gives_the_same_bits(tmp_path: Path) -> None:
@@ -55,7 +55,7 @@ def test_a_ledger_loses_at_most_a_line_that_is_not_whole(tmp_path: Path) -> None
 def test_a_ledger_believes_no_line_of_another_and_no_number_that_is_none(tmp_path: Path) -> None:
     ledger(tmp_path)(np.ones((2, 2)))
     (path,) = (tmp_path / "kept").iterdir()
-    other = KeptValues(Cell("squares", squares, {"log": str(tmp_path.parent)}), tmp_path / "other")
+    other = CachedValues(Cell("squares", squares, {"log": str(tmp_path.parent)}), tmp_path / "other")
     record, lines = path.read_text().split("\n", 1)
     row = np.ones(2).tobytes()
     for line in (

@@ -165,15 +165,15 @@ def test_a_walk_that_fails_as_it_begins_leaves_the_one_before():
 
 
 def test_a_key_that_asks_for_what_is_refused_is_told(monkeypatch):
-    """MuJoCo's viewer without its window."""
+    """MuJoCo's viewer without its observation time."""
     shown, session = [], LiveSession(LiveWalk(Stumbles(), 0.5, STARTS[0]), 0, STARTS.__getitem__)
 
     @contextmanager
-    def window(conditions, on_key):
+    def observation_time(conditions, on_key):
         on_key(desktop.UP)
         yield SimpleNamespace(is_running=lambda: len(shown) < 2)
 
-    monkeypatch.setattr(desktop, "_window", window)
+    monkeypatch.setattr(desktop, "_window", observation_time)
     monkeypatch.setattr(desktop, "_show", lambda *what: shown.append(what[-1]))
     desktop.view_live(session)
     assert all("too fast" in told for told in shown)

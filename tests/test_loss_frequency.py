@@ -1,4 +1,4 @@
-"""FLSS against an independent simulation, and the laws of its windows, starts and intervals."""
+"""FLSS against an independent simulation, and the laws of its observation times, starts and intervals."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -8,11 +8,11 @@ from scipy.stats import binomtest
 
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.intervals import wilson_interval
+from hexmj.stats import wilson_interval
 from hexmj.measures.kinematic import KinematicFlss, first_loss, flss, flss_over_range, losses_of_range
 from hexmj.starts import SLAB, draw_slabs, draw_start, draw_starts
-from hexmj.sweeps import conduct, run
-from hexmj.timing import Acceleration, Stride, observation_time
+from hexmj.sweep import run_study, run_cells
+from hexmj.timing import Acceleration, Stride, observation_duration
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]
 REFERENCE = {
@@ -28,18 +28,18 @@ REFERENCE = {
 CONTROLLERS = {"uncoordinated": UNCOORDINATED, "hws": HWS, "ldvs": LDVS}
 
 
-@pytest.mark.parametrize(("name", "window"), REFERENCE)
-def test_reference_to_the_printed_digit(name, window):
+@pytest.mark.parametrize(("name", "observation_time"), REFERENCE)
+def test_reference_to_the_printed_digit(name, observation_time):
     """The starts of seed 1 give every number of the reference as it is printed there.
 
     With other seeds the sampling error is added: with seed 0 the largest of the 24 differences is 0.020
     (uncoordinated, `start`, V = 0.3: 0.650; 0.656 over 35,000 starts), the others are below 0.011.
     """
-    printed = np.array(REFERENCE[name, window])
+    printed = np.array(REFERENCE[name, observation_time])
     digit = np.where((printed < 0.1) | (printed > 0.99), 0.001, 0.01)
-    if (name, window) == ("uncoordinated", "start"):
+    if (name, observation_time) == ("uncoordinated", "start"):
         digit[0] = 0.01
-    ours = flss(CONTROLLERS[name], VELOCITIES, window=window, seed=1).flss.values
+    ours = flss(CONTROLLERS[name], VELOCITIES, observation_time=observation_time, seed=1).flss.values
     assert (np.abs(ours - printed) <= digit / 2 + 1e-9).all()
 
 
@@ -47,7 +47,7 @@ def test_reference_to_the_printed_digit(name, window):
 def test_acceleration_nearly_keeps_stability():
     """The reference gives about 0.03 and 0.05 for a = 0.00008 up to V = 0.9; the paper below 0.05 and 0.1."""
     for controller, reference in ((LDVS, 0.03), (HWS, 0.05)):
-        table = flss(controller, [0.9], n_starts=1000, window="start", acceleration=Acceleration())
+        table = flss(controller, [0.9], n_starts=1000, observation_time="start", acceleration=Acceleration())
         assert table.flss.item() == pytest.approx(reference, abs=0.02)
 
 
@@ -62,14 +62,14 @@ def test_starts_lie_in_s_and_do_not_depend_on_their_number():
 
 def test_windows():
     v = np.array([0.1, 0.5])
-    assert observation_time("walk", v, Stride()) == pytest.approx([660.0, 180.0])
-    assert observation_time("start", v, Stride()) == pytest.approx([40.0, 40.0])
-    assert observation_time(12.5, v, Stride()) == pytest.approx([12.5, 12.5])
-    accelerated = observation_time("start", v, Stride(), Acceleration(0.001, 0.1))
+    assert observation_duration("walk", v, Stride()) == pytest.approx([660.0, 180.0])
+    assert observation_duration("start", v, Stride()) == pytest.approx([40.0, 40.0])
+    assert observation_duration(12.5, v, Stride()) == pytest.approx([12.5, 12.5])
+    accelerated = observation_duration("start", v, Stride(), Acceleration(0.001, 0.1))
     assert accelerated == pytest.approx([40.0, 440.0])
-    flss(LDVS, [0.1, 0.4], n_starts=2, window=300.0, acceleration=Acceleration(0.001))
-    with pytest.raises(InputError, match=r"^V = 0.5 is reached at 400 time units, the window ends at 399; expected"):
-        flss(LDVS, [0.1, 0.5], n_starts=2, window=399.0, acceleration=Acceleration(0.001))
+    flss(LDVS, [0.1, 0.4], n_starts=2, observation_time=300.0, acceleration=Acceleration(0.001))
+    with pytest.raises(InputError, match=r"^V = 0.5 is reached at 400 time units, the observation time ends at 399; expected"):
+        flss(LDVS, [0.1, 0.5], n_starts=2, observation_time=399.0, acceleration=Acceleration(0.001))
 
 
 def test_walks_that_accelerate_lag_behind():
@@ -87,18 +87,18 @@ def test_threads_do_not_matter():
 
 @pytest.mark.parametrize("samples", [2, 3])
 def test_samples_of_the_protocol(samples):
-    table = flss(LDVS, [0.5], n_starts=1000 * samples, window="start")
+    table = flss(LDVS, [0.5], n_starts=1000 * samples, observation_time="start")
     times = first_loss(draw_starts(1000 * samples, 0), LDVS, 0.5, 40.0)
     lost = np.isfinite(times).reshape(samples, 1000).mean(axis=1)
     assert table.sample_sd.item() == pytest.approx(lost.std(ddof=1))
     assert table.flss.item() == pytest.approx(lost.mean())
-    assert np.isnan(flss(LDVS, [0.5], n_starts=100, window="start").sample_sd.item())
+    assert np.isnan(flss(LDVS, [0.5], n_starts=100, observation_time="start").sample_sd.item())
 
 
 def test_progress_is_the_share_of_starts_and_velocities(monkeypatch):
     monkeypatch.setattr("hexmj.starts.SLAB", 1000)
     told: list[float] = []
-    flss(UNCOORDINATED, [0.9, 0.95], n_starts=1500, window=0.1, progress=told.append)
+    flss(UNCOORDINATED, [0.9, 0.95], n_starts=1500, observation_time=0.1, progress=told.append)
     assert told == pytest.approx([1 / 3, 1 / 6, 0, 1 / 3, 1 / 6, 0])
 
 
@@ -107,10 +107,10 @@ def test_slabs_are_one_stream():
     size = SLAB + 1500
     starts = draw_starts(size, 2)
     assert np.array_equal(starts, np.random.default_rng(2).uniform(-10.0, 10.0, (size, 6)))
-    table = flss(LDVS, [0.7], n_starts=size, window="start", seed=2)
+    table = flss(LDVS, [0.7], n_starts=size, observation_time="start", seed=2)
     assert table.flss.item() == np.isfinite(first_loss(starts, LDVS, 0.7, 40.0)).mean()
     v = np.random.default_rng([2, 1]).uniform(0.5, 0.9, size)
-    over_range, _ = flss_over_range(LDVS, 0.5, 0.9, n_starts=size, window="start", seed=2)
+    over_range, _ = flss_over_range(LDVS, 0.5, 0.9, n_starts=size, observation_time="start", seed=2)
     assert over_range == np.isfinite(first_loss(starts, LDVS, v, 40.0)).mean()
 
 
@@ -119,14 +119,14 @@ def test_slabs_are_one_stream():
 def test_any_cut_counts_what_one_run_counts(tmp_path, range_of):
     """Whatever the ranges' size and the order in which they are computed, and whoever computes them."""
     size, velocities = (SLAB + 2000, [0.7]) if range_of >= SLAB else (3400, [0.5, 0.9]) if range_of > 1 else (12, [0.7])
-    whole = flss(LDVS, velocities, n_starts=size, window="start", seed=2)
+    whole = flss(LDVS, velocities, n_starts=size, observation_time="start", seed=2)
     study = KinematicFlss(LDVS, velocities, size, "start", 2, range_of=range_of)
     cells = study.cells()
-    backwards = run(cells[::-1], tmp_path)
+    backwards = run_cells(cells[::-1], tmp_path)
     assert study.result(backwards[::-1]).identical(whole)
     with ThreadPoolExecutor(3) as pool:
-        assert conduct(study, tmp_path, executor=pool).identical(whole)
-        assert conduct(study, executor=pool).identical(whole)
+        assert run_study(study, tmp_path, executor=pool).identical(whole)
+        assert run_study(study, executor=pool).identical(whole)
 
 
 def test_ranges_of_one_stream_never_overlap():
@@ -152,19 +152,19 @@ def test_wilson_interval_is_the_one_of_scipy(lost, size):
 
 def test_generalised_flss_averages_over_velocities():
     """J_N over a range lies between I_N at its ends, and is I_N where the range is a point."""
-    ends = flss(LDVS, [0.2, 0.6], n_starts=2000, window="start").flss.values
-    inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, n_starts=2000, window="start")
+    ends = flss(LDVS, [0.2, 0.6], n_starts=2000, observation_time="start").flss.values
+    inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, n_starts=2000, observation_time="start")
     assert ends[0] < low < inside < high < ends[1]
-    assert flss_over_range(LDVS, 0.6, 0.6, n_starts=2000, window="start")[0] == ends[1]
+    assert flss_over_range(LDVS, 0.6, 0.6, n_starts=2000, observation_time="start")[0] == ends[1]
 
 
 def test_seven_samples_are_drawn_unless_told():
-    usual = flss_over_range(UNCOORDINATED, 0.8, 0.9, window="start")
-    assert usual == flss_over_range(UNCOORDINATED, 0.8, 0.9, window="start", n_starts=7000)
+    usual = flss_over_range(UNCOORDINATED, 0.8, 0.9, observation_time="start")
+    assert usual == flss_over_range(UNCOORDINATED, 0.8, 0.9, observation_time="start", n_starts=7000)
 
 
 def test_a_range_may_begin_at_a_stand():
-    assert flss_over_range(UNCOORDINATED, 0.0, 0.0, n_starts=20, window=10.0)[0] == 0.0
+    assert flss_over_range(UNCOORDINATED, 0.0, 0.0, n_starts=20, observation_time=10.0)[0] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -175,8 +175,8 @@ def test_a_range_may_begin_at_a_stand():
         ({"velocities": [0.1, 0.1]}, "twice"),
         ({"velocities": [1.0]}, "0 <= V < 1"),
         ({"velocities": [0.0]}, "no period"),
-        ({"window": "long"}, "valid names: walk, start"),
-        ({"window": -1.0}, "at least one step"),
+        ({"observation_time": "long"}, "valid names: walk, start"),
+        ({"observation_time": -1.0}, "at least one step"),
         ({"n_starts": 0}, "at least 1"),
         ({"seed": -1}, "at least 0"),
         ({"threads": 0}, "at least 1"),
@@ -198,7 +198,7 @@ def test_nonsense_gets_a_clear_sentence(change, words):
         ({"low": -0.5}, "velocity range -0.5 to 0.5; expected 0 <= low <= high < 1"),
         ({"high": 0.05}, "velocity range 0.1 to 0.05"),
         ({"high": 1.0}, "velocity range 0.1 to 1.0"),
-        ({"low": 0.0}, "velocity = 0 has no period; expected V > 0 with the window 'walk'"),
+        ({"low": 0.0}, "velocity = 0 has no period; expected V > 0 with the observation time 'walk'"),
     ],
 )
 def test_nonsense_for_a_range_gets_a_clear_sentence(change, words):

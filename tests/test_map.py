@@ -15,9 +15,9 @@ from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
 from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
 from hexmj.studies.stability_map.study import CONDITIONS, StabilityMap
-from hexmj.sweeps import Cell, conduct
+from hexmj.sweep import Cell, run_study
 
-SMALL: dict[str, Any] = {"values": [80.0, 320.0], "velocities": [0.5, 0.7], "n_starts": 12, "window": 60.0}
+SMALL: dict[str, Any] = {"values": [80.0, 320.0], "velocities": [0.5, 0.7], "n_starts": 12, "observation_time": 60.0}
 SHORTER: dict[str, Any] = {"values": [320.0]}
 OTHER_SEED: dict[str, Any] = {"seed": 1}
 
@@ -29,13 +29,13 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(folder):
-    return conduct(StabilityMap(LDVS, "vp", **SMALL), folder)
+    return run_study(StabilityMap(LDVS, "vp", **SMALL), folder)
 
 
 @pytest.mark.slow
 def test_cells_are_those_of_the_comparison(result):
     for vp in result.value.values:
-        alone = compare(LDVS, [0.5, 0.7], n_starts=12, window=60.0, conditions=Conditions(vp=vp)).isel(controller=0)
+        alone = compare(LDVS, [0.5, 0.7], n_starts=12, observation_time=60.0, conditions=Conditions(vp=vp)).isel(controller=0)
         for name in ("planned_loss", "measured_loss", "fall", "tilt", "kinematic", "physical", "physical_high"):
             assert np.array_equal(result[name].sel(value=vp).values, alone[name].values), name
 
@@ -64,25 +64,25 @@ def test_the_kinematic_row_knows_no_condition(result):
 
 def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
-    assert conduct(StabilityMap(LDVS, "vp", **SMALL), folder).identical(result)
-    part = conduct(StabilityMap(LDVS, "vp", **(SMALL | SHORTER)), folder)
+    assert run_study(StabilityMap(LDVS, "vp", **SMALL), folder).identical(result)
+    part = run_study(StabilityMap(LDVS, "vp", **(SMALL | SHORTER)), folder)
     assert np.array_equal(part.fall.values[0], result.fall.sel(value=320.0).values)
     with pytest.raises(pytest.fail.Exception, match="walked again"):
-        conduct(StabilityMap(LDVS, "vp", **(SMALL | OTHER_SEED)), folder)
+        run_study(StabilityMap(LDVS, "vp", **(SMALL | OTHER_SEED)), folder)
 
 
 @pytest.mark.slow
 def test_same_bits_in_any_blocks_and_threads(result, monkeypatch):
     monkeypatch.setattr(fates, "BLOCK", 5)
-    other = conduct(StabilityMap(LDVS, "vp", **SMALL), threads=1)
+    other = run_study(StabilityMap(LDVS, "vp", **SMALL), threads=1)
     assert other.drop_vars("speed").equals(result.drop_vars("speed"))
     assert_allclose(other.speed, result.speed, rtol=1e-14)  # a mean, summed in another order
 
 
 def test_starts_that_cannot_stand_are_left_out_everywhere():
-    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "window": 20.0}
-    animal = conduct(StabilityMap(LDVS, "centre_of_mass", [-9.4, 0.0], **few))
-    paper = conduct(StabilityMap(LDVS, "centre_of_mass", [0.0], **few))
+    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "observation_time": 20.0}
+    animal = run_study(StabilityMap(LDVS, "centre_of_mass", [-9.4, 0.0], **few))
+    paper = run_study(StabilityMap(LDVS, "centre_of_mass", [0.0], **few))
     assert paper.stand.item() == 8
     assert animal.stand.values.tolist() == [animal.sizes["start"], 8]
     assert 0 < animal.sizes["start"] < 8
@@ -91,20 +91,20 @@ def test_starts_that_cannot_stand_are_left_out_everywhere():
     with pytest.raises(
         InputError, match="load = 10; none of 8 starts stands on six feet there and reaches its tips at V = "
     ):
-        conduct(StabilityMap(LDVS, "load", [10.0], **few))
+        run_study(StabilityMap(LDVS, "load", [10.0], **few))
 
 
 def test_starts_whose_tips_are_out_of_reach_at_rest_are_left_out():
-    wide: dict[str, Any] = {"n_starts": 8, "window": 5.0, "stride": Stride(pep_min=-30.0, pep0=-25.0)}
-    result = conduct(StabilityMap(LDVS, "vp", [80.0], [0.5], **wide))
+    wide: dict[str, Any] = {"n_starts": 8, "observation_time": 5.0, "stride": Stride(pep_min=-30.0, pep0=-25.0)}
+    result = run_study(StabilityMap(LDVS, "vp", [80.0], [0.5], **wide))
     assert 0 < result.stand.item() == result.sizes["start"] < 8
 
 
 @pytest.mark.thorough
 def test_starts_whose_tips_are_out_of_reach_are_left_out_everywhere():
     few: dict[str, Any] = {"velocities": [0.5, 0.7], "n_starts": 9}
-    low = conduct(StabilityMap(LDVS, "standing_height", [6.0, 10.0], **few))
-    usual = conduct(StabilityMap(LDVS, "standing_height", [10.0], **few))
+    low = run_study(StabilityMap(LDVS, "standing_height", [6.0, 10.0], **few))
+    usual = run_study(StabilityMap(LDVS, "standing_height", [10.0], **few))
     assert low.stand.values.tolist() == [low.sizes["start"], 9] and 0 < low.sizes["start"] < 9
     assert np.array_equal(low.fall.sel(value=10.0), usual.fall.sel(start=low.start, value=10.0))
 
@@ -115,13 +115,13 @@ def test_the_body_as_it_is_now_decides_which_starts_stand(tmp_path):
     low = own.replace('name="abdomen" pos="-8 0 -2"', 'name="abdomen" pos="-8 0 -9"')
     assert low != own
     body = replace(STICK_INSECT, name="beetle", mjcf=mjcf)
-    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "window": 5.0, "conditions": Conditions(body=body)}
-    assert conduct(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
+    few: dict[str, Any] = {"velocities": [0.7], "n_starts": 8, "observation_time": 5.0, "conditions": Conditions(body=body)}
+    assert run_study(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
     mjcf.write_text(low)
     with pytest.raises(InputError, match="none of 8 starts stands on six feet"):
-        conduct(StabilityMap(LDVS, "vp", [80.0], **few))
+        run_study(StabilityMap(LDVS, "vp", [80.0], **few))
     mjcf.write_text(own)
-    assert conduct(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
+    assert run_study(StabilityMap(LDVS, "vp", [80.0], **few)).stand.item() == 8
 
 
 def test_the_froude_number_is_one_where_weight_only_just_holds_the_arc():
@@ -149,7 +149,7 @@ def test_the_values_of_every_condition_make_sense():
         ("step_height", {"values": [20.0]}, "at most 14 mm"),
         ("vp", {"velocities": [1.0]}, "0 <= V < 1"),
         ("vp", {"n_starts": 0}, "at least 1"),
-        ("vp", {"window": "long"}, "valid names: walk, start"),
+        ("vp", {"observation_time": "long"}, "valid names: walk, start"),
         (
             "vp",
             {"conditions": Conditions(vp=20.0)},
@@ -166,7 +166,7 @@ def test_bad_input_is_refused(over, changed, message):
 
 @pytest.mark.thorough
 def test_command(tmp_path, run):
-    words = ("map", "--values", 80, "--velocities", 0.7, "--starts", 4, "--window", 20, "--out", tmp_path)
+    words = ("map", "--values", 80, "--velocities", 0.7, "--starts", 4, "--observation time", 20, "--out", tmp_path)
     code, out, _ = run(*words, "--json")
     told = json.loads(out)
     assert code == 0

@@ -19,7 +19,7 @@ from hexmj.view.live import LiveWalk
 STARTS = hexmj.draw_starts(1, 0)
 
 TAKES: dict[str, Callable[[Conditions], Any]] = {
-    "compare": lambda told: hexmj.compare(LDVS, 0.3, n_starts=1, window=1.0, conditions=told),
+    "compare": lambda told: hexmj.compare(LDVS, 0.3, n_starts=1, observation_time=1.0, conditions=told),
     "walk": lambda told: hexmj.physical_walk(STARTS, LDVS, 0.3, 1.0, conditions=told),
     "dm_env": lambda told: dm.load(conditions=told),
     "task": lambda told: Task(conditions=told),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hexmj.sweeps import code, module_files, named_data
+from hexmj.sweep import code, module_files, named_data
 from hexmj.sweeps.code import sources_of_users
 from hexmj.sweeps.named_data import data_of_users
 

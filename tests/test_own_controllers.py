@@ -57,13 +57,13 @@ def test_both_measures_beside_ldvs(own):
     papers = hexmj.flss(hexmj.LDVS, [0.1, 0.4], n_starts=200)
     assert (table.flss <= papers.flss).all()
     assert table.flss[1] < papers.flss[1] - 0.1
-    both = hexmj.compare({"own": own, "ldvs": hexmj.LDVS}, [0.4], n_starts=12, window=80.0)
+    both = hexmj.compare({"own": own, "ldvs": hexmj.LDVS}, [0.4], n_starts=12, observation_time=80.0)
     kinematic, physical = both.kinematic.values[:, 0], both.physical.values[:, 0]
     assert kinematic[0] <= kinematic[1]
     assert physical[0] <= physical[1]
     assert both.tracking.sel(controller="own").max() < 3.0
     assert both.speed.sel(controller="own").min() > 0.8
-    alone = hexmj.physical_flss(own, [0.4], n_starts=12, window=80.0)
+    alone = hexmj.physical_flss(own, [0.4], n_starts=12, observation_time=80.0)
     assert alone.flss.item() == physical[0]
     assert hexmj.settings(alone)["controllers"][own.name]["name"] == own.name
 
@@ -254,7 +254,7 @@ def test_a_posture_of_ones_own_is_honoured():
 @pytest.mark.parametrize("name", ["feeler", "turning"])
 def test_on_the_command_line(name, run):
     """The documented commands try the tripod."""
-    code, out, _ = run("flss", "--model", OWN[name], "--velocities", 0.5, "--starts", 4, "--window", 30,
+    code, out, _ = run("flss", "--model", OWN[name], "--velocities", 0.5, "--starts", 4, "--observation time", 30,
                        "--physical", "--json")  # fmt: skip
     assert code == 0
     assert json.loads(out)
@@ -295,7 +295,7 @@ class Chatty:
 @pytest.mark.parametrize("more", few_of(["", "--processes 2"], ""))
 def test_what_a_controller_prints_is_no_answer(tmp_path, more):
     (tmp_path / "mine.py").write_text(CHATTY)
-    words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--window", "3"]
+    words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--observation time", "3"]
     command = [sys.executable, "-m", "hexmj", *words, "--no-video", "--json", *more.split()]
     paths = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
     done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, env=paths)
@@ -326,8 +326,8 @@ def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome(tmp_path):
     (tmp_path / "far.py").write_text(FAR)
     far = hexmj.load_controller(f"{tmp_path / 'far.py'}:Far")
     with pytest.raises(hexmj.InputError, match=r"start 0: \d+ of \d+ tips that its legs were told are out of reach"):
-        hexmj.physical_flss(far, [0.5], n_starts=2, window=5.0)
-    problem = hexmj.Problem(hexmj.FieldsForm(far), 0.5, 0.5, window=5.0, conditions=hexmj.Conditions())
+        hexmj.physical_flss(far, [0.5], n_starts=2, observation_time=5.0)
+    problem = hexmj.Problem(hexmj.FieldsForm(far), 0.5, 0.5, observation_time=5.0, conditions=hexmj.Conditions())
     assert Sample(problem, 2, 0).costs(np.array([[1e6], [5.0]])).tolist() == [1.0, 0.0]
 
 
@@ -351,7 +351,7 @@ def test_a_file_that_a_controller_names_may_not_change_while_a_command_is_at_wor
     Path("gains.txt").write_text("1")
     result = "hexmj.measures.kinematic.KinematicFlss.result"
     frequencies = KinematicFlss.result
-    command = ("flss", "--model", "mine.py:Tripod", "--velocities", 0.5, "--starts", 5, "--window", 5, "--out", "out")
+    command = ("flss", "--model", "mine.py:Tripod", "--velocities", 0.5, "--starts", 5, "--observation time", 5, "--out", "out")
     assert run(*command)[0] == 0
 
     def edited(self, data):

@@ -86,6 +86,6 @@ def test_help_tells_what_fields_are():
 
 def test_parts_that_the_pages_name_are_there_by_one_import():
     code = (
-        "import hexmj; hexmj.gaits.limit_gait, hexmj.sweeps.conduct, hexmj.controllers.Controller, hexmj.environments"
+        "import hexmj; hexmj.gaits.limit_gait, hexmj.sweep.run_study, hexmj.controllers.Controller, hexmj.environments"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -23,7 +23,7 @@ from hexmj.paper.rules import Answer, Band
 from hexmj.paper.table import NOT_SEARCHED, Row, claims_json, claims_markdown, judge
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
-from hexmj.timing import WINDOWS, Acceleration
+from hexmj.timing import OBSERVATION_TIMES, Acceleration
 
 TINY = replace(
     QUICK,
@@ -50,18 +50,18 @@ def test_measured_losses_are_those_of_flss(tmp_path):
     protocol = replace(TINY, sample=20)
     lost = measure("ldvs", protocol, tmp_path).lost
     fast = measure("hws accelerated", protocol, tmp_path).lost
-    for window in ("walk", "start"):
-        table = flss(LDVS, protocol.velocities, n_starts=140, seed=protocol.seed, window=window)
-        assert lost.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
+    for observation_time in ("walk", "start"):
+        table = flss(LDVS, protocol.velocities, n_starts=140, seed=protocol.seed, observation_time=observation_time)
+        assert lost.sel(observation_time=observation_time).mean("start").values == pytest.approx(table.flss.values)
         table = flss(
             HWS,
             protocol.velocities,
             n_starts=140,
             seed=protocol.seed,
-            window=window,
+            observation_time=observation_time,
             acceleration=protocol.acceleration,
         )
-        assert fast.sel(window=window).mean("start").values == pytest.approx(table.flss.values)
+        assert fast.sel(observation_time=observation_time).mean("start").values == pytest.approx(table.flss.values)
 
 
 def test_our_own_sets_are_judged_at_the_velocity_they_were_found_for():
@@ -77,7 +77,7 @@ def test_obstacles_are_met_by_the_same_stable_starts():
     postures = losses_after(0.5, LDVS, "postures", *how, None).lost
     assert none.equals(slow) and none.sum() > 0
     assert postures.sum() < none.sum()
-    assert (none.sel(window="walk") >= none.sel(window="start")).all()
+    assert (none.sel(observation_time="walk") >= none.sel(observation_time="start")).all()
 
 
 def test_lost_after_is_the_end_of_the_walk():
@@ -173,7 +173,7 @@ def test_figures_of_other_samples_are_refused_before_the_work(tmp_path):
 
 SET = """
 [[set]]
-window = "walk"
+observation time = "walk"
 velocities = [{v}]
 command = "made up"
 symmetric = {{ p32_i = 4.0, p33_i = 0.3, p32_c = 0.5, p4_i = 1 }}
@@ -198,9 +198,9 @@ def table(tmp_path, monkeypatch):
 def test_found_sets_feed_curves_and_claims(table, tmp_path):
     table("".join(SET.format(v=v) for v in ("0.3", "0.6", "0.1, 0.7")))
     lost = measure("ideal", TINY, tmp_path / "out").lost
-    assert (lost.sel(window="walk") >= 0).all()
-    assert (lost.sel(window="start") == -1).all()
-    assert (measure("wide", TINY, tmp_path / "out").lost.sel(window="walk") >= 0).all()
+    assert (lost.sel(observation_time="walk") >= 0).all()
+    assert (lost.sel(observation_time="start") == -1).all()
+    assert (measure("wide", TINY, tmp_path / "out").lost.sel(observation_time="walk") >= 0).all()
     verdicts = [
         judge(Claim("a", "5", "", "", Band(Weight(p, "p32_i"), (0.3, 0.6), most=0.1)), {}).verdicts
         for p in ("p33_i", "p32_c")
@@ -229,7 +229,7 @@ def test_the_shipped_sets_are_judged_on_fresh_starts():
     seeds = {int(one.command.split("--seed ")[1]) for one in found.found_sets()}
     assert seeds and FULL.seed not in seeds
     places = {one.place[:3] for one in found.found_sets() if one.controller.reading == found.PRINTED}
-    assert places == {(w, *at) for w in WINDOWS for at in (*((v, v) for v in FULL.velocities), *RANGES.values())}
+    assert places == {(w, *at) for w in OBSERVATION_TIMES for at in (*((v, v) for v in FULL.velocities), *RANGES.values())}
 
 
 def test_a_cell_holds_only_what_its_numbers_depend_on():
@@ -287,14 +287,14 @@ def test_other_readings_have_a_table_and_counts_of_their_own(run, tmp_path, monk
     """On a screen of 80 columns the cells of all in one would be as narrow as syllables."""
     claim = next(claim for claim in CLAIMS if claim.key == "hws-late")
     ours, lasting = (Answer(0.25, 0.2, 0.3, "V = 0.6", agrees) for agrees in (False, True))
-    row = Row(claim, dict.fromkeys(WINDOWS, ours), {"lasting": Row(claim, dict.fromkeys(WINDOWS, lasting))})
+    row = Row(claim, dict.fromkeys(OBSERVATION_TIMES, ours), {"lasting": Row(claim, dict.fromkeys(OBSERVATION_TIMES, lasting))})
     monkeypatch.setattr("hexmj.paper.reproduce.reproduce", lambda *_, **__: ([row], []))
     code, text, _ = run("reproduce", "--only", claim.key, "--beside", "lasting", "--out", tmp_path)
     of_ours, of_lasting = text.split("section")[1:]
     assert code == 0 and "lasting" not in of_ours and "ours" not in of_lasting
     assert of_lasting.splitlines()[0].split()[-4:] == ["lasting,", "walk", "lasting,", "start"]
     assert of_lasting.splitlines()[2].count("agrees: 0.2500") == 2
-    told = "reading lasting, claims on FLSS and sets, window start: held out 1 agrees"
+    told = "reading lasting, claims on FLSS and sets, observation time start: held out 1 agrees"
     assert any(line.startswith(told) for line in claims_json([row], asdict(FULL))["summary"])
 
 

@@ -13,11 +13,11 @@ from hexmj.paper.table import judge, summary
 
 
 def losses(*rates: float, starts: int = 1000, velocities: tuple[float, ...] = (0.1, 0.2, 0.3)) -> xr.Dataset:
-    """A measurement with these frequencies, the same under both windows."""
+    """A measurement with these frequencies, the same under both observation times."""
     lost = np.arange(starts) < np.round(np.array(rates)[:, np.newaxis] * starts)
     return xr.Dataset(
-        {"lost": (("window", "velocity", "start"), np.stack([lost, lost]).astype(np.int8))},
-        {"window": ["walk", "start"], "velocity": list(velocities)},
+        {"lost": (("observation_time", "velocity", "start"), np.stack([lost, lost]).astype(np.int8))},
+        {"observation_time": ["walk", "start"], "velocity": list(velocities)},
     )
 
 
@@ -35,9 +35,9 @@ def gaits(phases: np.ndarray) -> xr.Dataset:
     )  # fmt: skip
 
 
-def answer_of(rule: Rule, measured: Measured, window: str) -> Answer:
+def answer_of(rule: Rule, measured: Measured, observation_time: str) -> Answer:
     """Of a rule that can be judged."""
-    answer = rule.answer(measured, window)
+    answer = rule.answer(measured, observation_time)
     assert answer is not None
     return answer
 
@@ -122,7 +122,7 @@ def test_rare_events_are_compared_with_the_papers_own_sample():
 
 def test_windows_are_judged_apart():
     lost = losses(0.1, 0.1, 0.1)
-    lost.lost.loc[{"window": "start"}] = 0
+    lost.lost.loc[{"observation_time": "start"}] = 0
     row = judge(Claim("a", "5", "slow", "< 0.05", Band(Lost("hws"), (0.1, 0.3), most=0.05), "why"), {"hws": lost})
     assert row.verdicts == {"walk": "differs", "start": "agrees"}
     assert row.fits == "start"
@@ -136,4 +136,4 @@ def test_calibrated_claims_are_counted_apart():
     rows = [judge(Claim(key, "5", "slow", "", rule), measured) for key in ("hws-0.4", "hws-slow")]
     assert [row.kind for row in rows] == ["calibrated", "held out"]
     assert rows[0].cells[3] == "calibrated: PEP_min; observation time"
-    assert summary(rows)[0].endswith("window walk: held out 1 agrees; calibrated 1 agrees")
+    assert summary(rows)[0].endswith("observation time walk: held out 1 agrees; calibrated 1 agrees")

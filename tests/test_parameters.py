@@ -202,18 +202,18 @@ def test_weights_copy_their_input():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("window", "names", "velocities"),
+    ("observation_time", "names", "velocities"),
     [
         ("walk", ["own", "own-{}"], [0.1, 0.2, 0.5, 0.8]),
         ("start", ["own"], [0.2, 0.3, 0.5]),
         ("start", ["own-0.1"], [0.1]),
     ],
 )
-def test_our_own_sets_beat_the_papers(window, names, velocities):
-    """On fresh starts; over the window `start` LDVS is better than `own` at V = 0.1 (docs/paper.md)."""
+def test_our_own_sets_beat_the_papers(observation_time, names, velocities):
+    """On fresh starts; over the observation time `start` LDVS is better than `own` at V = 0.1 (docs/paper.md)."""
     for v in velocities:
         own, papers = (
-            [flss(PRESETS[name.format(v)], [v], seed=7, window=window).flss.item() for name in group]
+            [flss(PRESETS[name.format(v)], [v], seed=7, observation_time=observation_time).flss.item() for name in group]
             for group in (names, ["hws", "ldvs"])
         )
         assert max(own) < min(papers)

@@ -26,13 +26,13 @@ from hexmj.studies.stability_map.study import StabilityMap
 from hexmj.studies.static_limit.study import StaticLimit
 from hexmj.studies.terrain.study import Terrain
 from hexmj.studies.variants.study import Variants
-from hexmj.sweeps import conduct
+from hexmj.sweep import run_study
 from tiers import few_of
 
-PHYSICAL: dict[str, Any] = {"n_starts": 3, "window": 20.0}
-ON_PAPER: dict[str, Any] = {"n_starts": 20, "window": 20.0, "physical": False, "strategies": ["reorganise"]}
+PHYSICAL: dict[str, Any] = {"n_starts": 3, "observation_time": 20.0}
+ON_PAPER: dict[str, Any] = {"n_starts": 20, "observation_time": 20.0, "physical": False, "strategies": ["reorganise"]}
 FEW: dict[str, Any] = {"n_starts": 3, "n_physical": 2, "periods": 12}
-SHORT: dict[str, Any] = FEW | {"n_tried": 1, "window": 10.0}
+SHORT: dict[str, Any] = FEW | {"n_tried": 1, "observation_time": 10.0}
 TWO = {"ldvs": [hexmj.LDVS] * 2, "hws": [hexmj.HWS] * 2}
 
 
@@ -42,16 +42,16 @@ def searched() -> xr.Dataset:
 
 
 MADE: dict[str, Callable[[], xr.Dataset]] = {
-    "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], n_starts=3, window=20.0),
-    "compare": lambda: hexmj.compare({"a": hexmj.LDVS, "b": hexmj.HWS}, [0.5, 0.7], n_starts=3, window=20.0),
-    "map": lambda: conduct(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
-    "converge": lambda: conduct(StaticLimit(hexmj.LDVS, vps=[320.0, 160.0], **PHYSICAL)),
-    "terrain": lambda: conduct(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
-    "disturb": lambda: conduct(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **ON_PAPER)),
-    "variants": lambda: conduct(Variants(TWO, [0.5, 0.7], n_starts=20, window="start")),
-    "biology": lambda: conduct(Biology(hexmj.LDVS, 4, n_starts=2)),
-    "league": lambda: conduct(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
-    "ablate": lambda: conduct(Ablation({"ldvs": {"ldvs": hexmj.LDVS, "b": hexmj.HWS}}, [0.5, 0.7], **FEW)),
+    "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], n_starts=3, observation_time=20.0),
+    "compare": lambda: hexmj.compare({"a": hexmj.LDVS, "b": hexmj.HWS}, [0.5, 0.7], n_starts=3, observation_time=20.0),
+    "map": lambda: run_study(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
+    "converge": lambda: run_study(StaticLimit(hexmj.LDVS, vps=[320.0, 160.0], **PHYSICAL)),
+    "terrain": lambda: run_study(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
+    "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **ON_PAPER)),
+    "variants": lambda: run_study(Variants(TWO, [0.5, 0.7], n_starts=20, observation_time="start")),
+    "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
+    "league": lambda: run_study(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
+    "ablate": lambda: run_study(Ablation({"ldvs": {"ldvs": hexmj.LDVS, "b": hexmj.HWS}}, [0.5, 0.7], **FEW)),
     "search": searched,
 }
 
@@ -152,35 +152,35 @@ def test_a_title_names_the_controllers_that_are_shown():
 
 
 def test_results_of_other_settings_are_not_drawn_under_those_of_the_first():
-    def one(name: str, window: float) -> xr.Dataset:
-        return hexmj.compare({name: hexmj.LDVS}, [0.5], n_starts=2, window=window)
+    def one(name: str, observation_time: float) -> xr.Dataset:
+        return hexmj.compare({name: hexmj.LDVS}, [0.5], n_starts=2, observation_time=observation_time)
 
     a, b, longer = one("a", 5.0), one("b", 5.0), one("a", 10.0)
     with pytest.raises(InputError, match=r"^a result of the controller 'b', but with the settings of a; expected"):
         hexmj.plot(xr.concat([a, b], "controller"))
     for joined in ([a, longer], [longer, a]):
-        with pytest.raises(InputError, match=r"^a result with the window \d+\.0 in its settings, but with walks of "):
+        with pytest.raises(InputError, match=r"^a result with the observation time \d+\.0 in its settings, but with walks of "):
             hexmj.plot(xr.concat(joined, xr.DataArray([0.5, 0.7], dims="velocity", name="velocity")))
     told = xr.concat([a, b], "controller", combine_attrs="drop_conflicts")
     assert "a, b; 2 starts" in hexmj.plot(told).get_suptitle()
 
 
 def test_velocities_of_other_numbers_of_starts_are_drawn_together():
-    few, many = (hexmj.flss(hexmj.LDVS, [v], n_starts=n, window=5.0) for v, n in ((0.3, 5), (0.5, 8)))
+    few, many = (hexmj.flss(hexmj.LDVS, [v], n_starts=n, observation_time=5.0) for v, n in ((0.3, 5), (0.5, 8)))
     assert "starts" not in hexmj.plot(xr.concat([few, many], "velocity", combine_attrs="drop_conflicts")).get_suptitle()
 
 
 @pytest.mark.parametrize("other", [{"stride": hexmj.Stride(aep0=8.0)}, {"acceleration": hexmj.Acceleration(0.01)}])
 def test_velocities_of_other_walks_are_drawn_together_without_what_differs(other):
     both = [hexmj.flss(hexmj.LDVS, [v], n_starts=5, **how) for v, how in ((0.3, {}), (0.5, other))]
-    with pytest.raises(InputError, match="expected one window, stride and acceleration, or"):
+    with pytest.raises(InputError, match="expected one observation time, stride and acceleration, or"):
         hexmj.plot(xr.concat(both, "velocity"))
     title = hexmj.plot(xr.concat(both, "velocity", combine_attrs="drop_conflicts")).get_suptitle()
-    assert title.endswith("ldvs; 5 starts; window walk; seed 0")
+    assert title.endswith("ldvs; 5 starts; observation time walk; seed 0")
 
 
 def test_kinematic_and_physical_flss_are_not_drawn_as_one():
-    results = [measure(hexmj.LDVS, [0.5], n_starts=2, window=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
+    results = [measure(hexmj.LDVS, [0.5], n_starts=2, observation_time=5.0) for measure in (hexmj.flss, hexmj.physical_flss)]
     for both in (results, results[::-1]):
         for told in ("override", "drop_conflicts"):
             with pytest.raises(InputError, match=r"^a result of kinematic and of physical FLSS; expected one of them$"):
@@ -231,7 +231,7 @@ def undisturbed(figure: Any) -> list[Line2D]:
 def test_only_the_undisturbed_case_is_drawn_as_such():
     result = made("disturb")
     whole = hexmj.plot(result)
-    expected = result.kinematic.sel(window="whole").isel(case=0).values
+    expected = result.kinematic.sel(observation_time="whole").isel(case=0).values
     for one in (whole, hexmj.plot(result.isel(case=slice(None, None, -1)))):
         assert len(undisturbed(one)) == 2
         assert all(np.array_equal(line.get_ydata(), expected) for line in undisturbed(one))
@@ -273,6 +273,6 @@ def test_candidates_stand_at_their_evaluation():
 @pytest.mark.slow
 def test_each_group_of_an_ablation_is_set_off_however_its_rows_are_sorted():
     model, other = {"ldvs": hexmj.LDVS, "a": hexmj.HWS, "b": hexmj.HWS}, {"hws": hexmj.HWS}
-    result = conduct(Ablation({"ldvs": model, "hws": other}, [0.5], **FEW))
+    result = run_study(Ablation({"ldvs": model, "hws": other}, [0.5], **FEW))
     for one, row in ((result, 2.5), (result.isel(controller=slice(None, None, -1)), 0.5)):
         assert [np.asarray(line.get_ydata())[0] for line in hexmj.plot(one).axes[0].lines] == [row]

@@ -96,9 +96,9 @@ def test_mirrored_starts_walk_mirrored_paths():
 
 @pytest.mark.thorough
 def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
-    """`test_physics` has the half of it, over the window `walk`."""
+    """`test_physics` has the half of it, over the observation time `walk`."""
     conditions = (Conditions(longest_substep=ms) for ms in (0.625, 0.15625))
-    whole, quarter = (physical_flss(LDVS, [0.5], n_starts=60, window="start", conditions=one) for one in conditions)
+    whole, quarter = (physical_flss(LDVS, [0.5], n_starts=60, observation_time="start", conditions=one) for one in conditions)
     assert whole.low.item() <= quarter.flss.item() <= whole.high.item()
 
 
@@ -290,6 +290,6 @@ def test_targets_belong_to_the_state_that_is_shown():
 
 
 def test_feet_keep_to_their_targets():
-    """The aim is 1 mm at V = 0.5; the mean of 60 starts over the window `walk` is 0.89 mm."""
+    """The aim is 1 mm at V = 0.5; the mean of 60 starts over the observation time `walk` is 0.89 mm."""
     outcomes = physical_outcomes(settle(draw_starts(20, 0)), LDVS, 0.5, 60.0)
     assert outcomes.tracking.mean() < 1.0

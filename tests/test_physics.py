@@ -133,7 +133,7 @@ def test_nothing_is_measured_after_a_fall():
 
 @pytest.mark.thorough
 def test_speed_keeps_to_the_command(hundred):
-    """0.95 to 1.05 of the commanded speed over the window `walk` where the start did not fall."""
+    """0.95 to 1.05 of the commanded speed over the observation time `walk` where the start did not fall."""
     slow = compare(LDVS, [0.3], n_starts=40)
     speed = np.concatenate([one.speed.values[np.isinf(one.fall)] for one in (slow, hundred)])
     assert len(speed) > 60
@@ -306,7 +306,7 @@ def test_starts_out_of_reach_are_refused():
 
 def test_more_starts_than_the_memory_holds_are_refused(tmp_path, monkeypatch):
     (limit := tmp_path / "memory.max").write_text("1000000000\n")
-    monkeypatch.setattr("hexmj.process.threads.GROUP_LIMIT", limit)
+    monkeypatch.setattr("hexmj.threads.GROUP_LIMIT", limit)
     with pytest.raises(InputError, match="10000 starts that walk at once in physics take"):
         settle(np.zeros((10_000, 6)))
 
@@ -349,7 +349,7 @@ def test_feet_grasp_while_the_plan_lets_them_stand():
 
 
 def test_comparison_holds_every_answer():
-    result = compare({"a": LDVS, "b": UNCOORDINATED}, [0.3, 0.6], n_starts=20, window="start")
+    result = compare({"a": LDVS, "b": UNCOORDINATED}, [0.3, 0.6], n_starts=20, observation_time="start")
     assert result.sizes == {"controller": 2, "velocity": 2, "start": 20, "leg": 6}
     total = result.both + result.only_kinematic + result.only_physical + result.none
     assert (total == 20).all()

@@ -19,7 +19,7 @@ import hexmj
 from hexmj import field_docs
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 from hexmj.sweeps.plain_settings import classes, named_files, plain
 from hexmj.timing import Stride
 from hexmj.user_code.loaded import importable

@@ -12,7 +12,7 @@ import pytest
 import hexmj
 from hexmj.errors import InputError
 from hexmj.measures import kinematic
-from hexmj.process import progress
+from hexmj import progress
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.stages import search
 from hexmj.view import live
@@ -21,11 +21,11 @@ from tiers import few_of
 STARTS = hexmj.draw_starts(2, 0)
 CALLS: dict[str, Any] = {
     "flss": lambda **how: hexmj.flss(hexmj.LDVS, [0.5], n_starts=5, **how),
-    "compare": lambda **how: hexmj.compare(hexmj.LDVS, [0.5], n_starts=2, window=5.0, **how),
-    "physical_flss": lambda **how: hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=2, window=5.0, **how),
+    "compare": lambda **how: hexmj.compare(hexmj.LDVS, [0.5], n_starts=2, observation_time=5.0, **how),
+    "physical_flss": lambda **how: hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=2, observation_time=5.0, **how),
     "physical_walk": lambda **how: hexmj.physical_walk(STARTS, hexmj.LDVS, 0.5, 5.0, **how),
     "search": lambda **how: search(
-        hexmj.Problem(NetworkForm("hws"), 0.4, 0.4, window=20.0),
+        hexmj.Problem(NetworkForm("hws"), 0.4, 0.4, observation_time=20.0),
         hexmj.Effort(population=4, starts=5, budget=4, refine_starts=5, refine_budget=2),
         **how,
     ),
@@ -114,7 +114,7 @@ def test_a_command_without_a_terminal_prints_lines_on_standard_error():
     words = ["flss", "--starts", "2000", "--velocities", "0.5", "--json"]
     program = f"""
 from time import sleep
-from hexmj.process import progress
+from hexmj import progress
 from hexmj.measures import kinematic
 progress.EVERY, first_loss = 0.01, kinematic.first_loss
 kinematic.first_loss = lambda *of, **how: (sleep(0.5), first_loss(*of, **how))[1]

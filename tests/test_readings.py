@@ -33,7 +33,7 @@ from hexmj.paper.readings import (
 from hexmj.paper.readings_page import readings_markdown
 from hexmj.paper.scores import IDEAL, REFINED_BY, REFINING, SCORING, judged, refined
 from hexmj.starts import draw_starts
-from hexmj.sweeps import run
+from hexmj.sweep import run_cells
 from hexmj.timing import Acceleration, Stride
 
 SMALL = replace(SCORING, **REFINING, sample=20, gait_starts=2)
@@ -75,7 +75,7 @@ def test_who_looks_once_a_period_sees_fewer_losses(late, acceleration):
 
     seldom, always = lost("periods"), lost("steps")
     assert (seldom <= always).all()
-    assert not seldom[1].any() or acceleration  # the window 'start' is shorter than a period
+    assert not seldom[1].any() or acceleration  # the observation time 'start' is shorter than a period
     assert 0 < seldom[0].sum() < always[0].sum()
 
 
@@ -101,13 +101,13 @@ def scores_of(readings, agrees):
     """Made up: `agrees` says for each reading which of four claims do."""
     keys = ["hws-late", "ldvs-late", "hws-majority", "hws-0.4"]
     values = np.array(agrees, dtype=np.int8)[:, np.newaxis, :, np.newaxis] * np.ones((1, 2, 1, 2), dtype=np.int8)
-    told = {"agrees": (("reading", "constants", "claim", "window"), values)}
-    told |= {"miss": (("reading", "constants", "claim", "window"), np.where(values == 1, 0.0, 0.25))}
+    told = {"agrees": (("reading", "constants", "claim", "observation_time"), values)}
+    told |= {"miss": (("reading", "constants", "claim", "observation_time"), np.where(values == 1, 0.0, 0.25))}
     lengths = {
         name: ("reading", np.full(len(readings), one))
         for name, one in (("aep0", 9.0), ("pep0", -9.0), ("pep_min", -25.0), ("centred", True))
     }
-    axes = {"claim": keys, "window": ["walk", "start"], "constants": ["inferred", "refined"]}
+    axes = {"claim": keys, "observation_time": ["walk", "start"], "constants": ["inferred", "refined"]}
     return xr.Dataset(told | lengths, axes | {"reading": [title(one) for one in readings]})
 
 
@@ -115,16 +115,16 @@ def test_held_out_claims_rank_and_calibrated_ones_do_not():
     readings = [SCORING, replace(SCORING, reading=READINGS["lasting"]), replace(SCORING, order="undelayed")]
     scores = scores_of(readings, [[1, 0, 0, 1], [1, 1, 1, 0], [1, 0, 1, -1]])
     assert ranking(scores).tolist() == [1, 2, 0]
-    assert agreeing(scores).sel(window="walk", constants="inferred").values.tolist() == [1, 3, 2]
-    assert agreeing(scores, held_out=False).sel(window="walk", constants="inferred").values.tolist() == [1, 0, 0]
+    assert agreeing(scores).sel(observation_time="walk", constants="inferred").values.tolist() == [1, 3, 2]
+    assert agreeing(scores, held_out=False).sel(observation_time="walk", constants="inferred").values.tolist() == [1, 0, 0]
     assert gained(scores, "ipsilateral lasting", "walk") == (["ldvs-late", "hws-majority"], [])
-    changed = effects(scores, readings).sel(window="start")
+    changed = effects(scores, readings).sel(observation_time="start")
     assert changed.sel(choice="ipsilateral lasting").item() == 3
     assert changed.sel(choice="order printed").item() == 2
     better = refined_as(readings[1], scores.isel(reading=1))
     assert better.stride == better.gait_stride == Stride(aep0=9.0, pep0=-9.0, pep_min=-25.0, geometry=CENTRED)
-    closer = {"aside_agrees": (("best", "aside", "claim", "window"), np.ones((1, 1, 4, 2), dtype=np.int8))}
-    closer |= {"ideal_agrees": (("best", "ideal_claim", "window"), np.ones((1, 2, 2), dtype=np.int8))}
+    closer = {"aside_agrees": (("best", "aside", "claim", "observation_time"), np.ones((1, 1, 4, 2), dtype=np.int8))}
+    closer |= {"ideal_agrees": (("best", "ideal_claim", "observation_time"), np.ones((1, 2, 2), dtype=np.int8))}
     closer |= {"ideal_flss": (("best", "ideal_velocity"), np.full((1, 1), 0.0123))}
     told = {"best": ["ipsilateral lasting"], "aside": ["margin 1.0"], "ideal_velocity": [0.1]}
     page = readings_markdown(scores.assign(closer).assign_coords(told), readings)
@@ -142,7 +142,7 @@ def scored_at_once(monkeypatch):
     ideal = as_is.isel(claim=[0]).assign(flss=("ideal_velocity", [0.5])).assign_coords(ideal_velocity=[0.1])
     for name, made in {"score": one, "score_as_is": as_is, "score_of_ideals": ideal}.items():
         monkeypatch.setattr(f"hexmj.paper.readings.{name}", lambda protocol, made=made: made)
-    monkeypatch.setattr("hexmj.paper.readings.run", lambda cells, folder, **how: run(cells, **how))
+    monkeypatch.setattr("hexmj.paper.readings.run", lambda cells, folder, **how: run_cells(cells, **how))
 
 
 @pytest.mark.parametrize("count", [2, 72])

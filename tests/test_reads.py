@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import hexmj
-from hexmj.sweeps import Cell, cells, run
+from hexmj.sweep import Cell, cells, run_cells
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
 from reader import READER, another_program, what_was_read, write_all
@@ -142,7 +142,7 @@ def test_a_library_that_the_system_finds_does_not_count(computed: Callable[..., 
 
 
 def test_what_a_cell_reads_after_an_inner_sweep_counts(computed: Callable[..., tuple[float, int]]) -> None:
-    inner = "hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0)"
+    inner = "hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, observation time=1.0)"
     assert computed(f"[{inner}, float(Path(at, 'gain').read_text())][1]") == (1.0, 1)
     assert what_was_read() == {"one/gain"}
 
@@ -212,7 +212,7 @@ def test_a_file_that_a_text_names_counts_once_it_is_there_and_where_the_program_
     reader = importable("reader.py").Reader
 
     def gain() -> float:
-        return float(run([Cell("reader", reader().cell, {})], kept)[0].gain)
+        return float(run_cells([Cell("reader", reader().cell, {})], kept)[0].gain)
 
     assert gain() == 0.0
     Path("elsewhere").mkdir()
@@ -285,7 +285,7 @@ def test_what_packages_open_by_themselves_counts_by_what_it_holds(
     Path("reader.py").write_text(READER.format(gain="float(os.path.getsize('it.csv'))") + imports)
     for text in ("a", "ab"):
         Path("it.csv").write_text(text)
-        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+        (data,) = run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
         assert data.gain == len(text)
         another_program(monkeypatch)
 
@@ -313,7 +313,7 @@ def test_a_table_that_the_program_appends_to_is_no_log(
             file.write(row)
         module = importable("reader.py")
         module.cached("gains.csv")
-        (data,) = run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+        (data,) = run_cells([Cell("reader", module.Reader().cell, {})], Path("kept"))
         assert data.gain == total
         another_program(monkeypatch)
 
@@ -348,7 +348,7 @@ def test_a_database_that_was_read_at_import_and_has_changed_since_keeps_nothing(
     reader = importable("reader.py").Reader
     write_all("7.0")
     with pytest.warns(UserWarning, match="one.gain.db has changed since it was opened first"):
-        assert float(run([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0
+        assert float(run_cells([Cell("reader", reader().cell, {})], Path("kept"))[0].gain) == 1.0
 
 
 def test_what_an_installed_base_opens_counts(
@@ -358,7 +358,7 @@ def test_what_an_installed_base_opens_counts(
     (tmp_path / "site-packages" / "installed_base.py").write_text(
         "from pathlib import Path\nimport xarray as xr\nclass Base:\n    def cell(self):\n"
         "        from hexmj.sweeps import Cell, run\n"
-        "        return run([Cell('inner', self.inner, {})])[0]\n"
+        "        return run_cells([Cell('inner', self.inner, {})])[0]\n"
         "    def inner(self):\n"
         "        return xr.Dataset({'gain': float(Path(self.table).read_text())})\n"
     )
@@ -366,7 +366,7 @@ def test_what_an_installed_base_opens_counts(
     mine = "from dataclasses import dataclass\nfrom installed_base import Base\n"
     mine += "@dataclass(frozen=True)\nclass Reader(Base):\n    at: str = ''\n    table = 'one/gain'\n"
     Path("reader.py").write_text(mine)
-    run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert what_was_read() == {"one/gain"}
 
 

@@ -12,9 +12,9 @@ from tiers import few_of
 
 NEW = "import xarray as xr\nfrom pathlib import Path\n"
 SWEEPS = """
-from hexmj.sweeps import Cell, run
+from hexmj.sweep import Cell, run_cells
 if __name__ == "__main__":
-    print(run([Cell("swept", cell, {})], Path("kept"))[0].gain.item())
+    print(run_cells([Cell("swept", cell, {})], Path("kept"))[0].gain.item())
 """
 READS = "def load(name):\n    return [float(path.read_text()) for path in (Path(name),)][0]\n"
 GAIN = "def cell():\n    return xr.Dataset({'gain': GAIN})\n"
@@ -64,7 +64,7 @@ PROGRAMS = {
     },
     "an earlier sweep that kept nothing": {
         "mine": f"{CACHED}def cell():\n    return xr.Dataset({{'gain': load('gain')}})\n",
-        "script": SCRIPT.replace("print", "run([Cell('a', cell, {})]); print"),
+        "script": SCRIPT.replace("print", "run_cells([Cell('a', cell, {})]); print"),
     },
     "a module, while another thread sweeps": {
         "mine": LOADS,
@@ -217,7 +217,7 @@ def test_a_command_says_in_one_line_what_is_not_kept(tmp_path: Path) -> None:
         "0.5",
         "--starts",
         "5",
-        "--window",
+        "--observation time",
         "5",
         "--out",
         "out",
@@ -234,7 +234,7 @@ def test_what_a_script_writes_between_sweeps_its_controllers_may_remember(tmp_pa
     script = f"{NEW}from hexmj.sweeps import Cell, run\n"
     script += "def cell():\n    return xr.Dataset({'gain': float(Path('ga' + 'in').read_text())})\n"
     script += "for gain in (1.0, 2.0):\n    Path('gain').write_text(str(gain))\n"
-    script += "    assert run([Cell('script', cell, {})], Path('kept'))[0].gain == gain\nprint(gain)\n"
+    script += "    assert run_cells([Cell('script', cell, {})], Path('kept'))[0].gain == gain\nprint(gain)\n"
     gain, kept, complaint = sweep(tmp_path, script=script)
     assert (gain, kept) == (2.0, 1) and "gain has changed since it was opened first" in complaint
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, cells, run
+from hexmj.sweep import Cell, cells, run_cells
 from hexmj.sweeps.cells import unlike
 from hexmj.user_code import opened_files
 from hexmj.user_code.loaded import importable
@@ -29,7 +29,7 @@ def test_what_an_object_remembers_is_not_sent_to_workers(
         assert reader.known == 1.0
         if edited:
             Path("one/gain").write_text("7.0")
-        (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+        (data,) = run_cells([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
     assert data.gain == (7.0 if edited else 1.0)
     assert reader.known == 1.0
     assert what_was_read() == {"one/gain"}
@@ -40,7 +40,7 @@ def test_a_field_over_something_that_is_computed_once_is_sent(computed: Callable
         f"{READER.format(gain='self.known')}\n@dataclass(frozen=True)\nclass Known(Reader):\n    known: float = 3.0"
     )
     with ProcessPoolExecutor(1) as pool:
-        (data,) = run([Cell("reader", importable("reader.py").Known(known=4.0).cell, {})], Path("kept"), executor=pool)
+        (data,) = run_cells([Cell("reader", importable("reader.py").Known(known=4.0).cell, {})], Path("kept"), executor=pool)
     assert data.gain == 4.0
 
 
@@ -55,13 +55,13 @@ def test_a_worker_that_outlives_a_program_keeps_nothing_of_what_it_remembers(
     with ProcessPoolExecutor(1) as pool:
         pool.submit(os.getpid).result()
         assert reader.known == 1.0
-        run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+        run_cells([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
         another_program(monkeypatch)
         Path("one/gain").write_text("7.0")
         reader = importable("reader.py").Reader()
         assert reader.known == 7.0
         with pytest.warns(UserWarning, match="reader is not kept: .*one.gain has changed since"):
-            run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+            run_cells([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_cell_that_sweeps_in_processes_is_no_more_kept_than_what_it_sweeps(
     Path("inner_reader.py").write_text(READER.format(gain=gain))
     pool = "__import__('concurrent.futures').futures.ProcessPoolExecutor(1)"
     inner = "hexmj.sweeps.Cell('inner', importable('inner_reader.py').Reader().cell, {})"
-    gain = f"hexmj.sweeps.run([{inner}], executor={pool})[0].gain.item()"
+    gain = f"hexmj.sweep.run_cells([{inner}], executor={pool})[0].gain.item()"
     for n in (1, 2):  # what it has seen of the first one, the code may remember
         with pytest.warns(UserWarning, match=f"^reader is not kept: inner is not kept: [^:]*{told}[^:]*$"):
             computed(f"[importable := hexmj.user_code.loaded.importable, {gain}][1]", f"file {n}")
@@ -103,13 +103,13 @@ class Failing:
 def fails():
     with __import__("concurrent.futures").futures.ProcessPoolExecutor(1) as pool:
         try:
-            hexmj.sweeps.run([hexmj.sweeps.Cell("failing", Failing().cell, {})], executor=pool)
+            hexmj.sweep.run_cells([hexmj.sweeps.Cell("failing", Failing().cell, {})], executor=pool)
         except (hexmj.InputError, SystemExit):
             return True
 """
     )
     with pytest.warns(UserWarning, match="^reader is not kept: a cell that was swept elsewhere has failed"):
-        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+        (data,) = run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert data.gain == 0.0
     assert not [*Path("kept").glob("*.nc")]
 
@@ -124,7 +124,7 @@ def test_a_worker_that_outlives_a_program_knows_nothing_of_what_that_has_opened(
             Path("one/gain").write_text(str(gain))
             reader = importable("reader.py")
             assert reader.tried("one/gain") == gain
-            run([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
+            run_cells([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
             another_program(monkeypatch)
 
 
@@ -136,7 +136,7 @@ def test_a_folder_that_was_looked_for_before_it_was_made_is_no_data_of_a_worker_
     assert reader.tried("kept/made") == 0.0
     Path("kept/made").mkdir(parents=True)
     with ProcessPoolExecutor(1) as pool:
-        run([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
+        run_cells([Cell("reader", reader.Reader().cell, {})], Path("kept"), executor=pool)
     assert what_was_read() == set()
 
 
@@ -148,7 +148,7 @@ def test_a_worker_elsewhere_may_have_a_field_s_file_of_its_own(computed: Callabl
     reader = module.Reader(file="gain.txt")
     assert module.tried("gain.txt") == 2.0
     with ProcessPoolExecutor(1, initializer=os.chdir, initargs=("two",)) as pool:
-        (data,) = run([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
+        (data,) = run_cells([Cell("reader", reader.cell, {})], Path("kept"), executor=pool)
     assert data.gain == 2.0
     assert what_was_read() == set()
 

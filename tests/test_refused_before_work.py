@@ -165,7 +165,7 @@ def test_limits_of_walks_that_accelerate_are_told_as_they_go() -> None:
 
 def test_limits_are_told_whatever_the_controller_raises() -> None:
     with pytest.raises(hexmj.InputError, match=r"limited, check_velocity: ZeroDivisionError"):
-        hexmj.flss(LIMITED, [0.0], window=10.0, n_starts=2)
+        hexmj.flss(LIMITED, [0.0], observation_time=10.0, n_starts=2)
 
 
 def test_a_load_that_nobody_carries_refuses_no_league() -> None:

@@ -148,7 +148,7 @@ class Restless:
     "measured",
     [
         lambda starts: hexmj.physical_walk(starts, Restless(), 0.5, 2.0),
-        lambda starts: hexmj.compare(Restless(), [0.5], n_starts=2, window=2.0),
+        lambda starts: hexmj.compare(Restless(), [0.5], n_starts=2, observation_time=2.0),
         lambda starts: in_physics.walks(
             Entrant(Restless()),
             Restless(),

@@ -16,7 +16,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, over_axes, run
+from hexmj.sweep import Cell, over_axes, run_cells
 from small_cells import odd_cells
 
 LEVELS = pd.MultiIndex.from_tuples([(1, 2)], names=["b", "c"])
@@ -50,7 +50,7 @@ def odd(what: str) -> object:
 )
 def test_what_is_no_data_is_refused_in_one_sentence(tmp_path: Path, what: str, sentence: str) -> None:
     with pytest.raises(InputError, match=re.escape(sentence)):
-        run([Cell("odd", odd, {"what": what})], tmp_path)
+        run_cells([Cell("odd", odd, {"what": what})], tmp_path)
     assert not list(tmp_path.glob("*.nc"))
 
 
@@ -64,14 +64,14 @@ odd_elsewhere = wraps(odd)(odd_elsewhere)
 
 def test_a_wrapper_that_goes_by_the_name_of_what_it_wraps_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="odd is not what its module has under that name"):
-        run([Cell("odd", odd_elsewhere, {"what": "dict"})], tmp_path)
+        run_cells([Cell("odd", odd_elsewhere, {"what": "dict"})], tmp_path)
 
 
 def test_a_cell_may_change_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("data").mkdir()
     cells = [Cell(f"goes {i}", goes, {"folder": str(tmp_path / "data"), "i": i}) for i in range(2)]
-    run(cells, Path("kept"))
+    run_cells(cells, Path("kept"))
     assert len(list((tmp_path / "kept").glob("*.nc"))) == 2
 
 
@@ -88,9 +88,9 @@ def shut() -> Executor:
 @pytest.mark.parametrize(
     ("ask", "sentence"),
     [
-        (lambda: run([1]), "a cell = 1; expected a Cell"),  # pyright: ignore
-        (lambda: run(None), "cells = None; expected a Sequence"),  # pyright: ignore
-        (lambda: run(odd_cells(2), executor=shut()), "cannot schedule new futures after shutdown"),
+        (lambda: run_cells([1]), "a cell = 1; expected a Cell"),  # pyright: ignore
+        (lambda: run_cells(None), "cells = None; expected a Sequence"),  # pyright: ignore
+        (lambda: run_cells(odd_cells(2), executor=shut()), "cannot schedule new futures after shutdown"),
         (lambda: Cell(None, odd, {}), "name = None; expected a text"),  # pyright: ignore
         (lambda: Cell("odd", odd, [1]), "settings = [1]; expected a dict"),  # pyright: ignore
         (lambda: Cell("odd", odd, {"nope": 3}), "settings of odd: got an unexpected keyword argument 'nope'"),
@@ -118,7 +118,7 @@ def test_a_folder_that_is_none_is_a_sentence(tmp_path: Path, what: str) -> None:
     kept = tmp_path / "kept"
     kept.write_text("") if what == "a file" else kept.symlink_to("nowhere")
     with pytest.raises(InputError, match="kept is a file, or a link to nothing; expected a folder"):
-        hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, window=1.0, folder=kept)
+        hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, observation_time=1.0, folder=kept)
 
 
 @dataclass(frozen=True)
@@ -135,4 +135,4 @@ class Remembers:
 @pytest.mark.parametrize("keeps", [True, False])
 def test_a_setting_that_comes_about_is_refused(tmp_path: Path, keeps: bool) -> None:
     with pytest.raises(InputError, match="Remembers keeps 'table' beside its fields; expected all settings as fields"):
-        hexmj.flss(Remembers(), 0.5, n_starts=2, window=1.0, folder=tmp_path / "kept" if keeps else None)
+        hexmj.flss(Remembers(), 0.5, n_starts=2, observation_time=1.0, folder=tmp_path / "kept" if keeps else None)

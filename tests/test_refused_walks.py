@@ -43,7 +43,7 @@ def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
 
 def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -> None:
     entrant = Entrant(Stretched())
-    alone = League({"far": entrant}, (0.5,), 1, 1, 1, window=10.0, accelerating=False, periods=12, seed=0)
+    alone = League({"far": entrant}, (0.5,), 1, 1, 1, observation_time=10.0, accelerating=False, periods=12, seed=0)
     result = alone.result([cell.compute(threads=1) for cell in alone.cells()])
     assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
     assert "nan" not in league_markdown(result)
@@ -80,7 +80,7 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
 
 @pytest.mark.slow
 def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
-    one = League({"far": Entrant(Stretched())}, (0.5,), 6, 6, 1, window=10.0, accelerating=False, periods=12, seed=0)
+    one = League({"far": Entrant(Stretched())}, (0.5,), 6, 6, 1, observation_time=10.0, accelerating=False, periods=12, seed=0)
     result = one.result([cell.compute(threads=1) for cell in one.cells()])
     left = int((hexmj.draw_starts(6, 0)[:, 0] <= 0).sum())
     assert result.missing.item() == 6 - left and 0 < left < 6

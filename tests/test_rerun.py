@@ -13,20 +13,20 @@ from hexmj.cli.rerun import _Repeated
 from hexmj.paper.protocol import QUICK
 from hexmj.storage import netcdf
 from hexmj.storage.files import digest, sealed, write_whole
-from hexmj.storage.results import save_dataset
+from hexmj.io import save
 from hexmj.timing import Acceleration
 from tiers import few_of
 
-FLSS = ("flss", "--velocities", "0.5", "--starts", "40", "--window", "start")
+FLSS = ("flss", "--velocities", "0.5", "--starts", "40", "--observation time", "start")
 
 COMMANDS = {
     "flss": FLSS,
-    "walk": ("walk", "--physical", "--velocity", "0.5", "--window", "10"),
+    "walk": ("walk", "--physical", "--velocity", "0.5", "--observation time", "10"),
     "search": (
-        *("search", "--form", "hws", "--starts", "20", "--window", "start", "--budget", "20"),
+        *("search", "--form", "hws", "--starts", "20", "--observation time", "start", "--budget", "20"),
         *("--refine-starts", "20", "--refine-budget", "4", "--verdict-starts", "20"),
     ),
-    "compare": ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "3", "--window", "10", "--no-video"),
+    "compare": ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "3", "--observation time", "10", "--no-video"),
 }
 
 MINE = """
@@ -150,7 +150,7 @@ def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch, t
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(MINE)
     Path(toml).write_text('controller = "mine.py:Drags"\n[fields]\nname = "other"\n')
-    words = ["flss", "--model", toml, "--velocities", 0.5, "--starts", 20, "--window", 30, "--physical"]
+    words = ["flss", "--model", toml, "--velocities", 0.5, "--starts", 20, "--observation time", 30, "--physical"]
     code, _, error = run(*words, "--out", "out")
     assert code == 0, error
     assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"mine.py", toml}
@@ -168,9 +168,9 @@ def test_a_controller_of_one_s_own_that_was_edited(run, tmp_path, monkeypatch, t
 
 @pytest.mark.slow
 def test_a_result_of_other_words_in_its_place_is_told(run, tmp_path):
-    words = "compare", "--velocities", "0.5", "--window", "5", "--no-video", "--out", str(tmp_path / "kept"), "--starts"
+    words = "compare", "--velocities", "0.5", "--observation time", "5", "--no-video", "--out", str(tmp_path / "kept"), "--starts"
     told = [run(*words, starts)[2] for starts in ("2", "3", "3")]
-    assert "kept held what hexmj compare --velocities 0.5 --window 5 --no-video --starts 2 wrote; this has" in told[1]
+    assert "kept held what hexmj compare --velocities 0.5 --observation time 5 --no-video --starts 2 wrote; this has" in told[1]
     assert all("held what" not in one for one in (told[0], told[2]))
 
 
@@ -226,7 +226,7 @@ def test_a_manifest_that_makes_no_sense_gets_a_sentence(run, flss, content, sent
 def test_no_manifest_gets_a_sentence(run, tmp_path):
     assert "holds no manifest.json" in run("rerun", tmp_path)[2]
     assert "nowhere cannot be read: No such file" in run("rerun", tmp_path / "nowhere")[2]
-    file = save_dataset(xr.Dataset(), tmp_path / "flss.nc")
+    file = save(xr.Dataset(), tmp_path / "flss.nc")
     assert "flss.nc is no manifest; expected one, or a folder" in run("rerun", file)[2]
 
 
@@ -253,7 +253,7 @@ def test_a_file_that_changes_the_folder_does_not_lead_results_astray(run, tmp_pa
     Path("sub").mkdir()
     away = f"{begins}os.chdir(os.path.dirname(os.path.abspath(__file__)))\n"
     Path("sub/mine.py").write_text("import os\n" + MINE.replace(before, away + before, 1))
-    words = ["flss", "--model", "sub/mine.py:Drags", "--velocities", 0.5, "--starts", 5, "--window", 10]
+    words = ["flss", "--model", "sub/mine.py:Drags", "--velocities", 0.5, "--starts", 5, "--observation time", 10]
     assert run(*words, "--out", "out")[0] == 0
     assert set(json.loads(Path("out/manifest.json").read_text())["own"]) == {"sub/mine.py"}
     assert Path.cwd() == tmp_path
@@ -268,7 +268,7 @@ def test_a_file_that_was_edited_while_the_command_ran_counts_as_it_ran(run, tmp_
         Path(name).write_text(text)
     told = digest(Path("mine.py").read_bytes())
     words = ["compare", "--models", "mine.py:Drags", "edits.py:Drags", "--no-video", "--velocities", 0.5, "--starts", 5]
-    code, _, error = run(*words, "--window", 10, "--out", "out")
+    code, _, error = run(*words, "--observation time", 10, "--out", "out")
     manifest = json.loads(Path("out/manifest.json").read_text())
     assert code == 0, error
     assert manifest["own"]["mine.py"] == told
@@ -300,5 +300,5 @@ def test_files_that_are_named_like_a_window_a_number_or_a_controller_do_not_coun
     monkeypatch.chdir(tmp_path)
     for name in ("walk", "start", "0.3", "ldvs", "step", "mine"):
         Path(name).write_text("")
-    words = ["walk", "--window", "start", "--velocity=0.3", "--model", "ldvs", "--ground", "step", "--beside", "mine"]
+    words = ["walk", "--observation time", "start", "--velocity=0.3", "--model", "ldvs", "--ground", "step", "--beside", "mine"]
     assert files(words) == [Path("mine")]

@@ -23,7 +23,7 @@ from hexmj.errors import InputError
 from hexmj.plots import FIGURES
 from hexmj.search.stages import search
 from hexmj.storage import netcdf
-from hexmj.sweeps import Study, conduct
+from hexmj.sweep import Study, run_study
 from tiers import few_of
 
 
@@ -54,12 +54,12 @@ def compared() -> xr.Dataset:
     conditions = hexmj.Conditions(vp=200.0, ground="step", friction=0.5)
     slow = hexmj.Acceleration(rate=0.02)
     models = {ALPHA: hexmj.LDVS, "null": hexmj.load_controller("graham")}
-    how: Any = {"n_starts": 3, "window": 20.0, "conditions": conditions, "acceleration": slow}
+    how: Any = {"n_starts": 3, "observation_time": 20.0, "conditions": conditions, "acceleration": slow}
     return hexmj.compare(models, [0.3, 0.5], **how)
 
 
 def fallen() -> xr.Dataset:
-    return hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=2, window=10.0)
+    return hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=2, observation_time=10.0)
 
 
 def recorded() -> xr.Dataset:
@@ -79,16 +79,16 @@ def study(name: str) -> xr.Dataset:
 
     conditions = hexmj.Conditions(vp=200.0)
     small: dict[str, Callable[[], Study]] = {
-        "map": lambda: StabilityMap(hexmj.LDVS, "vp", [80.0, 320.0], [0.5], n_starts=2, window=10.0),
-        "converge": lambda: StaticLimit(hexmj.LDVS, vps=[320.0], n_starts=2, window=10.0),
+        "map": lambda: StabilityMap(hexmj.LDVS, "vp", [80.0, 320.0], [0.5], n_starts=2, observation_time=10.0),
+        "converge": lambda: StaticLimit(hexmj.LDVS, vps=[320.0], n_starts=2, observation_time=10.0),
         "terrain": lambda: Terrain(hexmj.LDVS, [0.6], ["step"], [3.0], grasps=[0.0], n_starts=2),
-        "disturb": lambda: DisturbedWalks(hexmj.LDVS, [0.6], ["halt"], n_starts=2, window=20.0),
-        "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=2, window=5.0, conditions=conditions),
+        "disturb": lambda: DisturbedWalks(hexmj.LDVS, [0.6], ["halt"], n_starts=2, observation_time=20.0),
+        "variants": lambda: Variants({"ldvs": [hexmj.LDVS]}, [0.5], n_starts=2, observation_time=5.0, conditions=conditions),
         "biology": lambda: Biology(hexmj.LDVS, 4, n_starts=2),
-        "league": lambda: League(entrants(("ldvs",)), (0.5,), n_starts=5, n_physical=2, n_tried=1, window=20.0),
+        "league": lambda: League(entrants(("ldvs",)), (0.5,), n_starts=5, n_physical=2, n_tried=1, observation_time=20.0),
         "ablate": lambda: Ablation({"ldvs": switched("ldvs")}, [0.5], n_starts=5, n_physical=2, periods=12),
     }
-    return conduct(small[name]())
+    return run_study(small[name]())
 
 
 def searched() -> xr.Dataset:
@@ -178,7 +178,7 @@ def test_a_part_of_a_result_is_drawn_or_refused_in_a_sentence(name: str):
 def test_one_velocity_is_a_list_of_one():
     alone, listed = (hexmj.flss(hexmj.LDVS, v, n_starts=5) for v in (0.3, [0.3]))
     assert alone.identical(listed)
-    alone, listed = (hexmj.compare(hexmj.LDVS, v, n_starts=2, window=5.0) for v in (0.3, [0.3]))
+    alone, listed = (hexmj.compare(hexmj.LDVS, v, n_starts=2, observation_time=5.0) for v in (0.3, [0.3]))
     assert alone.identical(listed)
 
 
@@ -188,7 +188,7 @@ def test_settings_are_told_as_they_were_given():
     assert [*told["controllers"]] == [ALPHA, "null"]
     assert told["conditions"] == hexmj.Conditions(vp=200.0, ground="step", friction=0.5).settings()
     assert told["acceleration"] == {"rate": 0.02, "start": 0.1}
-    assert (told["window"], told["starts"], told["seed"]) == (20.0, 3, 0)
+    assert (told["observation_time"], told["starts"], told["seed"]) == (20.0, 3, 0)
     assert hexmj.settings(flss())["seed"] == 2**70
     assert hexmj.settings(flss())["acceleration"] is None
 
@@ -199,7 +199,7 @@ def test_the_title_tells_what_was_chosen():
     for words in (
         "3 starts",
         "seed 0",
-        "window of 20 time units",
+        "observation time of 20 time units",
         "= 200 mm/s",
         "friction 0.5",
         "ground: step",
@@ -216,7 +216,7 @@ def test_the_title_tells_what_was_chosen():
 
 def test_all_measures_are_seen_of_the_slowest_and_the_fastest_walks():
     """Beside each other, half of them at a lower V than was walked."""
-    ends = hexmj.compare(hexmj.LDVS, [0.0, 0.999], n_starts=2, window=1.0)
+    ends = hexmj.compare(hexmj.LDVS, [0.0, 0.999], n_starts=2, observation_time=1.0)
     (axes,) = hexmj.plot(ends).axes
     drawn = np.concatenate([line.get_xdata() for line in axes.get_lines()])
     assert len(drawn) and axes.get_xlim()[0] < drawn.min() < 0.0 and 1.0 < drawn.max() < axes.get_xlim()[1]
@@ -243,7 +243,7 @@ def test_what_is_written_again_stays_as_private(tmp_path: Path):
 def test_what_may_only_be_read_is_not_replaced(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Root may write everything."""
     monkeypatch.setattr("os.access", lambda path, mode: bool(os.stat(path).st_mode & 0o222))
-    words = ("flss", "--velocities", "0.5", "--starts", "3", "--window", "start", "--out", tmp_path)
+    words = ("flss", "--velocities", "0.5", "--starts", "3", "--observation time", "start", "--out", tmp_path)
     assert run(*words)[0] == 0
     (kept := tmp_path / "flss.nc").chmod(0o444)
     before = kept.read_bytes()
@@ -344,7 +344,7 @@ def test_a_name_that_would_not_come_back_is_refused(old: str, tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("form", few_of(["svg", "png", "pdf"], "svg"))
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
-    words = ["compare", "--velocities", "0.5", "--starts", "2", "--window", "10", "--no-video", "--format", form]
+    words = ["compare", "--velocities", "0.5", "--starts", "2", "--observation time", "10", "--no-video", "--format", form]
     words += ["--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)
     drawn = tmp_path / f"comparison.{form}"
@@ -355,7 +355,7 @@ def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path):
 
 
 def test_a_damaged_result_is_no_result(tmp_path):
-    path = hexmj.save(hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, window="start"), tmp_path / "flss.nc")
+    path = hexmj.save(hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, observation_time="start"), tmp_path / "flss.nc")
     whole = path.read_bytes()
     for wrong in (whole[:900] + bytes([whole[900] ^ 1]) + whole[901:], whole[:-1], whole + b" "):
         path.write_bytes(wrong)
@@ -365,18 +365,18 @@ def test_a_damaged_result_is_no_result(tmp_path):
 
 @pytest.mark.parametrize("name", ["walknet", "walknet-reacog", "walknet-load", "walknet-without-2"])
 def test_a_figure_of_walknet_whose_reading_is_not_the_networks(name: str):
-    result = hexmj.flss(hexmj.load_controller(name), [0.3], n_starts=3, window="start")
+    result = hexmj.flss(hexmj.load_controller(name), [0.3], n_starts=3, observation_time="start")
     told = " ".join(text.get_text() for text in hexmj.plot(result).findobj(Text))
     assert name in told and "reading" not in told
 
 
 def test_what_has_lost_its_velocities_gets_a_sentence():
-    result = hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, window="start")
+    result = hexmj.flss(hexmj.LDVS, [0.3, 0.5], n_starts=5, observation_time="start")
     hexmj.plot(result.isel(velocity=[0]))
     for wrong in (0, []):
         with pytest.raises(InputError, match="without the axis velocity"):
             hexmj.plot(result.isel(velocity=wrong))
-    both = hexmj.compare({"hws": hexmj.HWS, "ldvs": hexmj.LDVS}, [0.3], n_starts=1, window=5.0)
+    both = hexmj.compare({"hws": hexmj.HWS, "ldvs": hexmj.LDVS}, [0.3], n_starts=1, observation_time=5.0)
     with pytest.raises(InputError, match=r"; of one controller without an axis\); expected the result as it .*isel\("):
         hexmj.plot(both.sel(controller="hws"))
     hexmj.plot(both.assign_coords(run=3))

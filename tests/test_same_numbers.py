@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj.storage.results import save_dataset
+from hexmj.io import save
 from hexmj.storage.same_numbers import Compared, compared
 
 
@@ -15,7 +15,7 @@ def test_every_bit_counts(tmp_path):
     new = {"x": [-0.0, nan, inf, 1.5, inf], "n": [1, 2, 3, 4, 7], "t": list("abcdx"), "b": [True] * 5, "came": [0] * 5}
     for name, values in (("old", old), ("new", new)):
         data = xr.Dataset({key: ("i", one) for key, one in values.items()})
-        save_dataset(data.assign_attrs(seed=len(name)), tmp_path / f"{name}.nc")
+        save(data.assign_attrs(seed=len(name)), tmp_path / f"{name}.nc")
     assert sorted(compared(tmp_path / "old.nc", tmp_path / "new.nc"), key=lambda one: one.name) == [
         Compared("(attributes)", 1, 0, None),
         Compared("(structure)", 1, 1, None),
@@ -83,7 +83,7 @@ def test_the_order_of_keys_counts_for_nothing(tmp_path):
 
 def test_a_variable_in_another_unit_is_not_equal(tmp_path):
     for name, units in (("old", "1"), ("new", "%")):
-        save_dataset(xr.Dataset({"x": ("i", [1.0], {"units": units})}), tmp_path / f"{name}.nc")
+        save(xr.Dataset({"x": ("i", [1.0], {"units": units})}), tmp_path / f"{name}.nc")
     assert compared(tmp_path / "old.nc", tmp_path / "new.nc") == [
         Compared("x", 1, 0, None),
         Compared("(attributes)", 1, 1, None),
@@ -108,12 +108,12 @@ def row(values: object, *axes: str, **attributes: object) -> xr.Dataset:
     ],
 )
 def test_all_that_a_netcdf_file_tells_counts(tmp_path, old, new, name):
-    paths = [save_dataset(one, tmp_path / f"{n}.nc") for n, one in enumerate((old, new))]
+    paths = [save(one, tmp_path / f"{n}.nc") for n, one in enumerate((old, new))]
     assert [one.name for one in compared(*paths) if one.differ] == [name]
 
 
 def test_digests_of_files_in_texts_are_the_manifests_to_compare(tmp_path):
     told = ["mine.py@0123456789ab.Tripod", "mine.py@ba9876543210.Tripod", "mine.py@ba9876543210.Wave"]
-    paths = [save_dataset(row([1.0], k=one), tmp_path / f"{n}.nc") for n, one in enumerate(told)]
+    paths = [save(row([1.0], k=one), tmp_path / f"{n}.nc") for n, one in enumerate(told)]
     assert not any(one.differ for one in compared(paths[0], paths[1]))
     assert [one.name for one in compared(paths[0], paths[2]) if one.differ] == ["(attributes)"]

@@ -16,7 +16,7 @@ from pace import Pace
 from tiers import few_of
 
 HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
-PROBLEM = Problem(HWS, 0.5, 0.5, window="start")
+PROBLEM = Problem(HWS, 0.5, 0.5, observation_time="start")
 EFFORT = Effort(budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
 
 
@@ -79,8 +79,8 @@ def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(
     (kept,) = tmp_path.iterdir()
     before = kept.read_bytes()
     for problem, effort in (
-        (Problem(HWS, 0.4, 0.5, window="start"), few),
-        (Problem(NetworkForm("hws", "sequential"), 0.5, 0.5, window="start"), few),
+        (Problem(HWS, 0.4, 0.5, observation_time="start"), few),
+        (Problem(NetworkForm("hws", "sequential"), 0.5, 0.5, observation_time="start"), few),
         (PROBLEM, replace(few, starts=21)),
         (PROBLEM, replace(few, seed=1)),
     ):

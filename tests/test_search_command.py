@@ -22,7 +22,7 @@ from waiting_legs import OWN
 
 PNG = b"\x89PNG"
 
-SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--window", "start", "--starts", 40, "--budget", 40,
+SEARCH = ["search", "--form", "hws", "--velocities", 0.3, 0.6, "--observation time", "start", "--starts", 40, "--budget", 40,
           "--refine-starts", 100, "--refine-budget", 20, "--verdict-starts", 500]  # fmt: skip
 
 
@@ -47,7 +47,7 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
     assert history.best.values[-1] == answer["cost"]
     assert json.loads(history.attrs["settings"])["effort"]["algorithm"] == algorithm
     for name, one in (("found", found), ("hws", hexmj.HWS), ("ldvs", hexmj.LDVS)):
-        flss, interval = hexmj.flss_over_range(one, 0.3, 0.6, n_starts=500, window="start", seed=1998)
+        flss, interval = hexmj.flss_over_range(one, 0.3, 0.6, n_starts=500, observation_time="start", seed=1998)
         assert answer["verdict"][name]["start"] == {"flss": flss, "flss_low": interval[0], "flss_high": interval[1]}
         assert "walk" in answer["verdict"][name]
     assert (tmp_path / "convergence.png").read_bytes().startswith(PNG)
@@ -67,7 +67,7 @@ def test_search_writes_a_controller_that_can_be_used_and_reports_it_again(run, t
 
 
 def test_the_order_of_updates_reaches_the_network(run, tmp_path):
-    words = ["search", "--form", "hws", "--begin", "hws", "--velocity", 0.4, "--window", "start", "--starts", 300,
+    words = ["search", "--form", "hws", "--begin", "hws", "--velocity", 0.4, "--observation time", "start", "--starts", 300,
              "--budget", 10, "--refine-budget", 0, "--verdict-starts", 200, "--json"]  # fmt: skip
     starts = hexmj.draw_starts(300, 0)
     for order in ("printed", "sequential"):
@@ -120,13 +120,13 @@ def test_a_search_that_is_stopped_by_hand_keeps_its_evaluations(run, tmp_path, m
 
 @pytest.mark.slow
 def test_physical_search(run, tmp_path):
-    words = ["search", "--physical", "--velocity", 0.6, "--window", "start", "--vp", 200, "--starts", 3, "--budget", 10]
+    words = ["search", "--physical", "--velocity", 0.6, "--observation time", "start", "--vp", 200, "--starts", 3, "--budget", 10]
     words += ["--refine-budget", 0, "--verdict-starts", 4, "--json", "--out", tmp_path]
     code, text, _ = run(*words)
     assert code == 0
     answer = json.loads(text)
     fell = hexmj.physical_flss(
-        hexmj.load_controller(str(tmp_path / "found.toml")), [0.6], n_starts=4, window="start", seed=1998,
+        hexmj.load_controller(str(tmp_path / "found.toml")), [0.6], n_starts=4, observation_time="start", seed=1998,
         conditions=hexmj.Conditions(vp=200.0),
     )  # fmt: skip
     assert answer["verdict"]["found"]["start"]["flss"] == fell.flss.item()
@@ -138,7 +138,7 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     """Its float fields, from their usual values; the found one can be named like any other."""
     (tmp_path / "mine.py").write_text(OWN)
     form = f"{tmp_path / 'mine.py'}:Waits"
-    words = ["search", "--form", form, "--velocity", 0.4, "--window", "start", "--starts", 40, "--budget", 28]
+    words = ["search", "--form", form, "--velocity", 0.4, "--observation time", "start", "--starts", 40, "--budget", 28]
     words += ["--refine-starts", 60, "--refine-budget", 8, "--verdict-starts", 50, "--json", "--out", tmp_path]
     code, text, error = run(*words)
     assert code == 0, error
@@ -148,7 +148,7 @@ def test_a_controller_of_ones_own_is_searched(run, tmp_path):
     assert {name: getattr(found, name) for name in ("share", "shift")} == answer["found"]
     assert (found.name, usual.name) == ("found", "waits")
     for name, one in (("usual", usual), ("found", found)):
-        flss = hexmj.flss(one, [0.4], n_starts=50, window="start", seed=1998).flss.item()
+        flss = hexmj.flss(one, [0.4], n_starts=50, observation_time="start", seed=1998).flss.item()
         assert answer["verdict"][name]["start"]["flss"] == flss
     history = xr.load_dataset(tmp_path / "history.nc")
     assert history.candidate.values[0].tolist() == [0.5, 0.1]
@@ -215,7 +215,7 @@ class Edits:
 def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path, name, why):
     (tmp_path / "leaves.py").write_text(LEAVES)
     (tmp_path / "table.txt").write_text("some")
-    words = ["--form", f"{tmp_path / 'leaves.py'}:{name}", "--window", 2, "--starts", 5, "--budget", 3]
+    words = ["--form", f"{tmp_path / 'leaves.py'}:{name}", "--observation time", 2, "--starts", 5, "--budget", 3]
     words += ["--population", 2, "--refine-budget", 0, "--verdict-starts", 6, "--out", tmp_path]
     code, printed, error = run("search", *words)
     assert code == 2 and not printed and why in error
@@ -226,7 +226,7 @@ def test_what_is_found_is_written_though_the_verdict_on_it_fails(run, tmp_path, 
 @pytest.mark.parametrize("begin", few_of(["ldvs", "lasting-0.3"], "lasting-0.3"))
 def test_a_search_begins_with_a_set_whose_candidates_read_the_legs(run, tmp_path, begin):
     words = ["--begin", begin, "--form", "mirrored", "--physical", "--feedback", "--velocity", 0.9]
-    words += ["--window", 5, "--starts", 2]
+    words += ["--observation time", 5, "--starts", 2]
     words += ["--budget", 2, "--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]
     assert run("search", *words)[0] == 0
 
@@ -236,7 +236,7 @@ def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
     """It is no set of weights: neither what is found nor what a search of weights can begin with."""
     (tmp_path / "heir.py").write_text(HEIR)
     form = f"{tmp_path / 'heir.py'}:Stretched"
-    words = ["--velocity", 0.4, "--window", "start", "--starts", 10, "--budget", 4, "--population", 2]
+    words = ["--velocity", 0.4, "--observation time", "start", "--starts", 10, "--budget", 4, "--population", 2]
     words += ["--refine-budget", 0, "--verdict-starts", 5, "--json", "--out", tmp_path / "out"]
     code, text, error = run("search", "--form", form, *words)
     assert code == 0, error
@@ -248,7 +248,7 @@ def test_an_heir_of_the_network_is_searched_as_itself(run, tmp_path):
     assert "stretched is not made of weights alone" in error
     for words in (["flss"], ["variants", "--out", tmp_path / "variants", "--models"]):
         model = ["--model", form] if words == ["flss"] else [form]
-        code, text, error = run(*words, *model, "--velocities", 0.4, "--starts", 5, "--window", "start")
+        code, text, error = run(*words, *model, "--velocities", 0.4, "--starts", 5, "--observation time", "start")
         assert code == 0, error
     assert "reading a word of its own" in text
 
@@ -275,7 +275,7 @@ def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run
     (tmp_path / "odd.py").write_text(ODD, encoding="utf-8")
     begun = tmp_path / name
     begun.write_text(f'controller = "{tmp_path}/odd.py:Odd"\n[fields]\ncap = inf\n[fields.gains]\nfront = 2.0\n')
-    words = ["search", "--form", begun, "--velocity", 0.5, "--window", 1, "--starts", 2, "--budget", 2]
+    words = ["search", "--form", begun, "--velocity", 0.5, "--observation time", 1, "--starts", 2, "--budget", 2]
     words += ["--population", 2, "--refine-budget", 0, "--verdict-starts", 2, "--out", tmp_path]
     assert run(*words)[0] == 0
     found = hexmj.load_controller(str(tmp_path / "found.toml"))
@@ -287,7 +287,7 @@ def test_what_is_found_is_read_again_whatever_its_fields_are_called_and_hold(run
 def test_a_search_goes_on_from_what_one_has_found_but_not_over_it(run, tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
     first, again, form = tmp_path / "first", tmp_path / "again", f"{tmp_path / 'mine.py'}:Waits"
-    words = ["search", "--velocity", 0.4, "--window", "start", "--starts", 20, "--budget", 10, "--refine-budget", 0]
+    words = ["search", "--velocity", 0.4, "--observation time", "start", "--starts", 20, "--budget", 10, "--refine-budget", 0]
     words += ["--verdict-starts", 20]
     assert run(*words, "--form", form, "--out", first)[0] == 0
     found = first / "found.toml"
@@ -320,7 +320,7 @@ def test_a_verdict_on_starts_of_earlier_searches_is_refused(run, tmp_path, monke
 
 
 def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
-    words = ["--form", "hws", "--ties", "later", "--window", "10", "--starts", 10, "--budget", 10, "--refine-budget", 0]
+    words = ["--form", "hws", "--ties", "later", "--observation time", "10", "--starts", 10, "--budget", 10, "--refine-budget", 0]
     code, shown, _ = run("search", *words, "--verdict-starts", 20, "--out", tmp_path)
     told = " ".join(shown.split())
     assert code == 0 and "later losses first among equals" in told
@@ -334,7 +334,7 @@ def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, t
     text += "X = dataclasses.replace(hexmj.LDVS, reading=Reading(cap='sum'), name='x')\n"
     (tmp_path / "own.py").write_text(text)
     words = ["search", "--form", "ldvs", "--begin", "own.py:X", "--velocity", 0.5, "--starts", 4, "--budget", 10]
-    words += ["--refine-budget", 0, "--verdict-starts", 4, "--window", 5]
+    words += ["--refine-budget", 0, "--verdict-starts", 4, "--observation time", 5]
     code, _, error = run(*words)
     said = "--begin = own.py:X: its reading has no name; expected --reading beside it, one of printed, lasting"
     assert code == 2 and said in error
@@ -344,7 +344,7 @@ def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, t
 
 def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
     """Unless others are given; what it finds walks by them."""
-    sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--window", "start"]
+    sizes = ["--starts", "4", "--budget", "10", "--refine-budget", "0", "--verdict-starts", "4", "--observation time", "start"]
     words = ["search", "--form", "mirrored", "--begin", "lasting-0.3", *sizes]
     for added, expected in ([], "lasting"), (["--reading", "printed"], "printed"):
         options_of([*words, *added, "--out", str(tmp_path / expected)]).run()

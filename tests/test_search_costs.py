@@ -19,21 +19,21 @@ from pace import Pace
 HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
 
 
-@pytest.mark.parametrize("window", ["walk", "start", 30.0])
+@pytest.mark.parametrize("observation_time", ["walk", "start", 30.0])
 @pytest.mark.parametrize("order", ["printed", "sequential"])
-def test_the_cost_is_the_flss_of_the_same_starts(window, order):
+def test_the_cost_is_the_flss_of_the_same_starts(observation_time, order):
     for name in FORMS:
         preset = hexmj.HWS if name == "hws" else hexmj.LDVS
         form, controller = NetworkForm(name, order), hexmj.Cruse1998(preset.weights, order)
         vector = form.vector(controller)
-        one = Sample(Problem(form, 0.4, 0.4, window), 300, 5)
-        expected = hexmj.flss(controller, [0.4], n_starts=300, window=window, seed=5).flss.item()
+        one = Sample(Problem(form, 0.4, 0.4, observation_time), 300, 5)
+        expected = hexmj.flss(controller, [0.4], n_starts=300, observation_time=observation_time, seed=5).flss.item()
         assert one.costs(vector[None]) == [expected]
-        some = Sample(Problem(form, 0.2, 0.6, window), 300, 5)
-        expected, _ = hexmj.flss_over_range(controller, 0.2, 0.6, n_starts=300, window=window, seed=5)
+        some = Sample(Problem(form, 0.2, 0.6, observation_time), 300, 5)
+        expected, _ = hexmj.flss_over_range(controller, 0.2, 0.6, n_starts=300, observation_time=observation_time, seed=5)
         assert some.costs(vector[None]) == [expected]
         verdict = some.verdict({"one": controller})
-        assert verdict.flss.sel(controller="one", window=str(window)) == expected
+        assert verdict.flss.sel(controller="one", observation_time=str(observation_time)) == expected
 
 
 def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
@@ -52,13 +52,13 @@ def test_the_physical_cost_is_the_physical_flss(feedback):
     sample = Sample(Problem(LDVS, 0.6, 0.6, "start", conditions=conditions, feedback=feedback), 12, 0)
     walked = hexmj.ReadsLegs(hexmj.LDVS) if feedback else hexmj.LDVS
     how: Any = {"n_starts": 12, "conditions": conditions}
-    expected = hexmj.physical_flss(walked, [0.6], window="start", **how).flss.item()
+    expected = hexmj.physical_flss(walked, [0.6], observation_time="start", **how).flss.item()
     assert sample.costs(LDVS.vector(hexmj.LDVS)[None]) == [expected]
     assert 0 < expected < 1
     if not feedback:
         verdict = sample.verdict({"ldvs": walked}).flss.sel(controller="ldvs")
-        assert verdict.sel(window="start") == expected
-        assert verdict.sel(window="walk") == hexmj.physical_flss(walked, [0.6], window="walk", **how).flss.item()
+        assert verdict.sel(observation_time="start") == expected
+        assert verdict.sel(observation_time="walk") == hexmj.physical_flss(walked, [0.6], observation_time="walk", **how).flss.item()
 
 
 SCRATCH = np.zeros(1)
@@ -79,7 +79,7 @@ class Careless(Pace):
 
 
 def test_candidates_that_share_an_array_of_their_module_are_walked_one_after_the_other():
-    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, window=1.0), 50, 0)
+    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, observation_time=1.0), 50, 0)
     vectors = np.array([[good, 0.0] for good in (0.5, 1.0, 0.0, 2.0)])
     alone = [sample.costs(vector[None])[0] for vector in vectors]
     assert len(set(alone)) > 2

@@ -37,7 +37,7 @@ def test_forms_are_what_their_names_say(name):
 def test_the_fields_of_a_controller_are_searched():
     """Those that are floats, from their usual values, over 0 to a multiple of them; what it refuses costs all."""
     form = FieldsForm(Pace())
-    problem = Problem(form, 0.4, 0.4, window=5.0)
+    problem = Problem(form, 0.4, 0.4, observation_time=5.0)
     domain = problem.domain(4.0)
     assert form.names == ("good", "idle")
     assert not domain.binary.any()
@@ -48,7 +48,7 @@ def test_the_fields_of_a_controller_are_searched():
     assert form.controller(np.array([1.5, 0.25])) == Pace(good=1.5, idle=0.25)
     sample = Sample(problem, 50, 0)
     assert sample.costs(np.array([[-1.0, 0.0]])) == [1.0]
-    expected = [hexmj.flss(Pace(good=good), [0.4], n_starts=50, window=5.0).flss.item() for good in (2.0, 0.1)]
+    expected = [hexmj.flss(Pace(good=good), [0.4], n_starts=50, observation_time=5.0).flss.item() for good in (2.0, 0.1)]
     assert sample.costs(np.array([[2.0, 0.0], [0.1, 7.0]])).tolist() == expected
     for algorithm in ("evolution", "cmaes"):
         found = search(problem, Effort(algorithm, domain=2.0, starts=40, budget=60, refine_starts=60, refine_budget=30))
@@ -59,7 +59,7 @@ def test_the_fields_of_a_controller_are_searched():
 
 def test_a_controller_that_is_false_is_begun_with(monkeypatch):
     monkeypatch.setattr(Pace, "__bool__", lambda _: False, raising=False)
-    domain = Problem(FieldsForm(Pace()), 0.4, 0.4, window=5.0).domain(4.0, Pace(good=1.0))
+    domain = Problem(FieldsForm(Pace()), 0.4, 0.4, observation_time=5.0).domain(4.0, Pace(good=1.0))
     assert domain.begin is not None and domain.begin.tolist() == [1.0, -0.5]
 
 
@@ -75,7 +75,7 @@ class Picky(Pace):
 
 
 def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
-    problem = Problem(FieldsForm(Picky()), 0.4, 0.4, window=5.0)
+    problem = Problem(FieldsForm(Picky()), 0.4, 0.4, observation_time=5.0)
     found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
     good = found.history.candidate.sel(parameter="good")
     refused = (good < 2) | (good >= 2.01)
@@ -101,7 +101,7 @@ class Late(Pace):
 
 
 def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_of_it_is_found():
-    problem = Problem(FieldsForm(Late()), 0.4, 0.4, window=5.0)
+    problem = Problem(FieldsForm(Late()), 0.4, 0.4, observation_time=5.0)
     assert Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]])).tolist() == [1.0]
     found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
     assert 2 <= found.vector[0] < 2.01 and found.cost < 1
@@ -120,7 +120,7 @@ def test_a_candidate_whose_simulation_fails_costs_as_one_that_loses_all_and_is_n
         return SimpleNamespace(fall=np.full(len(settled.starts), np.inf))
 
     monkeypatch.setattr("hexmj.measures.physical.physical_outcomes", outcomes)
-    problem = Problem(FieldsForm(Pace()), 0.3, 0.3, window=5.0, conditions=hexmj.Conditions())
+    problem = Problem(FieldsForm(Pace()), 0.3, 0.3, observation_time=5.0, conditions=hexmj.Conditions())
     assert Sample(problem, 2, 0).costs(np.array([[1.5, -0.5], [2.5, -0.5]])).tolist() == [1.0, 0.0]
     found = search(problem, Effort(starts=2, budget=10, refine_budget=0))
     assert found.vector[0] >= 2 and found.cost == 0 and (found.history.cost == 1).any()
@@ -150,7 +150,7 @@ class Fast(Pace):
 
 def test_an_error_of_ones_own_stays_what_it_is():
     with pytest.raises(TooFast, match=r"^too fast: 0\.4$"):
-        hexmj.flss(Fast(), 0.4, n_starts=3, window=5.0)
+        hexmj.flss(Fast(), 0.4, n_starts=3, observation_time=5.0)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class Odd(Pace):
 
 
 def test_a_candidate_whose_steps_make_no_sense_is_named():
-    problem = Problem(FieldsForm(Odd()), 0.4, 0.4, window=5.0)
+    problem = Problem(FieldsForm(Odd()), 0.4, 0.4, observation_time=5.0)
     with pytest.raises(InputError, match=r"with good = 1.5, idle = -0.5: .*x of a step"):
         Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]]))
 
@@ -177,14 +177,14 @@ class Far(Pace):
 
 
 def test_what_no_leg_reaches_is_never_found():
-    problem = Problem(FieldsForm(Far()), 0.3, 0.3, window=5.0, conditions=hexmj.Conditions())
+    problem = Problem(FieldsForm(Far()), 0.3, 0.3, observation_time=5.0, conditions=hexmj.Conditions())
     with pytest.raises(InputError, match="out of reach"):
         search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
 
 
 def test_starts_that_cannot_stand_are_refused_before_a_candidate_walks():
     stride = hexmj.Stride(aep0=11.0)
-    problem = Problem(FieldsForm(Fast()), 0.4, 0.4, window=5.0, conditions=hexmj.Conditions(), stride=stride)
+    problem = Problem(FieldsForm(Fast()), 0.4, 0.4, observation_time=5.0, conditions=hexmj.Conditions(), stride=stride)
     with pytest.raises(InputError, match=r"^of the 8 starts of seed 0, start 4, leg 3: the tip at 10.9 mm is out of"):
         search(problem, Effort(starts=4, budget=10, refine_starts=8))
 
@@ -212,7 +212,7 @@ def test_starts_that_cannot_stand_are_refused_before_a_candidate_walks():
 )
 def test_forms_that_make_no_sense_are_refused(form, sentence):
     with pytest.raises(InputError, match=sentence):
-        search(Problem(form(), 0.4, 0.4, window=5.0), Effort(starts=2, budget=10))
+        search(Problem(form(), 0.4, 0.4, observation_time=5.0), Effort(starts=2, budget=10))
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ class Askew:
 
 
 def test_switches_alone_are_searched_without_a_simplex():
-    problem = Problem(Askew(binary=np.ones(2, dtype=bool), box_is=([0.0, 0.0], [1.0, 1.0])), 0.4, 0.4, window=5.0)
+    problem = Problem(Askew(binary=np.ones(2, dtype=bool), box_is=([0.0, 0.0], [1.0, 1.0])), 0.4, 0.4, observation_time=5.0)
     found = search(problem, Effort(starts=5, budget=12, population=4, refine_budget=20))
     assert not found.history.stage.any()
     assert found.starts == 5

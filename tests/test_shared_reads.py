@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexmj.sweeps import Cell, KeptValues, finish, run
+from hexmj.sweep import Cell, CachedValues, finished_cells, run_cells
 from hexmj.user_code.loaded import importable
 from hexmj.user_code.opened_files import heard, spelled
 from reader import READER, another_program, what_was_read, write_all
@@ -33,7 +33,7 @@ def test_what_a_cell_has_read_that_goes_on_in_another_thread_is_remembered(
     )
     reader = importable("reader.py").Reader
     with ThreadPoolExecutor(2) as threads:
-        run([Cell(at, reader(at).cell, {}) for at in ("slow", "quick")], Path("kept"), executor=threads)
+        run_cells([Cell(at, reader(at).cell, {}) for at in ("slow", "quick")], Path("kept"), executor=threads)
     assert what_was_read("slow*") == what_was_read("quick*") == {"one/gain"}
 
 
@@ -42,7 +42,7 @@ def test_what_the_main_thread_opens_meanwhile_is_its_own(computed: Callable[...,
     Path("reader.py").write_text(READER.format(gain="[tried('one/gain'), __import__('time').sleep(0.2)][0]"))
     reader = importable("reader.py").Reader
     with ThreadPoolExecutor(1) as threads:
-        for _ in finish([Cell(at, reader(at).cell, {}) for at in "ab"], Path("kept"), executor=threads):
+        for _ in finished_cells([Cell(at, reader(at).cell, {}) for at in "ab"], Path("kept"), executor=threads):
             Path("two/gain").read_text()
             time.sleep(0.1)
     assert what_was_read("b-*") == {"one/gain"}
@@ -56,15 +56,15 @@ def test_a_result_of_a_file_as_it_was_and_as_it_is_is_told(
     def cells() -> list[Cell]:
         return [Cell(at, importable("reader.py").Reader(at).cell, {}) for at in ("first", "second")]
 
-    run(cells()[:1], Path("kept"))
+    run_cells(cells()[:1], Path("kept"))
     another_program(monkeypatch)
-    found = finish(cells(), Path("kept"))
+    found = finished_cells(cells(), Path("kept"))
     assert float(next(found)[1].gain) == 1.0
     write_all("7.0")
     with pytest.warns(UserWarning, match="gain has changed before second read it, and after others did: what comes of"):
         next(found)
     another_program(monkeypatch)
-    assert [float(data.gain) for data in run(cells(), Path("kept"))] == [7.0, 7.0]
+    assert [float(data.gain) for data in run_cells(cells(), Path("kept"))] == [7.0, 7.0]
 
 
 def test_what_a_thread_reads_ahead_of_which_no_function_is_a_user_s_counts(
@@ -79,7 +79,7 @@ def test_what_a_thread_reads_ahead_of_which_no_function_is_a_user_s_counts(
 def test_a_cell_that_uses_values_that_a_search_has_kept_has_read_what_they_have(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    values = "hexmj.sweeps.KeptValues(hexmj.sweeps.Cell('values', Inner().value, {}), Path('values'))"
+    values = "hexmj.sweeps.CachedValues(hexmj.sweeps.Cell('values', Inner().value, {}), Path('values'))"
     for calls in (1, 2):
         assert computed(f"{values}(np.ones((1, 1)))[0].item()") == (1.0, calls)
         assert what_was_read() == {"one/gain"}
@@ -97,7 +97,7 @@ def test_controllers_that_share_a_helper_do_not_count_each_other_s_files(
         text = READER.format(gain=f"shared_helper.ZERO + float(Path('{at}/gain').read_text())")
         Path(f"{at}.py").write_text(f"import shared_helper\n{text}")
         reader = importable(f"{at}.py").Reader
-        run([Cell(at, reader().cell, {})], Path(f"kept_{at}"))
+        run_cells([Cell(at, reader().cell, {})], Path(f"kept_{at}"))
     shutil.rmtree("kept")
     Path("kept_two").rename("kept")
     assert what_was_read() == {"two/gain"}
@@ -107,7 +107,7 @@ def test_what_an_outer_cell_tells_and_the_package_s_own_do_not_count_for_it(
     computed: Callable[..., tuple[float, int]],
 ) -> None:
     body = "hexmj.sweeps.Cell('body', Inner().of, {'body': hexmj.STICK_INSECT})"
-    inner = f"hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner(self.file).cell, {{}}), {body}])[0].gain.item()"
+    inner = f"hexmj.sweep.run_cells([hexmj.sweeps.Cell('inner', Inner(self.file).cell, {{}}), {body}])[0].gain.item()"
     assert computed(inner, "one/gain") == (1.0, 1)
     assert what_was_read() == set()
 
@@ -119,7 +119,7 @@ def test_a_cell_that_sweeps_has_read_what_its_cells_have_and_tell(
 ) -> None:
     pool = pool and f", executor=__import__('concurrent.futures').futures.{pool}PoolExecutor(1)"
     inner = f"hexmj.sweeps.Cell('inner', Inner({file!r}).cell, {{}})"
-    assert computed(f"hexmj.sweeps.run([{inner}]{pool})[0].gain.item()") == (1.0, 1)
+    assert computed(f"hexmj.sweep.run_cells([{inner}]{pool})[0].gain.item()") == (1.0, 1)
     assert what_was_read() == {"one/gain"}
 
 
@@ -141,12 +141,12 @@ class Picky:
 
 def swept():
     try:
-        return hexmj.sweeps.run([hexmj.sweeps.Cell("picky", Picky("one/gain").cell, {})])[0].gain.item()
+        return hexmj.sweep.run_cells([hexmj.sweeps.Cell("picky", Picky("one/gain").cell, {})])[0].gain.item()
     except hexmj.InputError:
         return 0.0
 """
     )
-    (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    (data,) = run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert data.gain == max(gain, 0.0)
     assert what_was_read() == {"one/gain"}
 
@@ -160,7 +160,7 @@ def test_a_file_that_a_swept_cell_missed_counts_for_the_outer_one(
     pool = pool and f", executor=__import__('concurrent.futures').futures.{pool}PoolExecutor(1)"
     inner = "hexmj.sweeps.Cell('inner', Missing().cell, {})"
     Path("reader.py").write_text(
-        READER.format(gain=f"hexmj.sweeps.run([{inner}]{pool})[0].gain.item()")
+        READER.format(gain=f"hexmj.sweep.run_cells([{inner}]{pool})[0].gain.item()")
         + f"""
 @dataclass(frozen=True)
 class Missing:
@@ -170,7 +170,7 @@ class Missing:
 """
     )
     for gain in (0.0, 5.0):
-        (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+        (data,) = run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
         assert data.gain == gain
         another_program(monkeypatch)
         Path("two/late").write_text("5.0")
@@ -186,7 +186,7 @@ def test_what_an_installed_controller_reads_is_kept_with_it(monkeypatch: pytest.
     name = f"my_reader_{at_import}"
     Path(f"site-packages/{name}.py").write_text(text)
     monkeypatch.syspath_prepend("site-packages")
-    (data,) = run([Cell("reader", importlib.import_module(name).Reader().cell, {})], Path("kept"))
+    (data,) = run_cells([Cell("reader", importlib.import_module(name).Reader().cell, {})], Path("kept"))
     assert data.gain == 1.0
     assert what_was_read() == {"one/gain"}
 
@@ -215,7 +215,7 @@ def test_what_a_cached_function_has_swept_before_counts(
         + """
 @functools.cache
 def best():
-    return hexmj.sweeps.run([hexmj.sweeps.Cell("inner", Inner().cell, {})], Path("inner"))[0].gain.item()
+    return hexmj.sweep.run_cells([hexmj.sweeps.Cell("inner", Inner().cell, {})], Path("inner"))[0].gain.item()
 """
     )
     for program in range(3):
@@ -223,7 +223,7 @@ def best():
             Path("one/gain").write_text("7.0")
         module = importable("reader.py")
         assert module.best() == (7.0 if program == 2 else 1.0)
-        (data,) = run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+        (data,) = run_cells([Cell("reader", module.Reader().cell, {})], Path("kept"))
         assert data.gain == module.best()
         if program == 0:
             shutil.rmtree("kept")
@@ -247,17 +247,17 @@ def test_a_file_that_a_text_names_counts_whoever_has_opened_it(
     )
     module = importable("reader.py")
     assert module.cached("gains.csv") == 1.0
-    run([Cell("reader", module.Reader().cell, {})], Path("kept"))
+    run_cells([Cell("reader", module.Reader().cell, {})], Path("kept"))
     another_program(monkeypatch)
     np.savetxt("gains.csv", [2.0])
-    (data,) = run([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
+    (data,) = run_cells([Cell("reader", importable("reader.py").Reader().cell, {})], Path("kept"))
     assert data.gain == 2.0
 
 
 def test_what_an_inner_cell_has_read_and_is_edited_before_the_outer_one_is_done_is_not_kept(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    inner = "hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
+    inner = "hexmj.sweep.run_cells([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
     gain = f"[{inner}, Path('edits').exists() and Path('one/gain').write_text('7.0')][0]"
     assert computed(gain) == (1.0, 1)
     another_program(monkeypatch)
@@ -273,14 +273,14 @@ def test_cells_side_by_side_do_not_answer_for_each_other(computed: Callable[...,
     reader = importable("reader.py").Reader
     cells = [Cell(at, reader(at, f"{at}/gain").cell, {}) for at in ("one", "two")]
     with ThreadPoolExecutor(2) as threads:
-        assert [float(data.gain) for data in run(cells, Path("both"), executor=threads)] == [1.0, 2.0]
+        assert [float(data.gain) for data in run_cells(cells, Path("both"), executor=threads)] == [1.0, 2.0]
     assert len(list(Path("both").glob("*.nc"))) == 2
 
 
 def test_a_cell_that_takes_a_kept_one_has_read_what_that_has(
     computed: Callable[..., tuple[float, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    gain = "hexmj.sweeps.run([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
+    gain = "hexmj.sweep.run_cells([hexmj.sweeps.Cell('inner', Inner().cell, {})], Path('inner'))[0].gain.item()"
     for calls in (1, 2):
         assert computed(gain) == (1.0, calls)
         assert what_was_read() == {"one/gain"}
@@ -292,9 +292,9 @@ def test_what_values_in_memory_have_opened_is_remembered(computed: Callable[...,
     computed("1.0", "one/gain")
     Path("reader.py").write_text(READER.format(gain="remembered('one/gain')"))
     reader = importable("reader.py").Reader()
-    KeptValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
+    CachedValues(Cell("values", reader.value, {}))(np.ones((1, 1)))
     shutil.rmtree("kept")
-    run([Cell("reader", reader.cell, {})], Path("kept"))
+    run_cells([Cell("reader", reader.cell, {})], Path("kept"))
     assert what_was_read() == {"one/gain"}
 
 
@@ -306,7 +306,7 @@ def test_values_are_those_of_the_files_that_were_read(
     Path("reader.py").write_text(READER.format(gain="remembered(self.at + '/gain')"))
 
     def values(gain: float, known: int) -> None:
-        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+        found = CachedValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
         assert (found.known, *found(rows)) == (known, gain, gain)
 
     values(1.0, known=0)
@@ -327,8 +327,8 @@ def test_values_of_a_file_as_it_was_and_as_it_is_are_told(
 ) -> None:
     Path("reader.py").write_text(READER.format(gain="float(Path('one/gain').read_text())"))
 
-    def values() -> KeptValues:
-        return KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+    def values() -> CachedValues:
+        return CachedValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
 
     values()(np.ones((1, 1)))
     another_program(monkeypatch)
@@ -344,6 +344,6 @@ def test_a_file_that_values_were_kept_beside_may_be_opened_later(
     Path("it.json").write_text("1.0")
     Path("reader.py").write_text(READER.format(gain="(tried('it.json') if len(rows) > 1 else 1.0)"))
     for rows in (1, 2):
-        found = KeptValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
+        found = CachedValues(Cell("values", importable("reader.py").Reader().value, {}), Path("values"))
         assert found(np.full((rows, 1), float(rows))).tolist() == [rows] * rows
         another_program(monkeypatch)

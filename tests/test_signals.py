@@ -63,7 +63,7 @@ def test_no_program_is_started_that_a_stop_would_reach(tmp_path):
     """As GLFW does to ask libraries for their versions."""
     heard = "lambda event, _: event == 'subprocess.Popen' and print('started a program', flush=True)"
     script = f"import sys\nfrom hexmj.__main__ import main\nsys.addaudithook({heard})\nmain()"
-    words = "flss --physical --velocities 0.5 --starts 1 --window 5 --threads 1"
+    words = "flss --physical --velocities 0.5 --starts 1 --observation time 5 --threads 1"
     done = subprocess.run(
         [sys.executable, "-c", script, *words.split()], env=ENVIRONMENT, capture_output=True, text=True, cwd=tmp_path
     )
@@ -150,7 +150,7 @@ def test_while_something_makes_another_exception_of_it(tmp_path, other):
         "sys.meta_path.insert(0, Stop())\n"
         "main()"
     )
-    words = ["map", "--velocities", "0.1", "--starts", "2", "--over", "friction", "--values", "1", "--window", "2"]
+    words = ["map", "--velocities", "0.1", "--starts", "2", "--over", "friction", "--values", "1", "--observation time", "2"]
     done = subprocess.run(
         [sys.executable, "-c", script, *words, "--out", str(tmp_path)], env=ENVIRONMENT, capture_output=True, timeout=60
     )
@@ -180,7 +180,7 @@ CTRL_C = signal.SIGINT, True
 @pytest.mark.slow
 @pytest.mark.parametrize(("by", "group"), few_of([(signal.SIGTERM, False), CTRL_C], CTRL_C), ids=["SIGTERM", "ctrl-c"])
 def test_while_a_film_is_written(tmp_path, by, group):
-    stopped(started("render", "--window", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
+    stopped(started("render", "--observation time", "200", "--out", str(tmp_path), until=tmp_path / ".part-*.mp4"), by, group)
     assert [path.name for path in tmp_path.iterdir()] == ["ldvs-V-0.3-1.nc"]
 
 

@@ -13,15 +13,15 @@ from hexmj.stability import walk_margin
 from hexmj.studies.static_limit.distances import distances
 from hexmj.studies.static_limit.figure import static_limit_figure
 from hexmj.studies.static_limit.study import StaticLimit
-from hexmj.sweeps import Cell, conduct
+from hexmj.sweep import Cell, run_study
 
-FEW: dict[str, Any] = {"n_starts": 12, "window": "start"}
+FEW: dict[str, Any] = {"n_starts": 12, "observation_time": "start"}
 
 
 @pytest.fixture(scope="module")
 def slower(tmp_path_factory):
     folder = tmp_path_factory.mktemp("converge")
-    return folder, conduct(StaticLimit(LDVS, vps=(400.0, 100.0, 25.0), **FEW), folder)
+    return folder, run_study(StaticLimit(LDVS, vps=(400.0, 100.0, 25.0), **FEW), folder)
 
 
 @pytest.mark.thorough
@@ -39,7 +39,7 @@ def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
 
 @pytest.mark.slow
 def test_the_feet_at_the_ground_give_the_planned_answer_where_those_that_carry_do_not(slower):
-    """With 30 starts over the window `walk` at 20 mm/s: 0.467 planned, 0.600 carried, 0.467 at the ground."""
+    """With 30 starts over the observation time `walk` at 20 mm/s: 0.467 planned, 0.600 carried, 0.467 at the ground."""
     _, result = slower
     slow = result.sel(vp=25.0)
     assert (abs(slow.grounded - slow.kinematic) <= abs(slow.measured - slow.kinematic)).all()
@@ -115,7 +115,7 @@ def test_finished_walks_are_not_walked_again(slower, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
     told: list[float] = []
     part = StaticLimit(LDVS, vps=(100.0, 25.0), leg_masses=(0.01,), **FEW)
-    again = conduct(part, folder, progress=told.append)
+    again = run_study(part, folder, progress=told.append)
     assert again.equals(result.sel(leg_mass=[0.01], vp=[100.0, 25.0]))
     assert sum(told) == pytest.approx(1.0)
 
@@ -131,7 +131,7 @@ def test_who_reads_the_legs_is_measured_against_what_these_are_told():
 @pytest.mark.thorough
 def test_a_controller_may_read_the_legs(slower):
     few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
-    reading, alone = conduct(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
+    reading, alone = run_study(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
     assert np.array_equal(reading.planned_loss, alone.planned_loss)  # on paper nothing is read
     assert not np.array_equal(reading.margin, alone.margin)
 
@@ -144,7 +144,7 @@ def test_a_controller_may_read_the_legs(slower):
         ({"leg_masses": ()}, "leg_masses = .*; expected at least one, and none of them twice"),
         ({"vps": (0.0,)}, "vp = 0.0; expected above 0.1"),
         ({"velocity": 1.0}, "0 <= V < 1"),
-        ({"window": "long"}, "valid names: walk, start"),
+        ({"observation_time": "long"}, "valid names: walk, start"),
         (
             {"conditions": Conditions(vp=20.0)},
             "vp = 20.0; expected 80.0: vps has all that are tried",
@@ -162,7 +162,7 @@ def test_what_makes_no_sense_is_refused(wrong, said):
 
 @pytest.mark.thorough
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
-    words = ("converge", "--vps", 100, 50, "--starts", 4, "--window", 10, "--out", tmp_path)
+    words = ("converge", "--vps", 100, 50, "--starts", 4, "--observation time", 10, "--out", tmp_path)
     code, text, _ = run(*words, "--json")
     assert code == 0
     answer = json.loads(text)

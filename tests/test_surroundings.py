@@ -15,8 +15,8 @@ from hexmj.cli import machine_checks
 from hexmj.controllers.checked_plans import said
 from tiers import few_of
 
-WALK = ("walk", "--physical", "--window", "1")
-FEW = ("flss", "--velocities", "0.5", "--starts", "3", "--window", "start")
+WALK = ("walk", "--physical", "--observation time", "1")
+FEW = ("flss", "--velocities", "0.5", "--starts", "3", "--observation time", "start")
 
 
 def done_with(words: tuple[str, ...], **around: str) -> subprocess.CompletedProcess[str]:
@@ -44,7 +44,7 @@ def test_where_nothing_tells_of_processes_a_sentence_does(run, monkeypatch, tmp_
 @cache
 def flss_in(columns: str) -> str:
     """What `flss` prints in a terminal of so many columns."""
-    return done_with(("flss", "--velocities", "0.5", "--starts", "4", "--window", "5"), COLUMNS=columns).stdout
+    return done_with(("flss", "--velocities", "0.5", "--starts", "4", "--observation time", "5"), COLUMNS=columns).stdout
 
 
 @pytest.mark.parametrize("columns", ["1", "7", "39"])
@@ -97,7 +97,7 @@ def test_numbers_for_libraries_that_are_none(name: str, number: str):
 
 @pytest.mark.slow
 def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
-    words = "render", "--window", "1", "--out", str(tmp_path / "film")
+    words = "render", "--observation time", "1", "--out", str(tmp_path / "film")
     done = done_with(words, PYGLFW_LIBRARY="/nonexistent", MUJOCO_GL="")
     assert done.returncode == 1
     assert "Nothing can be rendered here (MuJoCo found no GLFW, as where PYGLFW_LIBRARY leads to none)" in done.stderr
@@ -108,7 +108,7 @@ def test_a_film_without_glfw_is_a_sentence(tmp_path: Path):
 def test_who_draws_nothing_needs_no_gl_and_who_draws_gets_a_sentence(wish: str, tmp_path: Path):
     done = done_with((*WALK, "--out", str(tmp_path / "walk")), MUJOCO_GL=wish)
     assert done.returncode == 0, done.stderr
-    done = done_with(("render", "--window", "1", "--out", str(tmp_path / "film")), MUJOCO_GL=wish)
+    done = done_with(("render", "--observation time", "1", "--out", str(tmp_path / "film")), MUJOCO_GL=wish)
     if done.returncode:  # OSMesa may be there
         assert done.returncode == 1
         assert done.stderr.startswith("hexmj: Nothing can be rendered here (")
@@ -170,5 +170,5 @@ def test_no_thread_is_a_sentence(run: Any, monkeypatch: pytest.MonkeyPatch):
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr(threading.Thread, "start", no_thread)
-    code, _, error = run("flss", "--velocities", "0.5", "--starts", 3, "--window", "start")
+    code, _, error = run("flss", "--velocities", "0.5", "--starts", 3, "--observation time", "start")
     assert (code, error) == (2, "hexmj: the memory, or a limit of processes, does not suffice for a thread\n")

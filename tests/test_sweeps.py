@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from hexmj.errors import InputError
-from hexmj.sweeps import Cell, conduct, finish, over_axes, run
+from hexmj.sweep import Cell, run_study, finished_cells, over_axes, run_cells
 from hexmj.user_code.loaded import importable
 from left_by_cells import calls, contents
 from small_cells import (
@@ -43,9 +43,9 @@ def test_the_bits_are_the_same_here_in_threads_in_processes_and_again(tmp_path: 
     cells = odd_cells()
     with ThreadPoolExecutor(3) as threads:
         ways = {"here": None, "threads": threads, "processes": spawned}
-        found = {way: run(cells, tmp_path / way, executor=executor) for way, executor in ways.items()}
-        found |= {f"{way}, not kept": run(cells, executor=executor) for way, executor in ways.items()}
-    found["again"] = run(cells, tmp_path / "here")
+        found = {way: run_cells(cells, tmp_path / way, executor=executor) for way, executor in ways.items()}
+        found |= {f"{way}, not kept": run_cells(cells, executor=executor) for way, executor in ways.items()}
+    found["again"] = run_cells(cells, tmp_path / "here")
     for one in found.values():
         assert_same_bits(one, direct)
     assert contents(tmp_path / "here") == contents(tmp_path / "threads") == contents(tmp_path / "processes")
@@ -57,13 +57,13 @@ def test_a_users_object_travels_to_a_process_of_its_own(tmp_path: Path, spawned:
     tripod = importable(tmp_path / "mine.py").Tripod(2.0)
     cells = [Cell(f"{n} steps", of_object, {"controller": tripod, "n": n}) for n in (2, 3)]
     cells.append(Cell("its own", of_object, {"controller": importable(tmp_path / "mine.py").Tripod(3.0), "n": 4}))
-    assert_same_bits(run(cells, tmp_path / "kept", executor=spawned), run(cells))
+    assert_same_bits(run_cells(cells, tmp_path / "kept", executor=spawned), run_cells(cells))
 
 
 def test_what_a_caller_throws_away_nobody_holds() -> None:
     with ThreadPoolExecutor(1) as executor:
         held = list[weakref.ref[xr.Dataset]]()
-        for _, data in finish(odd_cells(), executor=executor):
+        for _, data in finished_cells(odd_cells(), executor=executor):
             held.append(weakref.ref(data))
             del data
             gc.collect()
@@ -73,22 +73,22 @@ def test_what_a_caller_throws_away_nobody_holds() -> None:
 
 def test_what_cannot_travel_is_refused_in_one_sentence(spawned: Executor) -> None:
     with pytest.raises(InputError, match="a cannot be sent to another process: "):
-        run([Cell("a", lambda: xr.Dataset(), {})], executor=spawned)
+        run_cells([Cell("a", lambda: xr.Dataset(), {})], executor=spawned)
 
 
 def test_what_a_worker_s_error_tells_is_told(spawned: Executor) -> None:
     with pytest.raises(RuntimeError, match=r"^OfALeg: leg 3 slips$"):
-        run([Cell("slips", slips, {"leg": 3})], executor=spawned)
+        run_cells([Cell("slips", slips, {"leg": 3})], executor=spawned)
     with ThreadPoolExecutor(1) as threads, pytest.raises(OfALeg):
-        run([Cell("slips", slips, {"leg": 3})], executor=threads)
+        run_cells([Cell("slips", slips, {"leg": 3})], executor=threads)
 
 
 def test_a_cell_is_told_how_only_if_it_asks(spawned: Executor) -> None:
     cells = [Cell("asks", told_how, {"seed": 1}), Cell("does not", odd_bits, {"seed": 1})]
-    assert run(cells)[0].threads == -1
-    assert run(cells, threads=3)[0].threads == 3
-    assert run(cells, executor=spawned)[0].threads == 1
-    assert run(cells, executor=spawned, threads=2)[0].threads == 2
+    assert run_cells(cells)[0].threads == -1
+    assert run_cells(cells, threads=3)[0].threads == 3
+    assert run_cells(cells, executor=spawned)[0].threads == 1
+    assert run_cells(cells, executor=spawned, threads=2)[0].threads == 2
 
 
 @pytest.mark.parametrize("kept", [True, False])
@@ -98,7 +98,7 @@ def test_progress_adds_up_to_one_by_shares_of_the_work(tmp_path: Path, kept: boo
     for again in (False, True):
         told: list[float] = []
         with ThreadPoolExecutor(1) as executor:
-            run(cells, tmp_path if kept else None, executor=executor if pool else None, progress=told.append)
+            run_cells(cells, tmp_path if kept else None, executor=executor if pool else None, progress=told.append)
         assert sum(told) == pytest.approx(1.0)
         assert len(told) == (2 if pool or (kept and again) else 8)
         assert max(told) == pytest.approx(0.75 if len(told) == 2 else 0.1875)
@@ -106,9 +106,9 @@ def test_progress_adds_up_to_one_by_shares_of_the_work(tmp_path: Path, kept: boo
 
 def test_nothing_finished_is_computed_again(tmp_path: Path, spawned: Executor) -> None:
     cells = counted_cells(tmp_path)
-    run(cells[:3], tmp_path / "kept")
-    run(cells, tmp_path / "kept", executor=spawned)
-    again = run(cells[::-1], tmp_path / "kept")
+    run_cells(cells[:3], tmp_path / "kept")
+    run_cells(cells, tmp_path / "kept", executor=spawned)
+    again = run_cells(cells[::-1], tmp_path / "kept")
     assert sorted(calls(tmp_path)) == [f"{i}" for i in range(6)]
     assert [float(one.number) for one in again] == [5.0, 4.0, 3.0, 2.0, 1.0, 0.0]
 
@@ -133,9 +133,9 @@ class Products:
 
 @pytest.mark.slow
 def test_cells_stand_along_their_axes_in_order(tmp_path: Path) -> None:
-    data = conduct(Products(), tmp_path)
+    data = run_study(Products(), tmp_path)
     assert data.y.dims == ("height", "speed", "x")
     height, speed = data.height.values[:, None, None], data.speed.values[:, None]
     assert np.array_equal(data.y, height * np.arange(3.0) + speed)
-    assert conduct(Products(), tmp_path).identical(data)
+    assert run_study(Products(), tmp_path).identical(data)
     assert len(contents(tmp_path)) == 6

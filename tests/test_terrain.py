@@ -32,10 +32,10 @@ from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.physics.settling import settle
 from hexmj.replay.film.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
-from hexmj.storage.attributes import settings
+from hexmj.io import settings
 from hexmj.studies.terrain.figure import terrain_figure
 from hexmj.studies.terrain.study import FARTHER, Terrain, reach
-from hexmj.sweeps import Cell, conduct
+from hexmj.sweep import Cell, run_study
 
 GROUNDS = {
     "flat": Conditions(),
@@ -67,7 +67,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def few(folder) -> xr.Dataset:
-    return conduct(Terrain(LDVS, **FEW), folder)
+    return run_study(Terrain(LDVS, **FEW), folder)
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
@@ -170,7 +170,7 @@ def test_the_distance_is_what_was_walked_in_whole_steps():
         "heights": (0.1,),
         "grasps": (0.0,),
     }
-    flat = conduct(Terrain(LDVS, **told)).sel(obstacle="flat").squeeze()
+    flat = run_study(Terrain(LDVS, **told)).sel(obstacle="flat").squeeze()
     duration = flat.attrs["distance"] / 0.4
     starts = draw_starts(3, 0, told["stride"])
     walk = physical_walk(starts, LDVS, 0.4, duration, stride=told["stride"], threads=1)
@@ -182,19 +182,19 @@ def test_the_distance_is_what_was_walked_in_whole_steps():
 
 def test_what_is_finished_is_not_walked_again(few, folder, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
-    xr.testing.assert_identical(conduct(Terrain(LDVS, **FEW), folder), few)
+    xr.testing.assert_identical(run_study(Terrain(LDVS, **FEW), folder), few)
 
 
 def test_where_nothing_is_reached_there_is_no_frequency():
     """At V = 0.95 this start falls at once."""
-    alone = conduct(Terrain(LDVS, **FEW | {"n_starts": 1, "seed": 1, "velocities": (0.95,)}))
+    alone = run_study(Terrain(LDVS, **FEW | {"n_starts": 1, "seed": 1, "velocities": (0.95,)}))
     assert (alone.reached == 0).all() and np.isnan(alone.flss).all()
 
 
 @pytest.mark.thorough
 def test_a_controller_may_read_the_legs(few):
     """It goes another way, not only at the step, and all its starts are counted."""
-    reading = conduct(Terrain(ReadsLegs(LDVS), **FEW))
+    reading = run_study(Terrain(ReadsLegs(LDVS), **FEW))
     assert reading.sizes == few.sizes and np.isfinite(reading.flss).all()
     assert not np.array_equal(reading.speed, few.speed)
 
@@ -262,7 +262,7 @@ def test_sizes_that_differ_at_all_are_two_obstacles():
     assert [*terrain.obstacles] == ["flat", "step 0.3 mm", "step 0.30000000000000004 mm"]
 
 
-@pytest.mark.parametrize("option", ["window", "acceleration", "initial-velocity", "ground", "ground-height", "grasp"])
+@pytest.mark.parametrize("option", ["observation_time", "acceleration", "initial-velocity", "ground", "ground-height", "grasp"])
 def test_the_command_offers_no_option_that_it_does_not_obey(run, tmp_path, option):
     code, _, error = run("terrain", f"--{option}", 1, "--out", tmp_path / "out")
     assert code == 2

@@ -11,7 +11,7 @@ import tomli_w
 
 import hexmj
 from hexmj.controllers.toml_fields import with_fields
-from hexmj.sweeps.plain_settings import plain
+from hexmj.plain import plain
 
 KINDS = """
 from __future__ import annotations

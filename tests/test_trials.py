@@ -55,7 +55,7 @@ def test_grounds_lie_as_the_body_is_large() -> None:
 
 def test_grounds_that_no_leg_of_a_larger_body_gets_to_are_no_trials() -> None:
     for body, expected in ((STICK_INSECT, True), (LARGER, False)):
-        league = League({"ldvs": Entrant(hexmj.LDVS)}, window=300.0, conditions=Conditions(body=body))
+        league = League({"ldvs": Entrant(hexmj.LDVS)}, observation_time=300.0, conditions=Conditions(body=body))
         tried = [name for name, *_ in league._tried(Entrant(hexmj.LDVS))]
         assert ("step" in tried, "load" in tried) == (expected, True), "90 mm are walked"
 

@@ -16,7 +16,7 @@ import hexmj
 from hexmj.errors import InputError
 from hexmj.storage.files import write_whole
 from hexmj.storage.locks import locked
-from hexmj.storage.results import save_dataset
+from hexmj.io import save
 
 
 def command(*words: str) -> subprocess.Popen[bytes]:
@@ -36,7 +36,7 @@ def test_many_writers_of_one_file_leave_one_whole_file(tmp_path):
 
 @pytest.mark.thorough
 def test_two_commands_write_the_same_folder(tmp_path):
-    words = ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--window", "20", "--no-video")
+    words = ("compare", "--models", "ldvs", "--velocities", "0.5", "--starts", "4", "--observation time", "20", "--no-video")
     both = [command(*words, "--json", "--out", str(tmp_path)) for _ in range(2)]
     answers = [one.communicate() for one in both]
     assert [one.returncode for one in both] == [0, 0], answers
@@ -96,5 +96,5 @@ def test_a_lock_that_is_a_link_empties_no_file(tmp_path, link):
 def test_what_a_killed_writer_left_is_in_nobody_s_way(tmp_path):
     (tmp_path / ".part-0123.nc").write_bytes(b"half")
     data = xr.Dataset({"x": ("n", [1.0])})
-    save_dataset(data, tmp_path / "data.nc")
+    save(data, tmp_path / "data.nc")
     assert xr.load_dataset(tmp_path / "data.nc", engine="h5netcdf").identical(data)

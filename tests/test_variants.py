@@ -16,10 +16,10 @@ from hexmj.legs import CENTRED
 from hexmj.search.samples import Sample
 from hexmj.studies.variants.figure import STYLES, variants_figure
 from hexmj.studies.variants.study import Variants, notes
-from hexmj.sweeps import Cell, conduct
+from hexmj.sweep import Cell, run_study
 from hexmj.variants import VARIANTS, instead, variants, varied
 
-SMALL: dict[str, Any] = {"velocities": (0.5, 0.7), "n_starts": 60, "window": "start", "seed": 4}
+SMALL: dict[str, Any] = {"velocities": (0.5, 0.7), "n_starts": 60, "observation_time": "start", "seed": 4}
 SETS = {"hws": (HWS, HWS), "own-V": (hexmj.PRESETS["own-0.5"], hexmj.PRESETS["own-0.7"])}
 
 
@@ -41,13 +41,13 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(folder):
-    return conduct(Variants(SETS, **SMALL), folder)
+    return run_study(Variants(SETS, **SMALL), folder)
 
 
 @pytest.mark.slow
 def test_a_figure_tells_of_the_stride_what_is_not_usual(result):
     assert "lines of the tips" not in variants_figure(result).get_suptitle()
-    other = conduct(Variants(SETS, **SMALL, stride=Stride(geometry=CENTRED, aep0=9.5)))
+    other = run_study(Variants(SETS, **SMALL, stride=Stride(geometry=CENTRED, aep0=9.5)))
     title = variants_figure(other).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
     assert "AEP$_0$ = 9.5 mm, other lines of the tips" in title
 
@@ -93,8 +93,8 @@ def test_a_row_says_what_is_walked_where_a_set_has_the_variant_anyway():
     assert instead(LDVS, "lasting") == instead(Stride(), "dt 0.2") == {}
     lasting, sums = hexmj.PRESETS["lasting"], replace(LDVS, reading=Reading(ipsilateral="lasting", cap="sum"))
     assert instead(ReadsLegs(sums), "lasting") == {"ipsilateral": "standing"}
-    few: dict[str, Any] = {"n_starts": 2, "window": 3.0, "stride": Stride(dt=0.05, geometry=CENTRED)}
-    walked = conduct(Variants({"ldvs": (LDVS, LDVS), "own": (LDVS, lasting)}, (0.3, 0.5), **few))
+    few: dict[str, Any] = {"n_starts": 2, "observation_time": 3.0, "stride": Stride(dt=0.05, geometry=CENTRED)}
+    walked = run_study(Variants({"ldvs": (LDVS, LDVS), "own": (LDVS, lasting)}, (0.3, 0.5), **few))
     told = {
         (name, variant, v): note
         for name in ("ldvs", "own")
@@ -122,7 +122,7 @@ def test_the_usual_variant_is_plain_flss(result):
     same = {"flss": "flss", "flss_low": "low", "flss_high": "high", "duration": "duration"}
     for name, networks in SETS.items():
         for network, v in zip(networks, SMALL["velocities"], strict=True):
-            plain = hexmj.flss(network, [v], **{key: SMALL[key] for key in ("n_starts", "window", "seed")})
+            plain = hexmj.flss(network, [v], **{key: SMALL[key] for key in ("n_starts", "observation_time", "seed")})
             one = result.sel(network=name, velocity=v, variant="usual")
             for ours, theirs in same.items():
                 assert one[ours].item() == plain[theirs].item()
@@ -130,7 +130,7 @@ def test_the_usual_variant_is_plain_flss(result):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_every_variant_is_plain_flss_of_what_it_changes(result, variant):
-    how = {key: SMALL[key] for key in ("n_starts", "window", "seed")}
+    how = {key: SMALL[key] for key in ("n_starts", "observation_time", "seed")}
     expected = hexmj.flss(varied(HWS, variant), [0.7], stride=varied(Stride(), variant), **how).flss.item()
     assert result.flss.sel(network="hws", velocity=0.7, variant=variant).item() == expected
 
@@ -138,12 +138,12 @@ def test_every_variant_is_plain_flss_of_what_it_changes(result, variant):
 @pytest.mark.parametrize(("over", "name"), [("mean", "mean"), ("worst", "worst")])
 def test_a_search_over_variants_costs_what_the_study_counts(result, over, name):
     form = NetworkForm("general")
-    sample = Sample(Problem(form, 0.5, 0.5, SMALL["window"], over=over), SMALL["n_starts"], SMALL["seed"])
+    sample = Sample(Problem(form, 0.5, 0.5, SMALL["observation_time"], over=over), SMALL["n_starts"], SMALL["seed"])
     sets = {key: networks[0] for key, networks in SETS.items()}
     expected = result[name].sel(velocity=0.5)
     costs = sample.costs(np.array([form.vector(one) for one in sets.values()]))
     np.testing.assert_allclose(costs, expected.sel(network=list(sets)).values, rtol=1e-12)
-    verdict = sample.verdict(sets).sel(window=SMALL["window"])
+    verdict = sample.verdict(sets).sel(observation_time=SMALL["observation_time"])
     for ours, theirs in {"flss": name, "flss_low": f"{name}_low", "flss_high": f"{name}_high"}.items():
         np.testing.assert_allclose(verdict[ours].values, result[theirs].sel(velocity=0.5).values, rtol=1e-12)
 
@@ -160,10 +160,10 @@ def test_mean_and_worst_are_of_the_variants(result):
 
 def test_what_is_finished_is_not_walked_again(result, folder, monkeypatch):
     monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
-    assert conduct(Variants(SETS, **SMALL), folder).identical(result)
+    assert run_study(Variants(SETS, **SMALL), folder).identical(result)
     others: dict[str, Any] = {**SMALL, "seed": 1}
     with pytest.raises(pytest.fail.Exception, match="walked again"):
-        conduct(Variants(SETS, **others), folder)
+        run_study(Variants(SETS, **others), folder)
 
 
 def test_the_figure_tells_what_was_counted_as_far_as_it_is_known(result):
@@ -202,11 +202,11 @@ def test_marks_are_whole_in_the_figure_where_nobody_or_everybody_loses(result, t
 def test_the_insect_walks_the_variants_that_its_legs_reach():
     """On paper the other one is walked too."""
     assert set(variants()) - set(variants(physical=True)) == {"AEP0 11"}
-    few: dict[str, Any] = {"velocities": (0.7,), "n_starts": 2, "window": 20.0}
-    walked = conduct(Variants({"ldvs": (LDVS,)}, conditions=Conditions(vp=200.0), **few))
+    few: dict[str, Any] = {"velocities": (0.7,), "n_starts": 2, "observation_time": 20.0}
+    walked = run_study(Variants({"ldvs": (LDVS,)}, conditions=Conditions(vp=200.0), **few))
     assert walked.variant.values.tolist() == variants(physical=True)
     assert notes(walked)[0] == "without AEP0 11, which the stick insect's legs do not reach on their usual lines"
-    alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, window=20.0, conditions=Conditions(vp=200.0))
+    alone = hexmj.physical_flss(LDVS, [0.7], n_starts=2, observation_time=20.0, conditions=Conditions(vp=200.0))
     assert walked.flss.sel(variant="usual").item() == alone.flss.item()
 
 
@@ -224,9 +224,9 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(InputError, match=r"variant PEP0 -11: pep_min = -10.5, pep0 = -11.0"):
         Variants({"ldvs": (LDVS,)}, (0.1,), stride=Stride(pep_min=-10.5, pep0=-10.0))
     with pytest.raises(InputError, match=r"variant dt 0.2: .*expected at least one step, 0.2"):
-        Variants({"ldvs": (LDVS,)}, (0.1,), window=0.12)
+        Variants({"ldvs": (LDVS,)}, (0.1,), observation_time=0.12)
     with pytest.raises(InputError, match=r"^.*expected at least one step, 0.1") as plain:
-        Variants({"ldvs": (LDVS,)}, (0.1,), window=0.05)
+        Variants({"ldvs": (LDVS,)}, (0.1,), observation_time=0.05)
     assert "variant" not in str(plain.value)
     with pytest.raises(InputError, match="variant 'bogus'; valid names: usual, centred"):
         varied(LDVS, "bogus")
@@ -240,7 +240,7 @@ def test_a_set_for_each_velocity_is_expected(networks):
 
 @pytest.mark.thorough
 def test_the_command_marks_what_is_walked_otherwise(run, tmp_path):
-    words = ["variants", "--models", "lasting", "ldvs", "--velocities", 0.3, "--starts", 2, "--window", 3]
+    words = ["variants", "--models", "lasting", "ldvs", "--velocities", 0.3, "--starts", 2, "--observation time", 3]
     code, out, _ = run(*words, "--out", tmp_path)
     (row,) = (line.split() for line in out.splitlines() if line.split()[:1] == ["lasting"] and "(" not in line)
     assert code == 0
@@ -253,7 +253,7 @@ def test_the_command_marks_what_is_walked_otherwise(run, tmp_path):
 
 @pytest.mark.thorough
 def test_the_command(run, result, tmp_path):
-    words = ["variants", "--models", "hws", "own-V", "--velocities", 0.5, 0.7, "--starts", 60, "--window", "start"]
+    words = ["variants", "--models", "hws", "own-V", "--velocities", 0.5, 0.7, "--starts", 60, "--observation time", "start"]
     code, out, _ = run(*words, "--seed", 4, "--json", "--out", tmp_path)
     told = json.loads(out)
     assert code == 0

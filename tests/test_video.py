@@ -296,7 +296,7 @@ def test_without_what_encodes_films_it_is_said_what_brings_it(fallen, tmp_path, 
     monkeypatch.setitem(sys.modules, "mediapy", None)
     with pytest.raises(RenderingError, match=r'pip install "\.\[film\]"'):
         render([fallen], tmp_path / "film.mp4")
-    code, _, error = run("render", "--window", "5", "--out", tmp_path / "out")
+    code, _, error = run("render", "--observation time", "5", "--out", tmp_path / "out")
     assert code == 1 and 'pip install ".[film]"' in error
     assert not list(tmp_path.iterdir())
 

@@ -18,7 +18,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998, Symmetric
 from hexmj.controllers.named import load_controller
 from hexmj.measures.physical import physical_walk
-from hexmj.process import progress
+from hexmj import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
 from hexmj.view import live
@@ -152,7 +152,7 @@ def test_a_screen_that_is_not_there_is_a_sentence(run, monkeypatch):
     monkeypatch.setenv("DISPLAY", ":4321")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     code, _, error = run("view")
-    sentence = "hexmj: no window can be opened (DISPLAY = :4321); --browser shows it in a browser\n"
+    sentence = "hexmj: no observation time can be opened (DISPLAY = :4321); --browser shows it in a browser\n"
     assert (code, error) == (1, sentence)
 
 

@@ -21,7 +21,7 @@ PNG = b"\x89PNG"
 
 @pytest.mark.thorough
 def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
-    words = ["compare", "--velocities", 0.4, 0.6, "--starts", 12, "--window", "start", "--json", "--no-video"]
+    words = ["compare", "--velocities", 0.4, 0.6, "--starts", 12, "--observation time", "start", "--json", "--no-video"]
     answers, datasets = [], []
     for threads in (1, 2):
         out = tmp_path / str(threads)
@@ -49,7 +49,7 @@ def test_compare_writes_the_same_bits_with_one_and_two_threads(run, tmp_path):
 def test_compare_makes_a_video_of_a_gait_and_its_tables_break_no_name(run, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = run(
-        *("compare", "--models", "ldvs", "uncoordinated", "--velocities", 0.5, "--starts", 4, "--window", 30),
+        *("compare", "--models", "ldvs", "uncoordinated", "--velocities", 0.5, "--starts", 4, "--observation time", 30),
         *("--out", tmp_path),
     )
     assert code == 0
@@ -70,7 +70,7 @@ def test_without_rendering_compare_still_delivers(tmp_path):
         "0.5",
         "--starts",
         "4",
-        "--window",
+        "--observation time",
         "20",
         "--out",
         str(tmp_path),
@@ -93,12 +93,12 @@ def test_controllers_that_are_called_as_what_stands_beside_them_are_refused(run,
 
 @pytest.mark.slow
 def test_physical_flss(run, tmp_path):
-    words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--window", "start"]
+    words = ["flss", "--physical", "--vp", 200, "--velocities", 0.5, "--starts", 10, "--observation time", "start"]
     code, text, _ = run(*words, "--json", "--out", tmp_path)
     answer = json.loads(text)
     assert code == 0
     conditions = hexmj.Conditions(vp=200.0)
-    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=10, window="start", conditions=conditions)
+    expected = hexmj.physical_flss(hexmj.LDVS, [0.5], n_starts=10, observation_time="start", conditions=conditions)
     assert answer["flss"] == expected.flss.values.tolist()
     assert answer["settings"]["conditions"]["vp"] == 200.0
     assert xr.load_dataset(tmp_path / "flss.nc").flss.values.tolist() == answer["flss"]
@@ -109,7 +109,7 @@ def test_physical_flss(run, tmp_path):
 
 def test_accelerated_flss(run):
     code, text, _ = run(
-        "flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--window", "start", "--json"
+        "flss", "--velocities", 0.3, "--starts", 50, "--acceleration", 0.001, "--observation time", "start", "--json"
     )
     assert code == 0
     assert json.loads(text)["duration"] == [pytest.approx(240.0)]
@@ -117,7 +117,7 @@ def test_accelerated_flss(run):
 
 @pytest.mark.parametrize("physical", [False, True])
 def test_walk(run, tmp_path, physical):
-    words = ["walk", "--velocity", 0.5, "--window", 40, "--start", 3, "--json", "--out", tmp_path]
+    words = ["walk", "--velocity", 0.5, "--observation time", 40, "--start", 3, "--json", "--out", tmp_path]
     code, text, _ = run(*words, *(["--physical"] if physical else []))
     assert code == 0
     answer = json.loads(text)
@@ -129,7 +129,7 @@ def test_walk(run, tmp_path, physical):
 
 
 def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
-    words = ["walk", "--velocity", 0.5, "--window", 16, "--step-height", 6, "--vp", 40, "--out", tmp_path]
+    words = ["walk", "--velocity", 0.5, "--observation time", 16, "--step-height", 6, "--vp", 40, "--out", tmp_path]
     assert run(*words)[0] == 0
     recording = xr.load_dataset(tmp_path / "recording.nc")
     lift = np.ptp(recording.planned_tip.sel(coordinate="z").values)
@@ -140,7 +140,7 @@ def test_the_puppet_of_a_plan_obeys_the_path_of_its_feet(run, tmp_path):
 @pytest.mark.slow
 @drawing
 def test_render_from_a_recording_and_side_by_side(run, tmp_path):
-    walk = ["--velocity", 0.5, "--window", 16]
+    walk = ["--velocity", 0.5, "--observation time", 16]
     run("walk", *walk, "--physical", "--out", tmp_path / "walk")
     for name, words, width in (
         ("ldvs-V-0.5", [tmp_path / "walk" / "recording.nc"], 320),
@@ -166,7 +166,7 @@ def test_render_from_a_recording_and_side_by_side(run, tmp_path):
 
 @drawing
 def test_what_takes_the_place_of_another_is_told_before_it_does(run, tmp_path, monkeypatch):
-    words = ["render", "--velocity", 0.5, "--window", 3, "--beside", "planned", "--width", 160, "--height", 120]
+    words = ["render", "--velocity", 0.5, "--observation time", 3, "--beside", "planned", "--width", 160, "--height", 120]
     assert run(*words, "--out", tmp_path)[0] == 0
 
     def full(*_):
@@ -198,7 +198,7 @@ class Drifts:
 def test_the_plan_that_is_filmed_beside_an_insect_is_its_own(run, tmp_path):
     """Of a controller that plans otherwise when it begins for the third time."""
     (tmp_path / "drifts.py").write_text(DRIFTS)
-    words = ["--velocity", 0.5, "--window", 3, "--beside", "planned", "--width", 160, "--height", 120]
+    words = ["--velocity", 0.5, "--observation time", 3, "--beside", "planned", "--width", 160, "--height", 120]
     code, _, error = run("render", "--model", f"{tmp_path / 'drifts.py'}:Drifts", *words, "--out", tmp_path / "films")
     assert code == 0, error
     planned, walked = (xr.load_dataset(path) for path in sorted((tmp_path / "films").glob("*.nc")))
@@ -207,7 +207,7 @@ def test_the_plan_that_is_filmed_beside_an_insect_is_its_own(run, tmp_path):
 
 
 def test_the_last_line_of_a_puppet_tells_what_it_obeys(run, tmp_path):
-    code, text, _ = run("walk", "--step-height", 5, "--window", 3, "--out", tmp_path)
+    code, text, _ = run("walk", "--step-height", 5, "--observation time", 3, "--out", tmp_path)
     assert code == 0
     assert "step_height 5.0" in text
     assert "friction" not in text

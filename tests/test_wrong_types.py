@@ -41,7 +41,7 @@ TABLE: Any = xr.Dataset({"x": 1.0})
 ANY: Any = None
 FEET = np.dstack([np.add.outer([0.0, 0.0], [28.0, 4.0, -20.0] * 2), np.broadcast_to(STRIDE.geometry.y, (2, 6))])
 STANDS = np.ones((2, 6), dtype=bool)
-FEW: Any = {"n_starts": 2, "window": 10.0}
+FEW: Any = {"n_starts": 2, "observation_time": 10.0}
 
 
 def walk(starts: Any = STARTS, controller: Any = LDVS, velocity: Any = 0.3, duration: Any = 5.0, **options: Any):
@@ -154,9 +154,9 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: flss(seed=True), "seed = True; expected a whole number of at least 0"),
     (lambda: flss(seed=0.0), "seed = 0.0; expected a whole number of at least 0"),
     (lambda: flss(seed=None), "seed = None; expected a whole number of at least 0"),
-    (lambda: flss(window=None), "window = None; expected a text or a number"),
-    (lambda: flss(window=True), "window = True; expected a text or a number"),
-    (lambda: flss(window=[10.0]), "window = [10.0]; expected a text or a number"),
+    (lambda: flss(observation_time=None), "observation time = None; expected a text or a number"),
+    (lambda: flss(observation_time=True), "observation time = True; expected a text or a number"),
+    (lambda: flss(observation_time=[10.0]), "observation time = [10.0]; expected a text or a number"),
     (lambda: flss(velocities="0.3"), "velocities = '0.3'; expected numbers"),
     (lambda: flss(velocities=[True]), "velocities = [True]; expected numbers"),
     (lambda: flss(velocities=None), "velocities = None; expected numbers"),
@@ -220,7 +220,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: compare(acceleration=0), "acceleration = 0; expected an Acceleration or None"),
     (lambda: compare(n_starts=1.5), "n_starts = 1.5; expected a whole number"),
     (lambda: compare(seed=True), "seed = True; expected a whole number"),
-    (lambda: compare(window=None), "window = None; expected a text or a number"),
+    (lambda: compare(observation_time=None), "observation time = None; expected a text or a number"),
     (lambda: compare(controllers=3), "controller = 3; expected a controller"),
     (lambda: compare(controllers={"a": 3}), "controller = 3; expected a controller"),
     (lambda: Comparison(LDVS), "controllers = Cruse1998("),
@@ -356,20 +356,20 @@ def test_numbers_of_numpy_are_numbers():
     """And stand in settings as Python's own."""
     for both in (flss(velocities=[0.3, 0.5]).velocity, namedtuple("Two", "one values")(0.3, 0.5)):
         assert compare(velocities=both).velocity.values.tolist() == [0.3, 0.5]
-    usual = flss(n_starts=30, seed=4, window=20.0, velocities=[0.5])
-    given = flss(n_starts=np.int64(30), seed=np.uint8(4), window=np.float64(20.0), velocities=np.array([0.5]))
+    usual = flss(n_starts=30, seed=4, observation_time=20.0, velocities=[0.5])
+    given = flss(n_starts=np.int64(30), seed=np.uint8(4), observation_time=np.float64(20.0), velocities=np.array([0.5]))
     assert given.equals(usual)
     assert json.dumps(given.attrs) == json.dumps(usual.attrs)
     assert type(hexmj.Conditions(ground=np.str_("rough")).ground) is str
     assert type(hexmj.Cruse1998(hexmj.LDVS.weights, name=np.str_("own")).name) is str
     assert flss(n_starts=3, velocities=np.array(0.5)).identical(flss(n_starts=3, velocities=0.5))
-    assert flss(n_starts=3, window=np.str_("start")).identical(flss(n_starts=3, window="start"))
+    assert flss(n_starts=3, observation_time=np.str_("start")).identical(flss(n_starts=3, observation_time="start"))
     assert hexmj.Conditions(vp=np.float32(40.0), ground_seed=np.int32(2)).values()["vp"] == 40.0
     stride = hexmj.Stride(dt=np.float32(0.25), geometry=hexmj.Geometry(origins=np.array([24, 0, -24])))  # pyright: ignore
     assert stride == hexmj.Stride(dt=0.25, geometry=hexmj.CENTRED)
     assert json.dumps(settings_of(replace(LDVS, weights=hexmj.Symmetric(np.float32(2.0)))))  # pyright: ignore
     assert np.array_equal(first_loss(threads=np.int64(1)), first_loss())
-    few: Any = {"window": 2.0, "threads": 1}
+    few: Any = {"observation_time": 2.0, "threads": 1}
     falls = hexmj.physical_flss(LDVS, [0.3], n_starts=np.int8(2), **few)  # pyright: ignore
     assert falls.identical(hexmj.physical_flss(LDVS, [0.3], n_starts=2, **few))
     assert one_start(walk(), np.int64(1)).x.shape == (50, 1, 6)  # pyright: ignore

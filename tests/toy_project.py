@@ -33,7 +33,7 @@ TOY = {
 
 PRINT_STEM = """
 from hexmj.user_code.loaded import importable
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 from toy.study import cell
 print(Cell("toy", cell, {"controller": importable("mine.py").Tripod()}).record())
 """

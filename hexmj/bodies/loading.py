@@ -18,7 +18,6 @@ from hexmj.body import Body
 from hexmj.conditions import ROUNDING, Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.storage.mjcf import content
 
 HOME_TOLERANCE = 1e-3
 """How far feet and centre of mass may be from where they shall be at home, in lengths of the shortest leg."""
@@ -43,7 +42,7 @@ def compile_body(
     timestep = body.longest_step if timestep is None else timestep
     if not 0 < timestep <= body.longest_step * (1.0 + ROUNDING):
         raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
-    compiled = _compiled(conditions, looks, pushes, content(body.mjcf))
+    compiled = _compiled(conditions, looks, pushes, body.mjcf.read_bytes())
     model = copy.copy(compiled.model)
     model.opt.timestep = timestep
     return replace(compiled, model=model)
@@ -55,7 +54,7 @@ def plain_model(body: Body) -> mujoco.MjModel:
     Raises:
         InputError: it does not compile, or it is not as described.
     """
-    return _plain_model(body, content(body.mjcf))
+    return _plain_model(body, body.mjcf.read_bytes())
 
 
 @lru_cache(maxsize=16)

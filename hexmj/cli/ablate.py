@@ -11,12 +11,12 @@ from tyro.conf import OmitArgPrefixes, arg
 from hexmj.cli.options import AS_THEY_ARE, STEADY, Accelerating, Controlled, Walks, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
-from hexmj.errors import check_distinct
+from hexmj.io import settings
 from hexmj.measures.captions import starts_in_words
-from hexmj.storage.attributes import settings
 from hexmj.studies.ablation import study
 from hexmj.studies.ablation.figure import ablation_figure
 from hexmj.studies.league.study import FRESH
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,13 +39,15 @@ class Ablate(StudyCommand):
     """Of these, number of starts that walk in physics; 100 unless given, at most all."""
     out: Path = Path("results/ablate")
     """Folder for figure, NetCDF, manifest and finished walks."""
-    walks: OmitArgPrefixes[Walks] = hiding(Walks(seed=FRESH), ["window"], "Windows are those of the measures.")
+    walks: OmitArgPrefixes[Walks] = hiding(
+        Walks(seed=FRESH), ["observation_time"], "Windows are those of the measures."
+    )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     controlled: OmitArgPrefixes[Controlled] = AS_THEY_ARE
     outputs = Outputs("walking without parts", "ablation.nc", {"ablation.png": ablation_figure})
 
     def study(self) -> study.Ablation:
-        check_distinct("models", self.models)
+        distinct("models", self.models)
         models = study.wholes(self.models)
         usual = min(study.Ablation.n_physical, max(1, self.starts))
         self.refuse_contact_gap(*(one for several in models.values() for one in several.values()))

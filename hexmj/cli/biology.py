@@ -11,7 +11,7 @@ from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hidin
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import table
 from hexmj.conditions import Conditions
-from hexmj.storage.results import save_text
+from hexmj.files import write_text
 from hexmj.studies.biology import study as biology
 from hexmj.studies.biology.figure import biology_figure
 from hexmj.studies.biology.table import HEADS, biology_markdown, rows
@@ -33,7 +33,7 @@ class Biology(StudyCommand):
     periods: int = biology.Biology.periods
     """Periods of a single leg that each start walks; the last three are measured."""
     out: Path = Path("results/biology")
-    walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "All walk so many periods.")
+    walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["observation_time"], "All walk so many periods.")
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), HIDDEN)
     outputs = Outputs("walking beside the animal", "biology.nc", {"biology.png": biology_figure}, others=(TABLE,))
@@ -55,9 +55,9 @@ class Biology(StudyCommand):
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
         yield table(HEADS, rows(result))
         yield f"starts with whole strides: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
-        walks = replace(self.walks, window=f"{self.periods} periods")
+        walks = replace(self.walks, observation_time=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The table as Markdown."""
-        return [save_text(biology_markdown(result), self.out / TABLE)]
+        return [write_text(self.out / TABLE, biology_markdown(result))]

@@ -1,10 +1,8 @@
 """The commands: what each does, and their options from the words of a command line."""
 
-from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from importlib import import_module
-from io import StringIO
 from operator import or_
 from types import SimpleNamespace
 from typing import Annotated, Any
@@ -12,13 +10,11 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import FlagCreatePairsOff, subcommand
 
-from hexmj.cli.command_words import shell
-from hexmj.cli.completion import completed
 from hexmj.version import __version__
 
 ABOUT = (
     "Controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice.\n\n"
-    "hexmj --version tells the version; hexmj --completion bash (zsh, fish) prints what completes words in a shell."
+    "hexmj --version tells the version; hexmj --tyro-print-completion bash (zsh) prints what completes words in a shell."
 )
 
 GOES_ON = "Repeat the command to go on"
@@ -75,8 +71,6 @@ def options_of(words: list[str]) -> Any:
     """The options of the command that is asked for; no other is imported then, and none that are only listed."""
     if words == ["--version"]:
         return SimpleNamespace(run=lambda: print(f"hexmj {__version__}"))
-    if words[:1] == ["--completion"]:
-        return SimpleNamespace(run=partial(_complete, shell(words[1:])))
     how: Any = {"config": (FlagCreatePairsOff,)}
     listed = words in (["--help"], ["-h"])
     if not listed:
@@ -92,13 +86,6 @@ def options_of(words: list[str]) -> Any:
     ]
     any_command: Any = reduce(or_, commands)
     return tyro.cli(any_command, prog="hexmj", description=ABOUT, args=words, **how)
-
-
-def _complete(shell: str) -> None:
-    """Print what makes the shell complete the words of `hexmj`."""
-    with redirect_stdout(StringIO()) as script, suppress(SystemExit):
-        options_of(["--tyro-write-completion", shell, "-"])
-    print(completed(script.getvalue(), COMMANDS))
 
 
 def _class(command: str) -> Any:

@@ -14,9 +14,9 @@ from hexmj.cli.recorded import recorded
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import four_digits, interval, physical_report, report_line, table
 from hexmj.errors import InputError, RenderingError
+from hexmj.io import settings
 from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, Comparison
 from hexmj.measures.figures import comparison_figure
-from hexmj.storage.attributes import settings
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -77,7 +77,7 @@ class Disturb(StudyCommand):
             self.adhesion,
             not self.kinematic,
             n_starts=self.starts,
-            window=self.walks.time,
+            observation_time=self.walks.time,
             **self.steady,
         )
         met, usual = {*study.disturbances, *study.strategies}, Disturb()
@@ -111,14 +111,14 @@ def _tables(result: "xr.Dataset", measure: str) -> "list[str | Table]":
     least = result[f"{measure}_reached"].min().item()
     parts: list[str | Table] = [
         f"{measure} FLSS from the disturbance on, at least {starts_in_words(least)}, with 95 % intervals"
-        + (", to the end of the window, which begins at full velocity again" if slow else ""),
-        _table(result.sel(window="whole").isel(case=shown), measure, interval),
+        + (", to the end of the observation time, which begins at full velocity again" if slow else ""),
+        _table(result.sel(observation_time="whole").isel(case=shown), measure, interval),
     ]
     if slow:
-        short = _table(result.sel(window="short").isel(case=slow), measure, interval)
-        parts += ["The same if the window begins with the disturbance", short]
+        short = _table(result.sel(observation_time="short").isel(case=slow), measure, interval)
+        parts += ["The same if the observation time begins with the disturbance", short]
     if answered:
-        buys = _table(result.sel(window="whole").isel(case=answered), f"{measure}_buys", difference)
+        buys = _table(result.sel(observation_time="whole").isel(case=answered), f"{measure}_buys", difference)
         parts += [f"What a strategy takes off the {measure} FLSS", buys]
     return parts
 

@@ -1,21 +1,20 @@
 """`hexmj flss`."""
 
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import four_digits, physical_report, print_json, report_line, save_figure, show, table
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
+from hexmj.io import MANIFEST, attributes, results_folder, save, save_manifest, settings
 from hexmj.starts import SAMPLE
-from hexmj.storage.attributes import attributes, settings
-from hexmj.storage.results import results_folder, save_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +60,7 @@ class Flss(WalkingCommand):
         controller = self.controlled.controller(self.model)
         self.refuse_contact_gap(controller)
         if self.out:
-            results_folder(self.out, ("flss.nc", self.drawn.named("flss.png"), MANIFEST))
+            results_folder(self.out)
         elif self.drawn != Figures():
             raise InputError(f"--format {self.drawn.format} without --out; expected it where a figure is written")
         result = self._measured(controller)
@@ -84,10 +83,10 @@ class Flss(WalkingCommand):
         from hexmj.measures.figures import flss_figure
 
         files = [
-            save_dataset(result, out / "flss.nc"),
+            save(result, out / "flss.nc"),
             save_figure(flss_figure, result, out / self.drawn.named("flss.png")),
         ]
-        return [*files, save_manifest(self, settings(result), files, out / MANIFEST)]
+        return [*files, save_manifest(sys.argv[1:], settings(result), files, out / MANIFEST)]
 
     def _print(self, result: "xr.Dataset", files: list[Path]) -> None:
         from hexmj.measures.captions import starts_in_words

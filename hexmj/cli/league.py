@@ -14,14 +14,14 @@ from hexmj.cli.recorded import recorded
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, RenderingError, SimulationError, check_distinct
+from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.files import write_text
 from hexmj.replay.film.film import Film
-from hexmj.storage.literal import literal
-from hexmj.storage.results import save_text
 from hexmj.studies.league import study
 from hexmj.studies.league.entrants_by_name import EVERYONE, FOUR, IDEAL, entrants
 from hexmj.studies.league.figure import league_figure, walks_figure
 from hexmj.studies.league.table import by_rank, league_markdown, tables
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,7 +81,7 @@ class League(StudyCommand):
         return list(dict.fromkeys(name.removesuffix(IDEAL) for name in self.participants))
 
     def study(self) -> study.League:
-        check_distinct("controllers", self.participants)
+        distinct("controllers", self.participants)
         asked = {
             "velocities": self.velocities,
             "n_starts": self.starts,
@@ -97,7 +97,7 @@ class League(StudyCommand):
             entrants(self.participants, loaded),
             **sizes,
             tried_at=self.trial_velocity,
-            window=self.walks.time,
+            observation_time=self.walks.time,
             **self.steady,
         )
 
@@ -110,13 +110,13 @@ class League(StudyCommand):
 
     def write_others(self, result: "xr.Dataset") -> list[Path]:
         """The tables as Markdown, and the film unless it is left out or cannot be made."""
-        table = save_text(league_markdown(result), self.out / TABLE)
+        table = write_text(self.out / TABLE, league_markdown(result))
         if self.no_video:
             return [table]
         try:
             return [table, self._filmed(result)]
         except RenderingError as error:
-            print(f"hexmj: no video: {literal(str(error))}", file=sys.stderr)
+            print(f"hexmj: no video: {error!s}", file=sys.stderr)
             return [table]
 
     def _filmed(self, result: "xr.Dataset") -> Path:
@@ -137,7 +137,7 @@ class League(StudyCommand):
             try:
                 shown.append(recorded(self, takes_part[name].controller, v, 0, title=name))
             except (InputError, SimulationError) as error:
-                print(f"hexmj: {literal(f'{name} is not in the video: {error}')}", file=sys.stderr)
+                print(f"hexmj: {f'{name} is not in the video: {error}'}", file=sys.stderr)
         if not shown:
             raise RenderingError("no controller of this league walks the first random start")
         render(shown, self.out / FILM, Film(width=480, height=360), progress=True)

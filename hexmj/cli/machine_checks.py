@@ -12,9 +12,8 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
 from typing import Any
 
-from hexmj.cli.surroundings import untold
-from hexmj.process.threads import cores
 from hexmj.rendering.gl import PACKAGES
+from hexmj.threads import cores
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where Linux tells how much processor time a container gets: microseconds of it, or max, in each period; elsewhere
@@ -98,8 +97,6 @@ def versions() -> str:
 
 def threads() -> str:
     """A thread per core that this process may use finds a core free: no quota is smaller, and Dask finds the cores."""
-    if told := untold():
-        raise Unfit(told)
     count, (share, period) = cores(), _quota()
     if share != "max" and int(share) < count * int(period):
         raise Unfit(f"{count} threads would share {int(share) / int(period):g} cores, which is all that are granted")

@@ -12,8 +12,9 @@ from tyro.conf import Fixed, OmitArgPrefixes, Suppress, arg
 from hexmj.cli.loaded import loaded
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import distinct
 
 PRESET = (
     "a preset (hws, ldvs, uncoordinated, own, own-0.1 ... own-0.9, robust-0.1, robust-0.3, robust-0.7, lasting,"
@@ -33,7 +34,7 @@ ControllerName = Annotated[str, arg(help=f"A controller: {CONTROLLER}.")]
 class Walks:
     """Which walks: their starts, how long they are observed, and where the tips step."""
 
-    window: str = "walk"
+    observation_time: str = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     seed: int = 0
     """Seed of the random starts; those of 0 are the ones on which our own presets were searched."""
@@ -41,11 +42,11 @@ class Walks:
 
     @property
     def time(self) -> str | float:
-        """The window's name, or its number of time units."""
+        """The observation time's name, or its number of time units."""
         try:
-            return float(self.window)
+            return float(self.observation_time)
         except ValueError:
-            return self.window
+            return self.observation_time
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class Controlled:
 
     def controllers(self, names: Sequence[str]) -> dict[str, Controller]:
         """Several of them, by what they call themselves, or as they were asked for where two have one name."""
-        check_distinct("models", names)
+        distinct("models", names)
         found = [self.controller(name) for name in names]
         own = [one.name for one in found]
         return dict(zip(own if len(set(own)) == len(own) else names, found, strict=True))

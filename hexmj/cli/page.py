@@ -1,15 +1,15 @@
 """`hexmj page`."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from tyro.conf import Positional
 
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.recorded import walk_summary
 from hexmj.cli.tables import print_json, show
 from hexmj.errors import InputError
-from hexmj.storage.results import results_folder
+from hexmj.io import MANIFEST, results_folder, save_manifest
 
 NAME = "walk.html"
 
@@ -35,10 +35,11 @@ class Page:
                 f"{len(self.recordings)} recordings were given; expected 1 or {MOST}, as recording.nc of hexmj walk"
             )
         shown = [load_recording(path) for path in self.recordings]
-        out = results_folder(self.out, (NAME, manifest := f"{NAME}-{MANIFEST}"))
+        out = results_folder(self.out)
+        manifest = f"{NAME}-{MANIFEST}"
         files = [page(shown, out / NAME)]
         settings = {"recordings": [str(path) for path in self.recordings]}
-        files.append(save_manifest(self, settings, files, out / manifest))
+        files.append(save_manifest(sys.argv[1:], settings, files, out / manifest))
         if self.json:
             print_json({"files": files, "recordings": [walk_summary(one) for one in shown]})
         else:

@@ -1,19 +1,20 @@
 """`hexmj readings`."""
 
+import sys
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
 from hexmj.checks import whole
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.study_command import lists_of
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show, table
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
+from hexmj.files import write_text
+from hexmj.io import MANIFEST, attributes, results_folder, save, save_manifest
 from hexmj.starts import MOST_DRAWN, check_draw
-from hexmj.storage.attributes import attributes
-from hexmj.storage.results import results_folder, save_dataset, save_text
+from hexmj.validate import distinct
 
 
 @dataclass(frozen=True)
@@ -55,23 +56,23 @@ class Readings:
         protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
         readings = list(combinations(protocol))
         if self.only:
-            check_distinct("--only", self.only)
+            distinct("--only", self.only)
             named = [named_reading(name) for name in dict.fromkeys(("printed", *self.only))]
             readings = [replace(protocol, reading=one) for one in named]
         best = min(12, len(readings)) if self.best is None else self.best
         if not 1 <= best <= len(readings):
             raise InputError(f"--best = {best}; expected 1 to {len(readings)}, as many readings as are tried")
-        out = results_folder(self.out, ("readings.md", "readings.nc", "readings.png", MANIFEST))
+        out = results_folder(self.out)
         with self.sweepers.at_work("reading") as how:
             scores = compare_readings(readings, best, out / "scores", **how)
         scores.attrs |= attributes({"only": self.only or ()})
         files = [
-            save_text(readings_markdown(scores, readings), out / "readings.md"),
-            save_dataset(scores, out / "readings.nc"),
+            write_text(out / "readings.md", readings_markdown(scores, readings)),
+            save(scores, out / "readings.nc"),
             save_figure(readings_figure, scores, out / "readings.png"),
         ]
         settings = {"protocol": asdict(protocol), "only": self.only or (), "best": best}
-        files.append(save_manifest(self, settings, files, out / MANIFEST))
+        files.append(save_manifest(sys.argv[1:], settings, files, out / MANIFEST))
         rows = readings_rows(scores, ranking(scores).tolist()[:best])
         if self.json:
             told = {"readings": [dict(zip(HEADS, row, strict=True)) for row in rows]}

@@ -6,9 +6,9 @@ import numpy as np
 
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
-from hexmj.process.progress import progress_bar
-from hexmj.process.threads import check_memory
-from hexmj.timing import observation_time, steps_within
+from hexmj.progress import progress_bar
+from hexmj.threads import check_memory
+from hexmj.timing import observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +60,7 @@ def _asked(
     from hexmj.starts import draw_start
 
     stride, acceleration = command.walks.stride, command.accelerating.procedure
-    time = float(observation_time(command.walks.time, np.array(velocity), stride, acceleration))
+    time = float(observation_duration(command.walks.time, np.array(velocity), stride, acceleration))
     check_memory(f"recordings of {time:g} time units", KEPT * int(steps_within(time, stride)))
     how = {"stride": stride, "acceleration": acceleration, "threads": threads}
     return draw_start(start, command.walks.seed, stride), time, how

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional
 
 from hexmj.body import STICK_INSECT
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Workers
 from hexmj.cli.recorded import walk_summary, walked_start
 from hexmj.cli.registry import changed
@@ -18,9 +17,8 @@ from hexmj.cli.tables import print_json, show
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
+from hexmj.io import MANIFEST, results_folder, save_manifest
 from hexmj.replay.film.film import MOST_PANELS, Film
-from hexmj.storage.literal import literal
-from hexmj.storage.results import results_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +61,8 @@ class Render(WalkingCommand):
         takes_of(shown)  # refuses what cannot be filmed before a folder is made
         name = self._name(shown)
         video, walks = f"{name}.{self.format}", () if shown else (f"{name}-1.nc", f"{name}-2.nc")
-        out = results_folder(self.out, (video, *walks, manifest := f"{video}-{MANIFEST}"))
+        out = results_folder(self.out)
+        manifest = f"{video}-{MANIFEST}"
         if sentence := missing():
             raise RenderingError(sentence)
         there = [one for one in (video, *walks) if (out / one).exists()]
@@ -72,12 +71,12 @@ class Render(WalkingCommand):
             shown = self._recorded(controllers)
             settings |= self._walked(controllers)
         for one in there:
-            print(f"hexmj: {literal(str(out / one))} was there; the new one takes its place", file=sys.stderr)
+            print(f"hexmj: {out / one!s} was there; the new one takes its place", file=sys.stderr)
         out.mkdir(parents=True, exist_ok=True)
         files = [save_recording(one, out / to) for one, to in zip(shown, walks, strict=False)]  # none that was given
         frames = render(shown, out / video, self.film, progress=True)
         files.append(out / video)
-        files.append(save_manifest(self, settings, files, out / manifest))
+        files.append(save_manifest(sys.argv[1:], settings, files, out / manifest))
         if self.json:
             summary = {"frames": frames, "film": asdict(self.film), "files": files}
             print_json(summary | {"recordings": [walk_summary(one) for one in shown]})

@@ -1,15 +1,16 @@
 """`hexmj reproduce`."""
 
+import sys
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, show, table
-from hexmj.errors import InputError, check_distinct
-from hexmj.storage.results import results_folder
+from hexmj.errors import InputError
+from hexmj.io import MANIFEST, results_folder, save_manifest
+from hexmj.validate import distinct
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,14 @@ class Reproduce:
             raise InputError("--beside without names; expected at least one, or no --beside for none")
         for option, given in (("--only", self.only), ("--beside", self.beside)):
             if given:
-                check_distinct(option, given)
-        results_folder(self.out, (MANIFEST,))
+                distinct(option, given)
+        results_folder(self.out)
         beside = self.beside or ()
         protocol = replace(QUICK if self.quick else FULL, seed=self.seed)
         with self.sweepers.at_work("reproducing") as how, as_shipped():
             rows, files = reproduce(self.out, protocol, self.only or (), beside, **how)
         settings = {"protocol": asdict(protocol), "only": self.only or (), "beside": beside}
-        files.append(save_manifest(self, settings, files, self.out / MANIFEST))
+        files.append(save_manifest(sys.argv[1:], settings, files, self.out / MANIFEST))
         if self.json:
             print_json(claims_json(rows, asdict(protocol)) | {"files": files})
             return

@@ -1,23 +1,22 @@
 """`hexmj search`."""
 
+import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.loaded import check_loaded, loaded, seeds_of_searches
-from hexmj.cli.manifest import MANIFEST, save_manifest
+from hexmj.cli.loaded import loaded, seeds_of_searches
 from hexmj.cli.options import Controlled, Figures, Workers
 from hexmj.cli.tables import interval, print_json, save_figure, show, table
 from hexmj.cli.walking_command import WalkingCommand
 from hexmj.errors import InputError
-from hexmj.process.progress import progress_bar
-from hexmj.process.threads import thread_count
+from hexmj.files import read_toml, write_text
+from hexmj.io import MANIFEST, results_folder, save, save_manifest
+from hexmj.progress import progress_bar
 from hexmj.starts import SAMPLE, check_draw
-from hexmj.storage.files import read_toml
-from hexmj.storage.literal import literal
-from hexmj.storage.results import results_folder, save_dataset, save_text
+from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,9 +84,9 @@ class Search(WalkingCommand):
 
     def run(self) -> None:
         """Search, judge what was found on fresh starts, write and print."""
+        from hexmj.plain import plain
         from hexmj.search.samples import Sample
         from hexmj.search.stages import search
-        from hexmj.sweeps.plain_settings import plain
 
         if (controlled := self._as_begun) != self.controlled:
             replace(self, controlled=controlled).run()
@@ -100,7 +99,7 @@ class Search(WalkingCommand):
         problem.domain(effort.domain, effort.begin)  # what it refuses is refused before there is a folder
         size = self._size(self.verdict_starts, 7 * SAMPLE, 200)
         fresh = Sample(problem, *check_draw(size, self.verdict_seed, "verdict_starts", "verdict_seed"))
-        out = results_folder(self.out, ("history.nc", FOUND, self._figure, MANIFEST))
+        out = results_folder(self.out)
         fresh.settle(self.workers.threads)  # what refuses to stand is told before the work
         found = search(problem, effort, folder=out / KEPT, threads=self.workers.threads, progress=True)
         settings = {
@@ -116,7 +115,6 @@ class Search(WalkingCommand):
                 verdict = fresh.verdict(judged, self.workers.threads, progress)
         except InputError as error:
             raise InputError(f"{error}; what was found is in {out / FOUND}") from None
-        check_loaded()  # it is on what was written
         if self.json:
             evaluations = found.history.sizes["evaluation"]
             told = {"cost": found.cost, "evaluations": evaluations, "replayed": found.replayed}
@@ -254,8 +252,8 @@ class Search(WalkingCommand):
         at = f"V from {low:g} to {high:g}" if self.velocities else f"V = {low:g}"
         at += f", {self.over} of all variants" if self.over != "usual" else ""
         at += ", later losses first among equals" if self.ties == "later" else ""
-        method = f"window {self.walks.window}, {self.algorithm}, seed {self.walks.seed}"
-        return literal(f"{self.form}, {self._kind} FLSS at {at}, {method}")
+        method = f"observation time {self.walks.observation_time}, {self.algorithm}, seed {self.walks.seed}"
+        return f"{self.form}, {self._kind} FLSS at {at}, {method}"
 
     def _write(self, problem: "Problem", found: "Found", settings: dict[str, Any]) -> list[Path]:
         from hexmj.search.convergence import convergence_figure
@@ -264,11 +262,11 @@ class Search(WalkingCommand):
         text = f"# hexmj search: {self._title}\nsearched = {{ seeds = {seeds} }}\n{self._toml(problem, found)}"
         history = found.history.assign_attrs(title=self._title)
         files = [
-            save_dataset(history, self.out / "history.nc"),
-            save_text(text, self.out / FOUND),
+            save(history, self.out / "history.nc"),
+            write_text(self.out / FOUND, text),
             save_figure(convergence_figure, history, self.out / self._figure),
         ]
-        return [*files, save_manifest(self, settings, files, self.out / MANIFEST)]
+        return [*files, save_manifest(sys.argv[1:], settings, files, self.out / MANIFEST)]
 
     def _toml(self, problem: "Problem", found: "Found") -> str:
         """What `load_controller` reads to the same bits: weights, or a controller and its fields."""
@@ -305,16 +303,31 @@ class Search(WalkingCommand):
             where = " in a variant" if self.over == "worst" else ""
             refused = f"; {all_lost} cost 1: all of their starts were lost{where}, or they do not walk{refused}"
         over = f"{self.over} over {len(problem.variants)} variants of " if self.over != "usual" else ""
-        windows = verdict.window.values.tolist()
+        observation_times = verdict.observation_time.values.tolist()
         judged = [
-            (name, *(interval(verdict.sel(controller=name, window=window), "flss") for window in windows))
+            (
+                name,
+                *(
+                    interval(verdict.sel(controller=name, observation_time=observation_time), "flss")
+                    for observation_time in observation_times
+                ),
+            )
             for name in verdict.controller.values.tolist()
         ]
         show(
             self._title,
             table(("parameter", "found", *vectors), numbers),
             f"{over}{self._kind} FLSS on {n_starts} fresh starts (seed {self.verdict_seed}), with 95 % intervals",
-            table(("model", *(f"window {window.removesuffix('.0')}" for window in windows)), judged),
+            table(
+                (
+                    "model",
+                    *(
+                        f"observation time {observation_time.removesuffix('.0')}"
+                        for observation_time in observation_times
+                    ),
+                ),
+                judged,
+            ),
             f"{found.history.sizes['evaluation']} evaluations, {found.replayed} candidates known from an earlier run;"
             f" least cost {found.cost:.4g}{self._counted(problem, found)}{refused}",
             self.conditions_line(self.physical),
@@ -333,10 +346,16 @@ def _numbers(form: "Form", controller: "Controller") -> "np.ndarray":
 
 
 def _judged(verdict: "xr.Dataset") -> dict[str, Any]:
-    """FLSS and its interval by controller and window."""
+    """FLSS and its interval by controller and observation time."""
 
-    def one(name: str, window: str) -> dict[str, float]:
-        return {str(key): values.item() for key, values in verdict.sel(controller=name, window=window).items()}
+    def one(name: str, observation_time: str) -> dict[str, float]:
+        return {
+            str(key): values.item()
+            for key, values in verdict.sel(controller=name, observation_time=observation_time).items()
+        }
 
-    windows = verdict.window.values.tolist()
-    return {name: {window: one(name, window) for window in windows} for name in verdict.controller.values.tolist()}
+    observation_times = verdict.observation_time.values.tolist()
+    return {
+        name: {observation_time: one(name, observation_time) for observation_time in observation_times}
+        for name in verdict.controller.values.tolist()
+    }

@@ -1,5 +1,6 @@
 """What commands that conduct a study have in common: walk with a progress bar, keep what is finished, write, print."""
 
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,14 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import Figures
 from hexmj.cli.sweepers import Sweepers
 from hexmj.cli.tables import print_json, save_figure, show
 from hexmj.cli.walking_command import WalkingCommand
-from hexmj.storage.attributes import settings
-from hexmj.storage.results import results_folder, save_dataset
-from hexmj.sweeps import Study, conduct
+from hexmj.io import MANIFEST, results_folder, save, save_manifest, settings
+from hexmj.sweep import Study, run_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,15 +67,15 @@ class StudyCommand(WalkingCommand):
         """Conduct the study in the folder, write its result, and print."""
         study, outputs = self.study(), self.outputs
         figures = {self.drawn.named(name): draw for name, draw in outputs.figures.items()}
-        folder = results_folder(self.out, [outputs.data, *figures, outputs.manifest, *outputs.others])
+        folder = results_folder(self.out)
         with self.sweepers.at_work(outputs.doing) as how:
-            result = conduct(study, folder / "walks", **how)
+            result = run_study(study, folder / "walks", **how)
         files = [
-            save_dataset(result, folder / outputs.data),
+            save(result, folder / outputs.data),
             *(save_figure(draw, result, folder / name) for name, draw in figures.items()),
             *self.write_others(result),
         ]
-        files.append(save_manifest(self, settings(result), files, folder / outputs.manifest))
+        files.append(save_manifest(sys.argv[1:], settings(result), files, folder / outputs.manifest))
         if self.json:
             print_json(self.summary(result) | {"searched": self.searched, "files": files})
         else:

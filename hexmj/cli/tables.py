@@ -4,10 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.answer_stream import ANSWERS
-from hexmj.storage import results
-from hexmj.storage.literal import literal
-from hexmj.storage.results import json_text
+from hexmj.io import json_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,12 +50,12 @@ def difference(one: "xr.Dataset", measure: str) -> str:
 
 
 def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path: Path) -> Path:
-    """Draw some data and write the figure; no date stands in it."""
+    """Draw some data and write the figure."""
+    from hexmj.io import save_figure
     from hexmj.pictures import as_shipped
 
-    undated: dict[str, Any] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     with as_shipped():
-        return results.save_figure(draw(data), path, dpi=150, metadata=undated.get(path.suffix))
+        return save_figure(draw(data), path)
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
@@ -101,8 +98,8 @@ def show(*parts: Any) -> None:
 
     console = Told(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
-        console.print(literal(part) if isinstance(part, str) else Padding(part, (1, 0), expand=False))
+        console.print(part if isinstance(part, str) else Padding(part, (1, 0), expand=False))
 
 
 def print_json(value: dict[str, Any]) -> None:
-    print(json_text(value), file=ANSWERS.get())
+    print(json_text(value))

@@ -42,7 +42,9 @@ class Terrain(StudyCommand):
     starts: int = terrain.Terrain.n_starts
     """Number of random starts, the same for every obstacle."""
     out: Path = Path("results/terrain")
-    walks: OmitArgPrefixes[Walks] = hiding(Walks(), ["window"], "Each start walks a distance instead of a time.")
+    walks: OmitArgPrefixes[Walks] = hiding(
+        Walks(), ["observation_time"], "Each start walks a distance instead of a time."
+    )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     conditions: OmitArgPrefixes[Conditions] = hiding(FARTHER, VARIED)
     outputs = Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
@@ -74,7 +76,10 @@ class Terrain(StudyCommand):
         )
         yield _table(result, self.conditions.body.trunk)
         distance = result.attrs["distance"]
-        walked = {"walks": replace(self.walks, window=f"{distance:g} / V"), "conditions": self._on_the_roughest}
+        walked = {
+            "walks": replace(self.walks, observation_time=f"{distance:g} / V"),
+            "conditions": self._on_the_roughest,
+        }
         yield replace(self, **walked).conditions_line(varied=VARIED, walked=distance)
 
     @property

@@ -11,12 +11,13 @@ from hexmj.cli.options import NETWORK, Controlled, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import interval, table
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
 from hexmj.measures.captions import starts_in_words
 from hexmj.starts import checked_list
 from hexmj.studies.short_names import short_names
 from hexmj.studies.variants import study
 from hexmj.studies.variants.figure import variants_figure
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +51,7 @@ class Variants(StudyCommand):
     def study(self) -> study.Variants:
         if not self.physical:
             self.refuse_physical("without --physical")
-        check_distinct("models", self.models)
+        distinct("models", self.models)
         checked_list(self.velocities)
         networks = {name: tuple(self._network(name, v) for v in self.velocities) for name in self.models}
         for several in networks.values():

@@ -10,7 +10,7 @@ from hexmj.cli.registry import changed
 from hexmj.cli.tables import show
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.process.progress import progress_bar
+from hexmj.progress import progress_bar
 
 END = "Ctrl-C ends it."
 
@@ -39,7 +39,7 @@ class View:
     conditions: OmitArgPrefixes[Conditions] = field(default_factory=Conditions)
 
     def run(self) -> None:
-        """Look at the recording or the walk, until the window is closed or somebody stops it."""
+        """Look at the recording or the walk, until the observation time is closed or somebody stops it."""
         from hexmj.view.desktop import screen
 
         on_screen = screen() and not self.browser

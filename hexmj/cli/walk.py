@@ -1,18 +1,18 @@
 """`hexmj walk`."""
 
 import math
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tyro.conf import OmitArgPrefixes
 
-from hexmj.cli.manifest import MANIFEST, save_manifest
 from hexmj.cli.options import ControllerName, Figures, Workers
 from hexmj.cli.recorded import recorded, walk_summary
 from hexmj.cli.tables import four_digits, print_json, save_figure, show
 from hexmj.cli.walking_command import WalkingCommand
-from hexmj.storage.results import results_folder
+from hexmj.io import MANIFEST, results_folder, save_manifest
 
 SHOWN = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
 """Conditions that the puppet of a plan shows too."""
@@ -47,7 +47,7 @@ class Walk(WalkingCommand):
             self.refuse_physical("without --physical", SHOWN)
         controller = self.controlled.controller(self.model)
         figure = self.drawn.named("walk.png")
-        out = results_folder(self.out, ("recording.nc", figure, MANIFEST))
+        out = results_folder(self.out)
         title = f"{controller.name}, V = {self.velocity:g}"
         how: Any = {"physical": self.physical, "threads": self.workers.threads}
         walked = recorded(self, controller, self.velocity, self.start, title=title, **how)
@@ -55,7 +55,7 @@ class Walk(WalkingCommand):
         told |= settings({self.model: controller}, n_starts=1, **self.walked)
         told |= {"conditions": self.conditions.settings()}
         files = [save_recording(walked, out / "recording.nc"), save_figure(walk_figure, walked, out / figure)]
-        files.append(save_manifest(self, told, files, out / MANIFEST))
+        files.append(save_manifest(sys.argv[1:], told, files, out / MANIFEST))
         summary = walk_summary(walked)
         if self.json:
             print_json(summary | {"settings": told, "searched": self.searched, "files": files})

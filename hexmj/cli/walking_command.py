@@ -17,7 +17,7 @@ from hexmj.conditions import Conditions, unusual
 from hexmj.controllers.protocol import Controller, ReadingPlan
 from hexmj.errors import InputError
 from hexmj.legs import GEOMETRIES
-from hexmj.timing import Stride, observation_time
+from hexmj.timing import Stride, observation_duration
 
 TOLD = ("vp", "step_height", "standing_height", "lift_time", "landing_time", "friction", "contact_gap")
 """Conditions that stand beside every physical measure; the others only if they are not the usual ones."""
@@ -36,9 +36,9 @@ class WalkingCommand:
 
     @property
     def walked(self) -> dict[str, Any]:
-        """How walks go, as measures and studies are told: window, seed, stride and acceleration."""
+        """How walks go, as measures and studies are told: observation time, seed, stride and acceleration."""
         return {
-            "window": self.walks.time,
+            "observation_time": self.walks.time,
             "seed": self.walks.seed,
             "stride": self.walks.stride,
             "acceleration": self.accelerating.procedure,
@@ -73,7 +73,7 @@ class WalkingCommand:
     def conditions_line(self, physical: bool = True, varied: Collection[str] = (), walked: float | None = None) -> str:
         """What stands beside every measure: conditions, of physical walks only, but for those that were `varied`; walks
         come as far as the options tell, or as was `walked` at most [mm]."""
-        line = f"window {self.walks.window} (t in time units); seed {self.walks.seed}"
+        line = f"observation time {self.walks.observation_time} (t in time units); seed {self.walks.seed}"
         if known := self.searched:
             tried = {seed for seeds in self._searches.values() for seed in seeds}
             other = next(seed for seed in count(1998) if seed not in tried)
@@ -116,7 +116,7 @@ class WalkingCommand:
         if not velocities.size:
             return math.inf
         acceleration = self.accelerating.procedure
-        time = observation_time(self.walks.time, velocities, self.walks.stride, acceleration)
+        time = observation_duration(self.walks.time, velocities, self.walks.stride, acceleration)
         lag = acceleration.lag(velocities, time) if acceleration else 0.0
         return float((velocities * time - lag).max())
 

@@ -22,12 +22,11 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     check_controller_type,
 )
-from hexmj.errors import InputError, Refused, is_of_numbas_cache
+from hexmj.errors import InputError, Refused
 from hexmj.legs import LEGS
-from hexmj.process.threads import check_memory, thread_count
 from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride, check_reached
-from hexmj.user_code.current_folder import kept_folder
 from hexmj.walks import PLANNED, PlannedWalk, copied
 
 KEPT = 400
@@ -234,13 +233,10 @@ def tell(plan: ReadingPlan, sensed: Sensed) -> None:
 def said(what: str) -> Iterator[None]:
     """Say in one sentence what a user's code raises, and where; if it changes the folder, that is changed back."""
     try:
-        with kept_folder():
-            yield
+        yield
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        if is_of_numbas_cache(error):
-            raise
         place = traceback.extract_tb(error.__traceback__)[-1]
         said = " ".join(str(error).split())
         raise InputError(

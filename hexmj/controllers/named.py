@@ -1,6 +1,7 @@
 """Controllers by name: presets, parameter files, objects in modules and files, entry points."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -19,10 +20,7 @@ from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.toml_fields import with_fields
 from hexmj.controllers.varied_names import PART, VARIED
 from hexmj.errors import InputError
-from hexmj.storage.files import SEARCHED, read_toml
-from hexmj.storage.literal import literal
-from hexmj.user_code.current_folder import kept_folder
-from hexmj.user_code.loaded import importable
+from hexmj.files import SEARCHED, read_toml
 
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points by which other packages bring controllers: a name and `module:object`."""
@@ -31,7 +29,6 @@ NO_FILE = "expected the path of one from the current folder; ~ is expanded by sh
 """What is said of a file that is not there."""
 
 
-@kept_folder()
 def load_controller(name: str) -> Controller:
     """A controller by its name.
 
@@ -77,9 +74,9 @@ def load_controller(name: str) -> Controller:
     table.pop(SEARCHED, None)
     if "controller" in table:
         if not (table.keys() <= {"controller", "fields"} and isinstance(table.get("fields", {}), dict)):
-            raise InputError(f"{path} holds {literal(', '.join(table)):.300}; expected controller and a table [fields]")
+            raise InputError(f"{path} holds {', '.join(table):.300}; expected controller and a table [fields]")
         return _with_fields(path, str(table["controller"]), table.get("fields", {}))
-    return read_network(table, name, literal(path.stem))
+    return read_network(table, name, path.stem)
 
 
 def parameter_file(name: str) -> Path | None:
@@ -128,7 +125,7 @@ def _with_fields(path: Path, named: str, values: dict[str, Any]) -> Controller:
         )
     found = load_controller(named)
     try:
-        return with_fields(found, values, literal(path.stem)) if values else found
+        return with_fields(found, values, path.stem) if values else found
     except Exception as error:  # whatever the user's class raises
         of: Any = found
         known = [one.name for one in fields(of) if one.init]
@@ -190,9 +187,20 @@ def _module(where: str, name: str) -> ModuleType:
         if not where.endswith(".py"):
             return import_module(where)
         if isfile(where):
-            return importable(where)
+            return _file_module(Path(where))
     except InputError as error:
         raise InputError(f"controller {name!r}: {error}") from None
     except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise InputError(f"controller {name!r}: {where} cannot be imported: {error!r:.300}") from error
     raise InputError(f"controller {name!r}: {where} is no file; {NO_FILE}")
+
+
+def _file_module(path: Path) -> ModuleType:
+    """Import a file as a module of its own name; its directory joins `sys.path`, also for worker processes."""
+    path = path.absolute()
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    module = import_module(path.stem)
+    if not path.samefile(str(module.__file__)):
+        raise InputError(f"{path}: there is another module {path.stem!r}, {module.__file__}; rename the file")
+    return module

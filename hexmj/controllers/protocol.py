@@ -6,7 +6,6 @@ what a robot would know.
 """
 
 from dataclasses import dataclass, is_dataclass
-from enum import Enum
 from inspect import getattr_static
 from typing import Any, Protocol, TypeGuard, runtime_checkable
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from hexmj.checks import printable, short
 from hexmj.errors import InputError
-from hexmj.sweeps.plain_settings import field_names, plain
+from hexmj.plain import plain
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 
@@ -258,15 +257,13 @@ def settings_of(controller: Controller) -> dict[str, Any]:
         InputError: no controller, or a field that is no plain data.
     """
     check_controller_type(controller)
-    return plain(_bare(controller))
+    return _without_classes(plain(controller))
 
 
-def _bare(value: Any) -> Any:
-    """A setting without the names of its classes."""
-    if isinstance(value, Enum):
-        return value.name or value.value
-    if (names := field_names(value)) is not None:
-        return {name: _bare(getattr(value, name)) for name in names}
-    if type(value) is dict:
-        return {key: _bare(item) for key, item in value.items()}
-    return [_bare(item) for item in value] if type(value) in (list, tuple) else value
+def _without_classes(value: Any) -> Any:
+    """Plain settings without the names of their classes; a member of an enumeration as its name."""
+    if isinstance(value, dict):
+        if value.keys() == {"class", "member"}:
+            return value["member"]
+        return {key: _without_classes(item) for key, item in value.items() if key != "class"}
+    return [_without_classes(item) for item in value] if isinstance(value, list) else value

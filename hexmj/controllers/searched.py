@@ -8,8 +8,8 @@ from hexmj.controllers.named import parameter_file
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, Evolved
 from hexmj.controllers.varied_names import PART
-from hexmj.storage.files import SEARCHED, read_toml
-from hexmj.sweeps.plain_settings import plain
+from hexmj.files import SEARCHED, read_toml
+from hexmj.plain import plain
 
 
 def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from hexmj.conditions import unusual
 from hexmj.errors import InputError
-from hexmj.storage.attributes import settings
-from hexmj.storage.literal import in_figure
+from hexmj.io import settings
+from hexmj.pictures import in_figure
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ WORDS = {
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """Between a condition's number and its unit, which stay in one line."""
 
-WALKS = {"window": "window {}", "seed": "seed {}"}
+WALKS = {"observation_time": "observation time {}", "seed": "seed {}"}
 """What is told of the walks, beside the number of starts."""
 
 STRIDE = {"aep0": "AEP$_0$ = {:g} mm", "pep0": "PEP$_0$ = {:g} mm", "pep_min": "PEP_min = {:g} mm", "dt": "dt = {:g}"}
@@ -125,9 +125,9 @@ def _stride(told: Mapping[str, Any]) -> str:
 
 
 def _walks(told: dict[str, Any]) -> list[str]:
-    """Starts, window, seed and acceleration, as far as a result has them."""
-    window = told.get("window")
-    own = {"window": f"of {window:g} time units"} if isinstance(window, float) else {}
+    """Starts, observation time, seed and acceleration, as far as a result has them."""
+    observation_time = told.get("observation_time")
+    own = {"observation_time": f"of {observation_time:g} time units"} if isinstance(observation_time, float) else {}
     found = [starts_in_words(told["starts"])] if "starts" in told else []
     found += [word.format((told | own)[name]) for name, word in WALKS.items() if name in told]
     if acceleration := told.get("acceleration"):

@@ -12,14 +12,14 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
-from hexmj.intervals import wilson_intervals
+from hexmj.io import attributes
 from hexmj.legs import LEGS
 from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
 from hexmj.measures.velocities import observed, several, velocity_axis
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw, draw_starts
-from hexmj.storage.attributes import attributes
-from hexmj.sweeps import Cell, Execution, conduct, over_axes
+from hexmj.stats import wilson_intervals
+from hexmj.sweep import Cell, Execution, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Comparison:
     """V_r (when accelerating, its final value), each 0 <= V < 1."""
     n_starts: int = 60
     """Number of starts, the same for every controller and velocity."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     seed: int = 0
     """Of the starts."""
@@ -73,10 +73,10 @@ class Comparison:
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.window, self.stride, self.acceleration)
+        return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`; each is an `outcome_table`."""
+        """See `sweep.Study`; each is an `outcome_table`."""
         from hexmj.measures.outcome_table import outcome_table
 
         for one in self.controllers.values():
@@ -98,7 +98,7 @@ class Comparison:
             starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
-        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        same = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         told = {"study": "compare"} | settings(self.controllers, *same) | {"conditions": self.conditions.settings()}
         return _with_answers(with_flss(table, MEASURES | BESIDE)).assign_attrs(attributes(told))
 
@@ -108,7 +108,7 @@ def compare(
     velocities: Sequence[float] | float,
     *,
     n_starts: int = Comparison.n_starts,
-    window: str | float = Comparison.window,
+    observation_time: str | float = Comparison.observation_time,
     seed: int = Comparison.seed,
     conditions: Conditions | None = None,
     stride: Stride | None = None,
@@ -120,10 +120,10 @@ def compare(
 
     Args:
         controllers: one, or several by name.
-        velocities: one or several, as of `Comparison`, and so are `n_starts`, `window`, `seed`, `conditions`, `stride`
+        velocities: one or several, as of `Comparison`, and so are `n_starts`, `observation_time`, `seed`, `conditions`, `stride`
             and `acceleration`.
         n_starts: number of starts.
-        window: observation time.
+        observation_time: observation time.
         seed: of the starts.
         conditions: of the physical walks.
         stride: of the plans.
@@ -147,7 +147,9 @@ def compare(
         controllers = {controllers.name: controllers}
     typed("folder", folder, Path | str | None)
     walks = given("conditions", conditions, Conditions), given("stride", stride, Stride), acceleration
-    return conduct(Comparison(controllers, several(velocities), n_starts, window, seed, *walks), folder, **how)
+    return run_study(
+        Comparison(controllers, several(velocities), n_starts, observation_time, seed, *walks), folder, **how
+    )
 
 
 def physical_flss(
@@ -155,7 +157,7 @@ def physical_flss(
     velocities: Sequence[float] | float,
     *,
     n_starts: int = 200,
-    window: str | float = Comparison.window,
+    observation_time: str | float = Comparison.observation_time,
     seed: int = Comparison.seed,
     conditions: Conditions | None = None,
     stride: Stride | None = None,
@@ -173,7 +175,7 @@ def physical_flss(
     """
     check_controller_type(controller)
     result = compare(
-        controller, velocities, n_starts=n_starts, window=window, seed=seed, conditions=conditions, stride=stride,
+        controller, velocities, n_starts=n_starts, observation_time=observation_time, seed=seed, conditions=conditions, stride=stride,
         acceleration=acceleration, folder=folder, **how,
     )  # fmt: skip
     fell = losses_by_sample(np.isfinite(result.fall.values[0]))

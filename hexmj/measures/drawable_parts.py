@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.errors import InputError
-from hexmj.storage.attributes import settings
-from hexmj.timing import Acceleration, Stride, observation_time
+from hexmj.io import settings
+from hexmj.timing import Acceleration, Stride, observation_duration
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,8 +32,8 @@ def check_axes(result: "xr.Dataset") -> None:
         raise InputError(f"a result without the values of its axis {bare[0]}; expected the result as it was computed")
 
 
-def check_window(result: "xr.Dataset") -> None:
-    """Refuse observation times that are not those of the window in the settings, as of results that were joined.
+def check_observation_time(result: "xr.Dataset") -> None:
+    """Refuse observation times that are not those of the observation time in the settings, as of results that were joined.
 
     Nothing is said of a result without such times or settings, nor of variants, whose strides are their own.
 
@@ -41,17 +41,17 @@ def check_window(result: "xr.Dataset") -> None:
         InputError: with the first time that differs.
     """
     told = settings(result)
-    known = {"window", "stride", "acceleration"} <= told.keys()
+    known = {"observation_time", "stride", "acceleration"} <= told.keys()
     if "duration" not in result.variables or not known or "variant" in result.duration.dims:
         return
     stride = Stride(**{name: value for name, value in told["stride"].items() if name != "geometry"})
     acceleration = Acceleration(**told["acceleration"]) if told["acceleration"] else None
-    times = observation_time(told["window"], result.velocity.values, stride, acceleration)
+    times = observation_duration(told["observation_time"], result.velocity.values, stride, acceleration)
     walked = result.duration.transpose(..., "velocity").values
     if (odd := walked[~np.isclose(walked, times)]).size:
         raise InputError(
-            f"a result with the window {told['window']} in its settings, but with walks of {odd[0]:g} time units;"
-            ' expected one window, stride and acceleration, or results joined with combine_attrs="drop_conflicts"'
+            f"a result with the observation time {told['observation_time']} in its settings, but with walks of {odd[0]:g} time units;"
+            ' expected one observation time, stride and acceleration, or results joined with combine_attrs="drop_conflicts"'
         )
 
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import InputError
+from hexmj.io import settings
 from hexmj.measures.captions import caption, conditions
 from hexmj.measures.drawable_parts import check_starts
-from hexmj.storage.attributes import settings
-from hexmj.storage.literal import in_figure
+from hexmj.pictures import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.controllers.protocol import Controller, settings_of
-from hexmj.intervals import wilson_intervals
 from hexmj.measures.velocities import velocity_axis
 from hexmj.starts import SAMPLE
+from hexmj.stats import wilson_intervals
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def settings(
     controllers: Mapping[str, Controller],
-    window: str | float,
+    observation_time: str | float,
     n_starts: int,
     seed: int,
     stride: Stride,
@@ -27,7 +27,7 @@ def settings(
     """All that is needed to run a measure again, as plain data; every result has it, see `attributes.settings`."""
     return {
         "controllers": {name: settings_of(one) for name, one in controllers.items()},
-        "window": window,
+        "observation_time": observation_time,
         "starts": n_starts,
         "seed": seed,
         "stride": asdict(stride),

@@ -15,14 +15,14 @@ from hexmj.controllers.checked_plans import advanced, begin, check_velocities
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import Controller, check_controller_type, settings_of
 from hexmj.errors import InputError
-from hexmj.intervals import wilson_interval
+from hexmj.io import attributes
 from hexmj.measures.frequency import frequency_table, losses_by_sample, settings
 from hexmj.measures.velocities import observed
-from hexmj.process.progress import Progress
+from hexmj.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
-from hexmj.storage.attributes import attributes
-from hexmj.sweeps import Cell, Execution, conduct
-from hexmj.timing import Acceleration, Stride, observation_time, steps_within
+from hexmj.stats import wilson_interval
+from hexmj.sweep import Cell, Execution, run_study
+from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 from hexmj.walks import PlannedWalk
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class KinematicFlss:
     """V_r (when accelerating, its final value), each 0 <= V < 1."""
     n_starts: int = 7 * SAMPLE
     """N, the same starts for every velocity."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     seed: int = 0
     """Of the starts."""
@@ -122,7 +122,7 @@ class KinematicFlss:
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.window, self.stride, self.acceleration)
+        return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     @property
     def places(self) -> list[tuple[int, int]]:
@@ -130,7 +130,7 @@ class KinematicFlss:
         return list(product(range(len(self.velocities)), range(0, self.n_starts, self.range_of)))
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`; each is a `losses_of_range`."""
+        """See `sweep.Study`; each is a `losses_of_range`."""
         v, duration = self.observed
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
@@ -148,7 +148,7 @@ class KinematicFlss:
         for (i, first), one in zip(self.places, data, strict=True):
             begin = first // SAMPLE
             losses[i, begin : begin + one.sizes["sample"]] += one.losses.values
-        told = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        told = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         made = settings({self.controller.name: self.controller}, *told)
         return frequency_table(losses, self.n_starts, *self.observed).assign_attrs(attributes({"study": "flss"} | made))
 
@@ -190,7 +190,7 @@ def flss(
     velocities: Sequence[float] | float,
     *,
     n_starts: int = KinematicFlss.n_starts,
-    window: str | float = KinematicFlss.window,
+    observation_time: str | float = KinematicFlss.observation_time,
     seed: int = KinematicFlss.seed,
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
@@ -206,7 +206,7 @@ def flss(
         controller: as of `KinematicFlss`, and so are `velocities` to `range_of`.
         velocities: V_r, one or several.
         n_starts: N.
-        window: observation time.
+        observation_time: observation time.
         seed: of the starts.
         stride: of the plans.
         acceleration: of Eq. 11.
@@ -224,9 +224,9 @@ def flss(
     check_controller_type(controller)
     stride = given("stride", stride, Stride)
     n_starts, seed = check_draw(n_starts, seed)
-    v, _ = observed(velocities, window, stride, acceleration)
-    study = KinematicFlss(controller, v.tolist(), n_starts, window, seed, stride, acceleration, range_of)
-    return conduct(study, folder, **how)
+    v, _ = observed(velocities, observation_time, stride, acceleration)
+    study = KinematicFlss(controller, v.tolist(), n_starts, observation_time, seed, stride, acceleration, range_of)
+    return run_study(study, folder, **how)
 
 
 def flss_over_range(
@@ -235,7 +235,7 @@ def flss_over_range(
     high: float,
     *,
     n_starts: int = 7 * SAMPLE,
-    window: str | float = "walk",
+    observation_time: str | float = "walk",
     seed: int = 0,
     stride: Stride | None = None,
     threads: int | None = None,
@@ -244,10 +244,10 @@ def flss_over_range(
 
     Args:
         controller: plans the walks.
-        low: least velocity of the range W, uniform, 0 <= V < 1, and above 0 with the window 'walk'.
+        low: least velocity of the range W, uniform, 0 <= V < 1, and above 0 with the observation time 'walk'.
         high: greatest velocity of the range W.
         n_starts: N.
-        window: 'walk', 'start' or the observation time itself [time units]; the named ones follow each velocity.
+        observation_time: 'walk', 'start' or the observation time itself [time units]; the named ones follow each velocity.
         seed: of the starts and their velocities.
         stride: step range, lines of the tips and time step.
         threads: one per core unless given; the result does not depend on it.
@@ -256,17 +256,21 @@ def flss_over_range(
         The frequency and its 95 % Wilson interval.
 
     Raises:
-        InputError: a range, window, seed or number of starts that makes no sense.
+        InputError: a range, observation time, seed or number of starts that makes no sense.
     """
     stride = given("stride", stride, Stride)
     low, high = typed("low", low, float), typed("high", high, float)
     if not 0 <= low <= high < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
     n_starts, seed = check_draw(n_starts, seed)
-    observation_time(window, low, stride)  # refuses a range that begins where there is no period, whatever is drawn
+    observation_duration(
+        observation_time, low, stride
+    )  # refuses a range that begins where there is no period, whatever is drawn
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in draw_slabs(n_starts, seed, stride):
         v = rng.uniform(low, high, len(x))
-        lost = first_loss(x, controller, v, observation_time(window, v, stride), stride=stride, threads=threads)
+        lost = first_loss(
+            x, controller, v, observation_duration(observation_time, v, stride), stride=stride, threads=threads
+        )
         count += int(np.isfinite(lost).sum())
     return count / n_starts, wilson_interval(count, n_starts)

@@ -8,9 +8,8 @@ from hexmj.measures.frequency import over_start
 from hexmj.measures.physical import physical_outcomes
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import Settled, settle
-from hexmj.process.progress import Progress
+from hexmj.progress import Progress
 from hexmj.starts import draw_starts
-from hexmj.storage.mjcf import content
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def settled_starts(
 
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
     """Every field of `Outcomes` over start."""
-    files = content(walks.conditions.body.mjcf)
+    files = walks.conditions.body.mjcf.read_bytes()
     settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads, files)
     outcomes = physical_outcomes(
         settled, walks.controller, walks.velocity, walks.duration,

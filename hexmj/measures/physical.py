@@ -17,7 +17,7 @@ from hexmj.physics.drive import Push, drive
 from hexmj.physics.measured import feet_on_ground, measured_walk
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
-from hexmj.process.progress import Progress, shown
+from hexmj.progress import Progress, shown
 from hexmj.stability import loss_time
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, copied, extent, joined, part_of

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.starts import checked_list
-from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_time, steps_within
+from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_duration, steps_within
 
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of an axis of velocities."""
@@ -22,7 +22,10 @@ def several(velocities: Sequence[float] | float) -> Sequence[float]:
 
 
 def observed(
-    velocities: Sequence[float] | float, window: str | float, stride: Stride, acceleration: Acceleration | None = None
+    velocities: Sequence[float] | float,
+    observation_time: str | float,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The velocities of a table and their observation times [time units], both (velocity,), if they make sense.
 
@@ -31,7 +34,7 @@ def observed(
     """
     v = checked_list(several(velocities), acceleration)
     check_reached(v, stride, acceleration)
-    duration = observation_time(window, v, stride, acceleration)
+    duration = observation_duration(observation_time, v, stride, acceleration)
     check_in_time(v, duration, acceleration)
     steps_within(duration, stride)
     return v, duration

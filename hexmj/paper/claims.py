@@ -111,7 +111,7 @@ CLAIMS = (
     Claim(
         "ideal-0.7", "5.1.1", "ideal FLSS beyond V = 0.7", "> 0.8",
         Band(Lost("ideal"), (0.75, 0.9), least=0.8),
-        "the window start is shorter than a period there: 0.74 at V = 0.75, 0.80 to 0.85 beyond",
+        "the observation time start is shorter than a period there: 0.74 at V = 0.75, 0.80 to 0.85 beyond",
     ),
     Claim("ideal-rises", "5.1.1", "FLSS 'steadily increases'", "rising", Trend(Lost("ideal"), (0.1, 0.9), 1)),
     Claim(
@@ -168,7 +168,7 @@ CLAIMS = (
     Claim(
         "ldvs-below-hws", "5.1.2", "LDVS below HWS at every V in [0.1, 0.5]", "smaller",
         Band(Lost("ldvs", "hws"), (0.1, 0.5), most=0.0),
-        "in the window start it is smaller up to V = 0.2 and no larger up to 0.35",
+        "in the observation time start it is smaller up to V = 0.2 and no larger up to 0.35",
     ),
     *_both(
         "slow", "5.2", "about zero at low V", "about 0",
@@ -211,7 +211,7 @@ CLAIMS = (
     *_both(
         "keeps", "5.2", "accelerated FLSS is kept at that of V_r(0)", "fits",
         lambda model: Band(Lost(f"{model} accelerated", model, at=0.1), (0.1, 0.9), -FITS, FITS),
-        "40 time units at V = 0.1 lose hardly a start, and the accelerated walk passes thousands before its window",
+        "40 time units at V = 0.1 lose hardly a start, and the accelerated walk passes thousands before its observation time",
     ),
     *_both(
         "periodic", "5.3", "only periodic oscillations", "all",

@@ -15,7 +15,7 @@ from hexmj.measures.velocities import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
-from hexmj.timing import WINDOWS
+from hexmj.timing import OBSERVATION_TIMES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,14 +145,14 @@ def footfall_diagrams(measured: Measured, model: str) -> "tuple[Figure, xr.Datas
     return figure, data
 
 
-def flss_figure(measured: Measured, number: int, window: str) -> "tuple[Figure, xr.Dataset]":
+def flss_figure(measured: Measured, number: int, observation_time: str) -> "tuple[Figure, xr.Dataset]":
     """Figs. 2-4, FLSS against velocity: means of the samples of starts, bars of one standard deviation over them."""
     import xarray as xr
 
     figure, curves = _figure(6.4, 4.6), CURVES[number]
     axes = figure.subplots()
     data = xr.concat(
-        [_samples(measured[name].lost.sel(window=window)) for name in curves],
+        [_samples(measured[name].lost.sel(observation_time=observation_time)) for name in curves],
         xr.DataArray(list(curves), dims="curve", name="curve"),
         combine_attrs="drop_conflicts",
     )
@@ -199,9 +199,12 @@ Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]
 
 FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{
-        f"figure-{number}-{window}": (tuple(curves), partial(flss_figure, number=number, window=window))
+        f"figure-{number}-{observation_time}": (
+            tuple(curves),
+            partial(flss_figure, number=number, observation_time=observation_time),
+        )
         for number, curves in CURVES.items()
-        for window in WINDOWS
+        for observation_time in OBSERVATION_TIMES
     },
     "figure-5": (("hws gaits",), partial(phase_figure, model="hws")),
     "figure-6": (("ldvs gaits",), partial(phase_figure, model="ldvs")),

@@ -8,8 +8,8 @@ from typing import Any
 from hexmj.controllers.cruse1998 import READINGS, Cruse1998, Reading, Symmetric
 from hexmj.controllers.cruse1998.readings import named_reading
 from hexmj.errors import InputError
-from hexmj.storage.files import read_toml
-from hexmj.timing import WINDOWS
+from hexmj.files import read_toml
+from hexmj.timing import OBSERVATION_TIMES
 
 TABLE = Path(__file__).with_name("ideal.toml")
 PRINTED = READINGS["printed"]
@@ -22,7 +22,7 @@ SEARCH_SEEDS = 0, 1
 class FoundSet:
     """One set of the HWS form, or for a range of the LDVS form, with what found it."""
 
-    window: str
+    observation_time: str
     """Observation time under which it was searched, 'walk' or 'start'."""
     low: float
     """Least velocity of the search."""
@@ -35,7 +35,7 @@ class FoundSet:
     @property
     def place(self) -> tuple[str, float, float, Reading]:
         """What it was searched for; no two sets of a table have the same."""
-        return self.window, self.low, self.high, self.controller.reading
+        return self.observation_time, self.low, self.high, self.controller.reading
 
 
 @cache
@@ -49,21 +49,27 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
     found = tuple(_read(entry, f"{path.name}, set {i + 1}") for i, entry in enumerate(table.get("set", [])))
     places = [one.place for one in found]
     if twice := [place for place in places if places.count(place) > 1]:
-        raise InputError(f"{path.name} holds two sets for {twice[0]}; expected one for each window and velocity")
+        raise InputError(
+            f"{path.name} holds two sets for {twice[0]}; expected one for each observation time and velocity"
+        )
     return found
 
 
-def found_set(window: str, low: float, high: float | None = None, reading: Reading = PRINTED) -> Cruse1998 | None:
+def found_set(
+    observation_time: str, low: float, high: float | None = None, reading: Reading = PRINTED
+) -> Cruse1998 | None:
     """The set for one velocity (Problem 1) or a range (Problem 2); None where no search has been made yet."""
-    place = window, low, low if high is None else high, reading
+    place = observation_time, low, low if high is None else high, reading
     return next((one.controller for one in found_sets() if one.place == place), None)
 
 
 def _read(entry: dict[str, Any], where: str) -> FoundSet:
-    if unknown := set(entry) - {"reading"} ^ {"window", "velocities", "command", "symmetric"}:
+    if unknown := set(entry) - {"reading"} ^ {"observation_time", "velocities", "command", "symmetric"}:
         raise InputError(f"{where}: {min(unknown)} is missing or unknown; see the head of the file")
-    if entry["window"] not in WINDOWS:
-        raise InputError(f"{where}: window = {entry['window']!r}; valid names: {', '.join(WINDOWS)}")
+    if entry["observation_time"] not in OBSERVATION_TIMES:
+        raise InputError(
+            f"{where}: observation time = {entry['observation_time']!r}; valid names: {', '.join(OBSERVATION_TIMES)}"
+        )
     velocities = entry["velocities"]
     if not (len(velocities) in (1, 2) and all(0 < v < 1 for v in velocities) and velocities == sorted(velocities)):
         raise InputError(f"{where}: velocities = {velocities}; expected one, or the ends of a range, in ]0, 1[")
@@ -73,6 +79,6 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
         valid = ", ".join(sorted(names))
         raise InputError(f"{where}: {min(unknown)} is no parameter of the {form} form; valid: {valid}")
     weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
-    name = f"ideal for {entry['window']}, V = {' to '.join(map(str, velocities))}"
+    name = f"ideal for {entry['observation_time']}, V = {' to '.join(map(str, velocities))}"
     controller = Cruse1998(weights, name=name, reading=named_reading(entry.get("reading", "printed")))
-    return FoundSet(entry["window"], velocities[0], velocities[-1], controller, entry["command"])
+    return FoundSet(entry["observation_time"], velocities[0], velocities[-1], controller, entry["command"])

@@ -17,7 +17,7 @@ from hexmj.measures.kinematic import first_loss
 from hexmj.paper.late_losses import lost_after, lost_at_periods
 from hexmj.phases import PAIRS
 from hexmj.starts import draw_starts
-from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
+from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,10 +47,10 @@ def losses(
     margin: float = 0.0,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Which starts lose static stability under both windows, (window, start): 1 lost, 0 not, -1 where there is no set.
+    """Which starts lose static stability under both observation times, (observation time, start): 1 lost, 0 not, -1 where there is no set.
 
     Args, beside those of `WalkSettings`:
-        sets: the network for each of `WINDOWS`.
+        sets: the network for each of `OBSERVATION_TIMES`.
         late: look only after `LATE_PERIODS`.
         looks: at every step, or once a period only.
         margin: by how much S is narrower than ]PEP_0, AEP_0[ at either end [mm].
@@ -59,10 +59,10 @@ def losses(
 
     inner = replace(stride, pep0=stride.pep0 + margin, aep0=stride.aep0 - margin)
     starts = draw_starts(n_starts, seed, inner)
-    lost = np.full((len(WINDOWS), n_starts), NO_SET, dtype=np.int8)
+    lost = np.full((len(OBSERVATION_TIMES), n_starts), NO_SET, dtype=np.int8)
     for one in dict.fromkeys(filter(None, sets)):
         rows = [row for row, other in enumerate(sets) if other == one]
-        times = [observation_time(WINDOWS[row], np.array(velocity), stride, acceleration) for row in rows]
+        times = [observation_duration(OBSERVATION_TIMES[row], np.array(velocity), stride, acceleration) for row in rows]
         durations = np.array(times)
         wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
         how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
@@ -73,7 +73,7 @@ def losses(
         else:
             first = first_loss(starts, one, velocity, durations.max(), **how)
             lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
-    return xr.Dataset({"lost": (("window", "start"), lost)}, {"window": list(WINDOWS)})
+    return xr.Dataset({"lost": (("observation_time", "start"), lost)}, {"observation_time": list(OBSERVATION_TIMES)})
 
 
 def limit_regimes(
@@ -90,7 +90,7 @@ def limit_regimes(
 
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     starts = draw_starts(n_starts, seed, stride)
-    duration = observation_time("walk", np.array(velocity), stride, acceleration)
+    duration = observation_duration("walk", np.array(velocity), stride, acceleration)
     times = first_loss(starts, controller, velocity, duration, **how)
     gait = limit_gait(controller, velocity, n_starts=n_starts, seed=seed, **how)
     return xr.Dataset(

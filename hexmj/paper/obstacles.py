@@ -14,7 +14,7 @@ from hexmj.controllers.protocol import SteerableController
 from hexmj.studies.disturbance.disturbances import disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan
 from hexmj.studies.disturbance.strategies import collect_postures
-from hexmj.timing import WINDOWS, Acceleration, Stride, observation_time, steps_within
+from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,9 +34,9 @@ def losses_after(
     acceleration: Acceleration | None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Which starts lose static stability after a halt in mid-stride, (window, start): 1 lost, 0 not.
+    """Which starts lose static stability after a halt in mid-stride, (observation time, start): 1 lost, 0 not.
 
-    A window begins when the walk is at its velocity again.
+    A observation time begins when the walk is at its velocity again.
 
     Args, beside those of `WalkSettings`:
         answer: to the obstacle.
@@ -63,8 +63,10 @@ def losses_after(
     ahead = plan()
     ahead.advance(int(halt.step.max()) + 1)
     back = ahead.resumed * stride.dt + (acceleration.duration(velocity) if acceleration else 0.0)
-    windows = [back + observation_time(window, velocity, stride) for window in WINDOWS]
-    steps = steps_within(windows, stride)
+    observation_times = [
+        back + observation_duration(observation_time, velocity, stride) for observation_time in OBSERVATION_TIMES
+    ]
+    steps = steps_within(observation_times, stride)
     first = planned_losses(plan(), steps.max(axis=0), threads)
     lost = ((first > 0) & (first <= steps)).astype(np.int8)
-    return xr.Dataset({"lost": (("window", "start"), lost)}, {"window": list(WINDOWS)})
+    return xr.Dataset({"lost": (("observation_time", "start"), lost)}, {"observation_time": list(OBSERVATION_TIMES)})

@@ -13,8 +13,8 @@ from hexmj.paper.found_sets import found_set
 from hexmj.paper.measurements import Looks, footfalls, limit_regimes, losses
 from hexmj.paper.obstacles import Answer, losses_after
 from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
-from hexmj.sweeps import Cell
-from hexmj.timing import WINDOWS, Acceleration, Stride
+from hexmj.sweep import Cell
+from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 
 OWN = {reading: name for name, reading in READINGS.items() if name != "printed"}
 """Readings under which sets of our own were searched -> what their names begin with, instead of 'own'."""
@@ -69,24 +69,26 @@ class Protocol:
             whole(name, getattr(self, name), 1, MOST_STARTS)
         whole("seed", self.seed, 0)
 
-    def network(self, name: str, window: str, velocity: float) -> Cruse1998 | None:
+    def network(self, name: str, observation_time: str, velocity: float) -> Cruse1998 | None:
         """The network of a measurement at a velocity, as this protocol reads it.
 
         Args:
-            name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the window and this reading,
+            name: a preset, 'ideal' (Problem 1) or one of `RANGES` (Problem 2), found under the observation time and this reading,
                 or 'own', the preset of our own for this velocity alone.
-            window: one of `WINDOWS`.
+            observation_time: one of `OBSERVATION_TIMES`.
             velocity: V_r.
 
         Returns:
             None where no such set is known.
         """
         if name == "ideal":
-            found = found_set(window, velocity, reading=self.reading)
+            found = found_set(observation_time, velocity, reading=self.reading)
         elif name == "own":
             found = PRESETS.get(f"{OWN.get(self.reading, 'own')}-{velocity:g}")
         else:
-            found = found_set(window, *RANGES[name], reading=self.reading) if name in RANGES else PRESETS[name]
+            found = (
+                found_set(observation_time, *RANGES[name], reading=self.reading) if name in RANGES else PRESETS[name]
+            )
         return found and replace(found, order=self.order, reading=self.reading)
 
 
@@ -107,7 +109,7 @@ QUICK = Protocol(
 
 @dataclass(frozen=True)
 class Losses:
-    """Which starts lose static stability under both windows: Figs. 2-4."""
+    """Which starts lose static stability under both observation times: Figs. 2-4."""
 
     preset: str
     """See `Protocol.network`."""
@@ -122,7 +124,9 @@ class Losses:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """All that its outcomes depend on, but for velocity and seed."""
         return {
-            "sets": tuple(protocol.network(self.preset, window, velocity) for window in WINDOWS),
+            "sets": tuple(
+                protocol.network(self.preset, observation_time, velocity) for observation_time in OBSERVATION_TIMES
+            ),
             "n_starts": protocol.samples * protocol.sample,
             "stride": protocol.stride,
             "acceleration": protocol.acceleration if self.accelerated else None,

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hexmj.controllers.cruse1998 import Reading
-from hexmj.intervals import WILSON_Z, wilson_interval
 from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, circular_range, classify, unrolled, wilson_phase
+from hexmj.stats import WILSON_Z, wilson_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,9 +72,9 @@ class Lost:
         """Measurements."""
         return (self.curve,) if self.minus is None else (self.curve, self.minus)
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """Where all of its sets are known."""
-        curves = [measured[name].lost.sel(window=window) for name in self.needs]
+        curves = [measured[name].lost.sel(observation_time=observation_time) for name in self.needs]
         for v in curves[0].velocity.values.tolist():
             other = v if self.at is None else self.at
             if other not in curves[-1].velocity:
@@ -86,7 +86,7 @@ class Lost:
 
 @dataclass(frozen=True)
 class _OfModel:
-    """Base of the quantities of a preset's gaits, for which no window matters."""
+    """Base of the quantities of a preset's gaits, for which no observation time matters."""
 
     model: str
     windowed = False
@@ -109,7 +109,7 @@ class Phase(_OfModel):
         """For a rule's sentence."""
         return f"{self.pairs} phase({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """One for each pair."""
         for v, one in kept_gaits(measured[self.needs[0]]):
             for pair in one.pair.values[IPSILATERAL if self.pairs == "ipsilateral" else CONTRALATERAL].tolist():
@@ -136,7 +136,7 @@ class Regime(_OfModel):
         """Measurements."""
         return (f"{self.model} gaits" if self.accelerated else f"{self.model} regimes",)
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """One for each velocity."""
         for v in measured[self.needs[0]].velocity.values.tolist():
             one = measured[self.needs[0]].sel(velocity=v)
@@ -158,7 +158,7 @@ class Scatter(_OfModel):
             return f"largest - smallest phase, on the circle, of the ipsilateral pairs({self.model})"
         return f"part of starts outside the main peak of a pair({self.model})"
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """One for each velocity, or for each pair."""
         for v, one in kept_gaits(measured[self.needs[0]]):
             if self.of == "periods":
@@ -182,7 +182,7 @@ class Named(_OfModel):
         """For a rule's sentence."""
         return f"part of gaits that are {self.name}({self.model})"
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """One for each velocity; the left side and the front legs name the gait."""
         for v, one in kept_gaits(measured[self.needs[0]]):
             phases = one.phase.sel(pair=["1-2", "2-3", "1-4"]).values
@@ -205,10 +205,14 @@ class Weight:
         """For a rule's sentence."""
         return f"|{self.parameter} / {self.over}| of the ideal sets" if self.over else f"{self.parameter} of ideal sets"
 
-    def points(self, measured: Measured, window: str) -> Iterator[Point]:
+    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """One for each set."""
         for one in found_sets():
-            if one.window == window and one.low == one.high and one.controller.reading == self.reading:
+            if (
+                one.observation_time == observation_time
+                and one.low == one.high
+                and one.controller.reading == self.reading
+            ):
                 value = getattr(one.controller.weights, self.parameter)
                 if self.over:
                     with np.errstate(divide="ignore", invalid="ignore"):

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Unpack, get_args, get_type_hints
 import numpy as np
 
 from hexmj.controllers.cruse1998 import Order, Reading
+from hexmj.io import attributes
 from hexmj.legs import CENTRED, FIG1
 from hexmj.paper.claims import INFERRED_FROM
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.scores import score, score_as_is, score_of_ideals, with_stride
-from hexmj.process.progress import part_of, shown
-from hexmj.storage.attributes import attributes
-from hexmj.sweeps import Cell, Execution, run
+from hexmj.progress import part_of, shown
+from hexmj.sweep import Cell, Execution, run_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +89,7 @@ def compare_readings(
         how: see `sweeps.Execution`.
 
     Returns:
-        Over reading, constants, claim and window: `agrees` and `miss`, see `scores.judged`, and the refined constants.
+        Over reading, constants, claim and observation time: `agrees` and `miss`, see `scores.judged`, and the refined constants.
         Of the best readings, over `best` and `aside`: `aside_agrees`; and over `ideal_claim`: `ideal_agrees`, with
         `ideal_flss` over `ideal_velocity`.
     """
@@ -98,7 +98,7 @@ def compare_readings(
     first, then = REFINED * len(readings), best * (math.prod(map(len, ASIDE.values())) - 1 + WITH_IDEALS)
     with shown(how.get("progress"), "reading") as told:
         cells = [Cell(title(one), score, {"protocol": one}) for one in readings]
-        scored = run(cells, folder, **how | {"progress": part_of(told, first / (first + then))})
+        scored = run_cells(cells, folder, **how | {"progress": part_of(told, first / (first + then))})
         scores = xr.concat(scored, xr.Variable("reading", [title(one) for one in readings]))
         order = ranking(scores)[:best]
         closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
@@ -124,7 +124,7 @@ def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how:
     looked = [read(one, aside) for one in readings for aside in asides]
     cells = [Cell(title(one), score_as_is, {"protocol": one}) for one in looked]
     cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, WITH_IDEALS) for one in readings]
-    found = run(cells, folder, **how)
+    found = run_cells(cells, folder, **how)
     judged, searched = found[: len(looked)], found[len(looked) :]
     rows = [xr.concat(judged[i : i + len(asides)], "aside").agrees for i in range(0, len(judged), len(asides))]
     names = ["; ".join(f"{name} {one}" for name, one in aside.items() if one != ASIDE[name][0]) for aside in asides]
@@ -149,15 +149,15 @@ def agreeing(scores: "xr.Dataset", held_out: bool = True) -> "xr.DataArray":
 def ranking(scores: "xr.Dataset") -> np.ndarray:
     """Places of the readings, (reading,), the best first.
 
-    More held-out claims agree, with the constants as inferred, in the better window; among equals, less is missed.
+    More held-out claims agree, with the constants as inferred, in the better observation time; among equals, less is missed.
     """
-    count = agreeing(scores).sel(constants="inferred").max("window").values
-    miss = scores.miss.sel(constants="inferred").sum("claim").min("window").values
+    count = agreeing(scores).sel(constants="inferred").max("observation_time").values
+    miss = scores.miss.sel(constants="inferred").sum("claim").min("observation_time").values
     return np.lexsort((miss, -count))
 
 
 def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray":
-    """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, window).
+    """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, observation time).
 
     The constants are those inferred.
     """
@@ -170,13 +170,15 @@ def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray
         for i in sorted(set(of.tolist())):
             rows[f"{name} {choices[i]}"] = count.isel(reading=np.flatnonzero(of == i)).mean("reading")
     values = np.stack([row.values for row in rows.values()])
-    return xr.DataArray(values, {"choice": list(rows), "window": count.window}, ("choice", "window"))
+    return xr.DataArray(
+        values, {"choice": list(rows), "observation_time": count.observation_time}, ("choice", "observation_time")
+    )
 
 
-def gained(scores: "xr.Dataset", reading: str, window: str) -> tuple[list[str], list[str]]:
+def gained(scores: "xr.Dataset", reading: str, observation_time: str) -> tuple[list[str], list[str]]:
     """Held-out claims that agree under a reading but not as printed, and the reverse; constants as inferred."""
     kept = [key for key in scores.claim.values if key not in CALIBRATED]
-    at = scores.agrees.sel(claim=kept, window=window, constants="inferred") == 1
+    at = scores.agrees.sel(claim=kept, observation_time=observation_time, constants="inferred") == 1
     one, printed = at.sel(reading=reading).values, at.sel(reading=AS_PRINTED).values
     keys = np.array(kept)
     return keys[one & ~printed].tolist(), keys[printed & ~one].tolist()

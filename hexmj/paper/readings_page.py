@@ -6,15 +6,21 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from hexmj.controllers.cruse1998 import READINGS
+from hexmj.io import markdown_table
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, effects, gained, ranking, title
-from hexmj.storage.markdown import markdown_table
-from hexmj.timing import WINDOWS
+from hexmj.timing import OBSERVATION_TIMES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-HEADS = ("reading", *(f"held out, {window}" for window in WINDOWS), "calibrated", "missed by", "refined constants")
+HEADS = (
+    "reading",
+    *(f"held out, {observation_time}" for observation_time in OBSERVATION_TIMES),
+    "calibrated",
+    "missed by",
+    "refined constants",
+)
 
 
 def readings_rows(scores: "xr.Dataset", places: Sequence[int]) -> list[tuple[str, ...]]:
@@ -23,9 +29,11 @@ def readings_rows(scores: "xr.Dataset", places: Sequence[int]) -> list[tuple[str
     rows = []
     for i in places:
         one = scores.isel(reading=i)
-        cells = [_both(held.isel(reading=i).sel(window=window)) for window in WINDOWS]
-        of = _both(calibrated.isel(reading=i).max("window"))
-        miss = " / ".join(f"{miss:.2f}" for miss in one.miss.sum("claim").min("window").values)
+        cells = [
+            _both(held.isel(reading=i).sel(observation_time=observation_time)) for observation_time in OBSERVATION_TIMES
+        ]
+        of = _both(calibrated.isel(reading=i).max("observation_time"))
+        miss = " / ".join(f"{miss:.2f}" for miss in one.miss.sum("claim").min("observation_time").values)
         rows.append((one.reading.item(), *cells, of, miss, _constants(one)))
     return rows
 
@@ -54,7 +62,7 @@ def _judged_on(scores: "xr.Dataset", one: Protocol) -> str:
         f"{held} held-out and {scores.sizes['claim'] - held} calibrated claims on the printed sets; each"
         f" is judged on {one.samples * one.sample} starts and {one.gait_starts} gaits, seed {one.seed}.  Before the"
         " slash: constants as inferred, by which readings are ranked; behind it: refined, on calibrated claims alone."
-        "  'Calibrated' and 'missed by', how far answers lie outside of their rules in sum, are of the better window.\n"
+        "  'Calibrated' and 'missed by', how far answers lie outside of their rules in sum, are of the better observation time.\n"
     )
 
 
@@ -62,39 +70,45 @@ def _named_ones(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]
     """All that have a name, and what each gains and loses against the printed one."""
     places = _named(readings)
     lines = [*markdown_table(HEADS, readings_rows(scores, places)), ""]
-    for name, window in product([title(readings[i]) for i in places[1:]], WINDOWS):
-        more, less = (", ".join(keys) or "none" for keys in gained(scores, name, window))
-        lines.append(f"- {name}, window {window}: gains {more}; loses {less}")
+    for name, observation_time in product([title(readings[i]) for i in places[1:]], OBSERVATION_TIMES):
+        more, less = (", ".join(keys) or "none" for keys in gained(scores, name, observation_time))
+        lines.append(f"- {name}, observation time {observation_time}: gains {more}; loses {less}")
     return lines
 
 
 def _changes(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
     changed = effects(scores, readings)
     rows = [
-        (choice, *(f"{changed.sel(choice=choice, window=window).item():.1f}" for window in WINDOWS))
+        (
+            choice,
+            *(
+                f"{changed.sel(choice=choice, observation_time=observation_time).item():.1f}"
+                for observation_time in OBSERVATION_TIMES
+            ),
+        )
         for choice in changed.choice.values
     ]
-    return markdown_table(("choice", *WINDOWS), rows)
+    return markdown_table(("choice", *OBSERVATION_TIMES), rows)
 
 
 def _aside(scores: "xr.Dataset") -> list[str]:
     """The best with each of the choices of which only acceleration or the measure knows."""
-    looked = (scores.aside_agrees == 1).sel(claim=_held_out(scores)).sum("claim").max("window")
-    without = agreeing(scores).sel(constants="refined").max("window")
+    looked = (scores.aside_agrees == 1).sel(claim=_held_out(scores)).sum("claim").max("observation_time")
+    without = agreeing(scores).sel(constants="refined").max("observation_time")
     rows = [
         (name, str(without.sel(reading=name).item()), *map(str, looked.sel(best=name).values.tolist()))
         for name in scores.best.values
     ]
     told = (
         "Held-out claims that agree with the choices of which only acceleration or the measure knows: refined"
-        " constants, in the better window."
+        " constants, in the better observation time."
     )
     return [told, "", *markdown_table(("reading", "none of them", *scores.aside.values), rows)]
 
 
 def _ideal_sets(scores: "xr.Dataset") -> list[str]:
     """What a search found under each of the best."""
-    judged = (scores.ideal_agrees == 1).any("window")
+    judged = (scores.ideal_agrees == 1).any("observation_time")
     rows = [
         (
             name,
@@ -104,7 +118,7 @@ def _ideal_sets(scores: "xr.Dataset") -> list[str]:
         for name in scores.best.values
     ]
     heads = ("reading", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
-    told = "FLSS of ideal sets that a short search found under each, window walk, refined constants."
+    told = "FLSS of ideal sets that a short search found under each, observation time walk, refined constants."
     return [told, "", *markdown_table(heads, rows)]
 
 

@@ -6,18 +6,19 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from hexmj.checks import path_of
+from hexmj import io
 from hexmj.controllers.cruse1998.readings import named_reading
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
+from hexmj.files import write_text
+from hexmj.io import json_text, results_folder, save
 from hexmj.measures.velocities import VELOCITY
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of
 from hexmj.paper.table import Row, claims_json, claims_markdown, judge
-from hexmj.process.progress import part_of, shown
-from hexmj.storage import results
-from hexmj.storage.results import json_text, results_folder, save_dataset, save_text
-from hexmj.sweeps import Execution, over_axes, run
+from hexmj.progress import part_of, shown
+from hexmj.sweep import Execution, over_axes, run_cells
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,13 +56,13 @@ def reproduce(
     if not only and protocol.samples != SAMPLES:
         raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, as the figures draw, or keys of claims")
     if beside:
-        check_distinct("readings beside", beside)
+        distinct("readings beside", beside)
     if "printed" in beside:
         raise InputError("reading 'printed' beside itself; expected others, beside which it stands anyway")
     readings = {name: named_reading(name) for name in beside}
-    results_folder(out := path_of(out), TABLES)
+    results_folder(out := Path(out))
     if not only:
-        results_folder(out / "figures", [name + end for name in FIGURES for end in (*DRAWN, ".nc")])
+        results_folder(out / "figures")
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
     with shown(how.get("progress"), "reproducing") as progress:
         part = how | {"progress": part_of(progress, 1 / (1 + len(readings)))}
@@ -71,7 +72,7 @@ def reproduce(
             other = _measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, part)
             rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
     texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
-    files = [save_text(text, out / name) for name, text in zip(TABLES, texts, strict=True)]
+    files = [write_text(out / name, text) for name, text in zip(TABLES, texts, strict=True)]
     if not only:
         for name, (_, draw) in FIGURES.items():
             files += save_figure(*draw(measured), out / "figures" / name)
@@ -80,7 +81,7 @@ def reproduce(
 
 def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
     """One measurement of `MEASUREMENTS`, (velocity, ...); folder and `how` as of `sweeps.finish`."""
-    return _over_velocities(name, protocol, run(cells(name, protocol), folder, **how))
+    return _over_velocities(name, protocol, run_cells(cells(name, protocol), folder, **how))
 
 
 def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
@@ -94,7 +95,7 @@ def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
 def _measurements(names: Sequence[str], protocol: Protocol, folder: Path, how: Execution) -> "dict[str, xr.Dataset]":
     """Measurements from one sweep over the velocities of all."""
     parts = {name: cells(name, protocol) for name in names}
-    data = iter(run([cell for part in parts.values() for cell in part], folder, **how))
+    data = iter(run_cells([cell for part in parts.values() for cell in part], folder, **how))
     return {name: _over_velocities(name, protocol, [*islice(data, len(part))]) for name, part in parts.items()}
 
 
@@ -107,5 +108,5 @@ def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]"
 
 def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:
     """Write a figure as PDF and PNG, and its data as NetCDF, under `path` with these endings."""
-    files = [results.save_figure(figure, path.with_name(path.name + end), **how) for end, how in DRAWN.items()]
-    return [*files, save_dataset(data, path.with_name(path.name + ".nc"))]
+    files = [io.save_figure(figure, path.with_name(path.name + end)) for end in DRAWN]
+    return [*files, save(data, path.with_name(path.name + ".nc"))]

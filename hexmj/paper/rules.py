@@ -37,10 +37,10 @@ class _OverRange:
     quantity: Quantity
     velocities: tuple[float, float]
 
-    def answer(self, measured: Measured, window: str) -> Answer | None:
+    def answer(self, measured: Measured, observation_time: str) -> Answer | None:
         """None where a set has not been searched yet."""
         low, high = self.velocities
-        points = self.quantity.points(measured, window)
+        points = self.quantity.points(measured, observation_time)
         inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
         met = [point.velocity for point in inside]
         if not met or min(met) > low + END + 1e-9 or max(met) < high - END - 1e-9:

@@ -20,7 +20,7 @@ from hexmj.paper.table import judge
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
-from hexmj.timing import WINDOWS, Stride
+from hexmj.timing import OBSERVATION_TIMES, Stride
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,23 +71,25 @@ def judged(
     """Claims judged under a protocol; measurements that are `known` need not be taken.
 
     Returns:
-        Over claim and window: `agrees`, 1, 0 or -1 where a set was not searched; and `miss`, by how much the point that
-        strains a band or a trend most lies outside.  A claim that no window concerns stands under both.
+        Over claim and observation time: `agrees`, 1, 0 or -1 where a set was not searched; and `miss`, by how much the point that
+        strains a band or a trend most lies outside.  A claim that no observation time concerns stands under both.
     """
     import xarray as xr
 
     names = {name for claim in claims for name in claim.rule.quantity.needs}
     measured = dict(known or {})
     measured |= {name: measure(name, protocol, threads=threads) for name in MEASUREMENTS if name in names - {*measured}}
-    shape = len(claims), len(WINDOWS)
+    shape = len(claims), len(OBSERVATION_TIMES)
     agrees, miss = np.full(shape, NOT_JUDGED, dtype=np.int8), np.zeros(shape)
     for i, claim in enumerate(claims):
         answers = judge(claim, measured).answers
-        for j, window in enumerate(WINDOWS):
-            if answer := answers.get(window, answers.get("")):
+        for j, observation_time in enumerate(OBSERVATION_TIMES):
+            if answer := answers.get(observation_time, answers.get("")):
                 agrees[i, j], miss[i, j] = answer.agrees, _miss(claim, answer)
-    coordinates = {"claim": [claim.key for claim in claims], "window": list(WINDOWS)}
-    return xr.Dataset({"agrees": (("claim", "window"), agrees), "miss": (("claim", "window"), miss)}, coordinates)
+    coordinates = {"claim": [claim.key for claim in claims], "observation_time": list(OBSERVATION_TIMES)}
+    return xr.Dataset(
+        {"agrees": (("claim", "observation_time"), agrees), "miss": (("claim", "observation_time"), miss)}, coordinates
+    )
 
 
 def _miss(claim: Claim, answer: Answer) -> float:
@@ -101,7 +103,7 @@ def _miss(claim: Claim, answer: Answer) -> float:
 
 
 def refined(protocol: Protocol, threads: int | None = None) -> Protocol:
-    """The protocol with the constants whose misses on `REFINED_BY` are least, under the window that they fit best."""
+    """The protocol with the constants whose misses on `REFINED_BY` are least, under the observation time that they fit best."""
     claims = [claim for claim in CLAIMS if claim.key in REFINED_BY]
 
     def miss(stride: Stride) -> float:
@@ -122,7 +124,7 @@ def with_stride(protocol: Protocol, stride: Stride) -> Protocol:
 
 
 def score(protocol: Protocol, threads: int | None = None) -> "xr.Dataset":
-    """Claims on the printed sets judged, over constants (as inferred, refined), claim and window."""
+    """Claims on the printed sets judged, over constants (as inferred, refined), claim and observation time."""
     import xarray as xr
 
     better = refined(protocol, threads)
@@ -134,14 +136,14 @@ def score(protocol: Protocol, threads: int | None = None) -> "xr.Dataset":
 
 
 def score_as_is(protocol: Protocol, threads: int | None = None) -> "xr.Dataset":
-    """Claims on the printed sets judged, over claim and window."""
+    """Claims on the printed sets judged, over claim and observation time."""
     return judged([claim for claim in CLAIMS if _is_of(claim, SCORED)], protocol, threads=threads)
 
 
 def score_of_ideals(protocol: Protocol, threads: int | None = None) -> "xr.Dataset":
-    """Claims on the ideal sets judged, over claim and window, with `flss` of the sets that a search finds anew.
+    """Claims on the ideal sets judged, over claim and observation time, with `flss` of the sets that a search finds anew.
 
-    The search is a short one, from the HWS, of each of `IDEAL_VELOCITIES` under the window 'walk'.
+    The search is a short one, from the HWS, of each of `IDEAL_VELOCITIES` under the observation time 'walk'.
     """
     import xarray as xr
 
@@ -150,7 +152,7 @@ def score_of_ideals(protocol: Protocol, threads: int | None = None) -> "xr.Datas
     lost = xr.concat(found, xr.Variable("velocity", list(IDEAL_VELOCITIES)))
     claims = [claim for claim in CLAIMS if _is_of(claim, (*SCORED, "ideal")) and not _is_of(claim, SCORED)]
     claims = [claim for claim in claims if "ideal late" not in claim.rule.quantity.needs]
-    flss = lost.lost.sel(window="walk").mean("start").rename(velocity="ideal_velocity")
+    flss = lost.lost.sel(observation_time="walk").mean("start").rename(velocity="ideal_velocity")
     return judged(claims, protocol, {"ideal": lost}, threads).assign(flss=flss)
 
 
@@ -161,7 +163,7 @@ def _ideal_losses(velocity: float, protocol: Protocol, threads: int | None) -> "
     effort = replace(IDEAL, begin=PRESETS["hws"], starts=n_starts)
     best = form.controller(search(problem, effort, threads=threads).vector)
     how: Any = {"stride": protocol.stride, "acceleration": None, "late": False, "threads": threads}
-    sets = tuple(best if window == "walk" else None for window in WINDOWS)
+    sets = tuple(best if observation_time == "walk" else None for observation_time in OBSERVATION_TIMES)
     return losses(velocity, sets, n_starts, protocol.seed, **how)
 
 

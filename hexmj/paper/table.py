@@ -1,20 +1,20 @@
-"""The table of claims: each judged over both windows, as rows, Markdown and JSON."""
+"""The table of claims: each judged over both observation times, as rows, Markdown and JSON."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from hexmj.io import markdown_table
 from hexmj.paper.claims import IN_PHYSICS, Claim
 from hexmj.paper.found_sets import SEARCH_SEEDS
 from hexmj.paper.protocol import FULL, QUICK
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
-from hexmj.storage.markdown import markdown_table
-from hexmj.timing import WINDOWS
+from hexmj.timing import OBSERVATION_TIMES
 
 NOT_SEARCHED = "not yet searched"
 SAME = "same"
-"""Stands under the second window where no window is involved."""
+"""Stands under the second observation time where no observation time is involved."""
 KINDS = ("held out", "calibrated")
 """Whether a constant was inferred from the number that a claim is about, see `claims.INFERRED_FROM`."""
 
@@ -25,25 +25,25 @@ class Row:
 
     claim: Claim
     answers: dict[str, Answer | None]
-    """By window; one, under '', where no window is involved; None where a set has not been searched yet."""
+    """By observation time; one, under '', where no observation time is involved; None where a set has not been searched yet."""
     beside: "dict[str, Row]" = field(default_factory=dict)
     """The same claim under other readings of the network, by their names."""
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """By window: agrees, differs or not yet searched."""
+        """By observation time: agrees, differs or not yet searched."""
         return {
-            window: NOT_SEARCHED if one is None else "agrees" if one.agrees else "differs"
-            for window, one in self.answers.items()
+            observation_time: NOT_SEARCHED if one is None else "agrees" if one.agrees else "differs"
+            for observation_time, one in self.answers.items()
         }
 
     @property
     def fits(self) -> str:
-        """Which window the paper's numbers fit: a window, both or neither; empty where that is not the question."""
+        """Which observation time the paper's numbers fit: a observation time, both or neither; empty where that is not the question."""
         if set(self.answers) == {""} or NOT_SEARCHED in self.verdicts.values():
             return ""
-        agreeing = [window for window, verdict in self.verdicts.items() if verdict == "agrees"]
-        return "both" if len(agreeing) == len(WINDOWS) else next(iter(agreeing), "neither")
+        agreeing = [observation_time for observation_time, verdict in self.verdicts.items() if verdict == "agrees"]
+        return "both" if len(agreeing) == len(OBSERVATION_TIMES) else next(iter(agreeing), "neither")
 
     @property
     def kind(self) -> str:
@@ -52,7 +52,7 @@ class Row:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """What `heads` names: our answers under each window, those of other readings, which window fits, why."""
+        """What `heads` names: our answers under each observation time, those of other readings, which observation time fits, why."""
         why = self.claim.why if "differs" in self.verdicts.values() else ""
         kind = f"{self.kind}: {'; '.join(self.claim.calibrates)}" if self.claim.calibrates else self.kind
         answered = [cell for row in (self, *self.beside.values()) for cell in row.ours]
@@ -60,24 +60,29 @@ class Row:
 
     @property
     def ours(self) -> list[str]:
-        """Our answers under each window."""
+        """Our answers under each observation time."""
         told = [
             f"{verdict}: {_number(answer)}" if answer else verdict
             for verdict, answer in zip(self.verdicts.values(), self.answers.values(), strict=True)
         ]
-        return told + [SAME] * (len(WINDOWS) - len(told))
+        return told + [SAME] * (len(OBSERVATION_TIMES) - len(told))
 
 
 def heads(rows: Sequence[Row]) -> tuple[str, ...]:
     """Of the columns of `Row.cells`."""
     readings = ("ours", *(rows[0].beside if rows else ()))
-    answers = (f"{reading}, {window}" for reading in readings for window in WINDOWS)
+    answers = (f"{reading}, {observation_time}" for reading in readings for observation_time in OBSERVATION_TIMES)
     return "section", "the paper", "its value", "kind", *answers, "fits", "why"
 
 
 def heads_beside(reading: str) -> tuple[str, ...]:
     """Of the columns of `cells_beside`."""
-    return "section", "the paper", "its value", *(f"{reading}, {window}" for window in WINDOWS)
+    return (
+        "section",
+        "the paper",
+        "its value",
+        *(f"{reading}, {observation_time}" for observation_time in OBSERVATION_TIMES),
+    )
 
 
 def cells_beside(rows: Sequence[Row], reading: str) -> list[tuple[str, ...]]:
@@ -86,22 +91,29 @@ def cells_beside(rows: Sequence[Row], reading: str) -> list[tuple[str, ...]]:
 
 
 def judge(claim: Claim, measured: Measured) -> Row:
-    """Judge a claim over both windows, or once where no window is involved."""
-    windows = WINDOWS if claim.rule.quantity.windowed else ("",)
-    return Row(claim, {window: claim.rule.answer(measured, window) for window in windows})
+    """Judge a claim over both observation times, or once where no observation time is involved."""
+    observation_times = OBSERVATION_TIMES if claim.rule.quantity.windowed else ("",)
+    return Row(
+        claim,
+        {observation_time: claim.rule.answer(measured, observation_time) for observation_time in observation_times},
+    )
 
 
 def summary(rows: Sequence[Row]) -> list[str]:
     """Sentences that count the verdicts, those of calibrated claims apart."""
     lines = []
-    for windows, of in ((WINDOWS, "claims on FLSS and sets"), (("",), "claims on gaits")):
-        for window in windows:
-            judged = [row for row in rows if window in row.verdicts]
-            counts = [f"{kind} {_counts([r.verdicts[window] for r in judged if r.kind == kind])}" for kind in KINDS]
-            lines.append(f"{of}{f', window {window}' if window else ''}: {'; '.join(counts)}")
+    for observation_times, of in ((OBSERVATION_TIMES, "claims on FLSS and sets"), (("",), "claims on gaits")):
+        for observation_time in observation_times:
+            judged = [row for row in rows if observation_time in row.verdicts]
+            counts = [
+                f"{kind} {_counts([r.verdicts[observation_time] for r in judged if r.kind == kind])}" for kind in KINDS
+            ]
+            lines.append(
+                f"{of}{f', observation_time {observation_time}' if observation_time else ''}: {'; '.join(counts)}"
+            )
     fits = [row.fits for row in rows if row.fits]
-    counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *WINDOWS, "neither"))
-    return [*lines, f"which window the paper's numbers fit: {counts}"]
+    counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *OBSERVATION_TIMES, "neither"))
+    return [*lines, f"which observation time the paper's numbers fit: {counts}"]
 
 
 def on_searched_starts(seed: int) -> list[str]:
@@ -149,10 +161,10 @@ def summary_beside(rows: Sequence[Row]) -> list[str]:
 
 
 def _answers(row: Row) -> dict[str, dict[str, Any]]:
-    """Verdicts and numbers, by window."""
+    """Verdicts and numbers, by observation time."""
     return {
-        window or "any": {"verdict": row.verdicts[window]} | (asdict(answer) if answer else {})
-        for window, answer in row.answers.items()
+        observation_time or "any": {"verdict": row.verdicts[observation_time]} | (asdict(answer) if answer else {})
+        for observation_time, answer in row.answers.items()
     }
 
 

@@ -13,8 +13,8 @@ from mujoco.batch import Batch
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.jitted import jitted
 from hexmj.physics.callbacks import batched
-from hexmj.process.threads import thread_count
 from hexmj.rotations import lowest
+from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
 """What a body goes on from."""

@@ -3,10 +3,8 @@
 `python -m hexmj.physics.divergence FILE` replays one.
 """
 
-import io
 import json
 import sys
-import zipfile
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
@@ -19,10 +17,10 @@ from hexmj.bodies.loading import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
+from hexmj.files import replacing
 from hexmj.physics.backend import Diverged, MujocoBatch
 from hexmj.physics.fine_steps import FineSteps
 from hexmj.rotations import lean
-from hexmj.storage.files import read_sealed, sealed, write_whole
 
 STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
 
@@ -42,9 +40,10 @@ def save_state(error: SimulationError, folder: Path) -> Path:
     Raises:
         InputError: it cannot be written.
     """
-    content = io.BytesIO()
-    np.savez(content, allow_pickle=False, **error.state)
-    return write_whole((folder / error.file_name).resolve(), sealed(content.getvalue()))
+    path = folder / error.file_name
+    with replacing(path) as part:
+        np.savez(part, allow_pickle=False, **error.state)
+    return path
 
 
 def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -81,12 +80,8 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
 
 def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody, mujoco.MjData]:
     """A written state, the body with its conditions, time step and contacts, and its data in that state."""
-    if (content := read_sealed(Path(path))) is None:
-        raise InputError(f"{path} is damaged, or no state that a simulation left; expected one of this version")
-    if not zipfile.is_zipfile(io.BytesIO(content)):
-        raise InputError(f"{path} is no state that a simulation left; expected a file of arrays, .npz")
     try:
-        with np.load(io.BytesIO(content)) as file:
+        with np.load(path) as file:
             saved = dict(file)
         conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
         compiled = compile_body(Conditions(body=body, **conditions), float(saved["timestep"]))
@@ -94,7 +89,7 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
         data = mujoco.MjData(compiled.model)
         for name in STATE:
             getattr(data, name)[:] = saved[name]
-    except (KeyError, ValueError) as error:
+    except (KeyError, OSError, ValueError) as error:
         raise InputError(f"{path} is no state of the body {body.name!r}: {error}") from None
     return saved, compiled, data
 

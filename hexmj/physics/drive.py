@@ -17,7 +17,7 @@ from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan
 from hexmj.physics.pushes import Push
 from hexmj.physics.settling import Settled
-from hexmj.process.progress import Progress
+from hexmj.progress import Progress
 from hexmj.timing import steps_within
 
 __all__ = ["Chunk", "Push", "drive"]

@@ -26,9 +26,9 @@ def steps_pushed(conditions: Conditions, stride: Stride) -> int:
     return round(PUSH_LASTS / conditions.seconds(stride))
 
 
-def can_push(conditions: Conditions, stride: Stride, window: float = np.inf) -> bool:
-    """Whether steps of the plan are short enough for a push, and a window [time units] holds it."""
-    return 0 < round(PUSH_LASTS / conditions.seconds(stride)) <= window / stride.dt + 1e-6
+def can_push(conditions: Conditions, stride: Stride, observation_time: float = np.inf) -> bool:
+    """Whether steps of the plan are short enough for a push, and a observation time [time units] holds it."""
+    return 0 < round(PUSH_LASTS / conditions.seconds(stride)) <= observation_time / stride.dt + 1e-6
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from hexmj.physics.backend import STATE, Diverged, MujocoBatch
 from hexmj.physics.divergence import walk_error
 from hexmj.physics.fine_steps import SINK
 from hexmj.physics.foot_path import standing_tips
-from hexmj.process.threads import check_memory
 from hexmj.starts import checked_starts, draw_starts
+from hexmj.threads import check_memory
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0

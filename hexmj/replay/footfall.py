@@ -8,8 +8,8 @@ from hexmj.diagrams import spans
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.measures.figures import MEASURE_COLOURS
+from hexmj.pictures import in_figure
 from hexmj.replay.schema import ROUNDING
-from hexmj.storage.literal import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,9 +7,10 @@ import xarray as xr
 
 from hexmj.bodies.loading import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
-from hexmj.checks import path_of, typed
+from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
+from hexmj.files import read_netcdf, write_netcdf
 from hexmj.legs import LEGS
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
@@ -18,9 +19,6 @@ from hexmj.physics.orders import hold
 from hexmj.replay.schema import MEASURED, PLANNED, TIMES, check_recording, check_settings, stride_settings
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
-from hexmj.storage import netcdf
-from hexmj.storage.files import read_sealed, sealed, write_whole
-from hexmj.storage.literal import literal
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start
 
@@ -117,7 +115,7 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
         InputError: it is no recording, see `check_recording`, or cannot be written.
     """
     _check(typed("recording", recording, xr.Dataset))
-    return write_whole(path_of(path), sealed(netcdf.encode(recording)))
+    return write_netcdf(recording, path)
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
@@ -126,11 +124,7 @@ def load_recording(path: Path | str) -> xr.Dataset:
     Raises:
         InputError: it cannot be read, is damaged, or is no recording.
     """
-    path = path_of(path)
-    recording = netcdf.decode(
-        read_sealed(path),
-        f"{path} is damaged, or was not written by hexmj.save_recording of this version; expected a recording",
-    )
+    recording = read_netcdf(path)
     try:
         _check(recording)
     except InputError as error:
@@ -181,7 +175,7 @@ def _dataset(
         if name in values
     }
     coords = {name: variables.pop(name) for name in TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
-    return xr.Dataset(variables, coords, {"title": literal(title), **conditions.settings(), **stride_settings(stride)})
+    return xr.Dataset(variables, coords, {"title": title, **conditions.settings(), **stride_settings(stride)})
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions
-from hexmj.errors import LONGEST, InputError
+from hexmj.errors import InputError
 from hexmj.legs import LEGS, Geometry
 from hexmj.timing import Stride
 
@@ -142,8 +142,8 @@ def check_settings(recording: xr.Dataset) -> None:
         if not _alike(given[name], usual):
             value = np.asarray(given[name]).tolist()
             raise InputError(f"no recording: attribute {name} = {value!r:.80}; expected one such as {usual!r}")
-    if not (title := given["title"]).isprintable() or len(title) > LONGEST:
-        raise InputError(f"no recording: title = {title!r:.80}; expected at most {LONGEST} printable characters")
+    if not (title := given["title"]).isprintable() or len(title) > 1000:
+        raise InputError(f"no recording: title = {title!r:.80}; expected at most {1000} printable characters")
     lines: Any = {name: tuple(map(float, given[name])) for name in ("origins", "lateral")}
     Stride(**{name: float(given[name]) for name in ("aep0", "pep0", "pep_min", "dt")}, geometry=Geometry(**lines))
 

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from hexmj.measures.figures import tidy
-from hexmj.storage.literal import in_figure
+from hexmj.pictures import in_figure
 
 if TYPE_CHECKING:
     import xarray as xr

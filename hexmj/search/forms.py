@@ -10,7 +10,7 @@ from hexmj.checks import short, typed
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.labels import vector_of
-from hexmj.sweeps.plain_settings import plain
+from hexmj.plain import plain
 
 
 @runtime_checkable

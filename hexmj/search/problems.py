@@ -10,12 +10,12 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
+from hexmj.plain import plain
 from hexmj.search.domain import Domain
 from hexmj.search.forms import Form
 from hexmj.search.network_forms import NetworkForm
 from hexmj.starts import checked_velocities
-from hexmj.sweeps.plain_settings import plain
-from hexmj.timing import WINDOWS, Acceleration, Stride, check_in_time, observation_time, steps_within
+from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, check_in_time, observation_duration, steps_within
 from hexmj.variants import variants, varied
 
 FARTHEST = 1e6
@@ -41,7 +41,7 @@ class Problem:
     """Least velocity of the range W, a fraction of V_p; Problem 1 where it is also the greatest."""
     high: float
     """Greatest velocity of the range W, a fraction of V_p."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     stride: Stride = field(default_factory=Stride)
     """Step range, lines of the tips and time step."""
@@ -71,7 +71,7 @@ class Problem:
                 f"over = {self.over!r} with {self.form!r:.80}; expected it with the 1998 network, whose rules vary"
             )
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
-        duration = observation_time(self.window, ends, self.stride, self.acceleration)
+        duration = observation_duration(self.observation_time, ends, self.stride, self.acceleration)
         check_in_time(ends, duration, self.acceleration)
         steps_within(duration, self.stride)
         _ = self.variants
@@ -87,10 +87,10 @@ class Problem:
         }
 
     @property
-    def windows(self) -> list[str | float]:
-        """The window of the cost, and the named ones beside it."""
-        named = [name for name in WINDOWS if self.low > 0 or name != "walk"]
-        return list(dict.fromkeys([self.window, *named]))
+    def observation_times(self) -> list[str | float]:
+        """The observation time of the cost, and the named ones beside it."""
+        named = [name for name in OBSERVATION_TIMES if self.low > 0 or name != "walk"]
+        return list(dict.fromkeys([self.observation_time, *named]))
 
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
         """Where a search begins, see `Form.box`; at `begin`, if one is given."""
@@ -139,7 +139,7 @@ class Problem:
 
     def settings(self) -> dict[str, Any]:
         """The problem as plain data."""
-        names = "form", "low", "high", "window", "feedback", "over", "ties"
+        names = "form", "low", "high", "observation_time", "feedback", "over", "ties"
         told = {name: plain(getattr(self, name)) for name in names}
         told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
         return told | {"conditions": self.conditions and self.conditions.settings()}

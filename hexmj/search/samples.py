@@ -12,15 +12,15 @@ from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
-from hexmj.intervals import wilson_intervals
 from hexmj.labels import check_labels
 from hexmj.measures.kinematic import first_loss
-from hexmj.process.progress import Progress, part_of
-from hexmj.process.threads import thread_count
+from hexmj.progress import Progress, part_of
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.problems import Problem
 from hexmj.starts import check_draw, draw_starts
-from hexmj.timing import observation_time, steps_within
+from hexmj.stats import wilson_intervals
+from hexmj.threads import thread_count
+from hexmj.timing import observation_duration, steps_within
 from hexmj.variants import varied
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ class Sample:
 
     def _cost(self, candidate: Controller, threads: int | None) -> float:
         """FLSS; where ties are broken, with one start more that counts for the part of the time lost on average."""
-        times, (ends,) = self._times(candidate, [self.problem.window], threads)
+        times, (ends,) = self._times(candidate, [self.problem.observation_time], threads)
         lost = (times <= ends).sum().item()
         if self.problem.ties == "equal":
             return lost / self.n_starts
@@ -166,7 +166,7 @@ class Sample:
             who = f"the best candidate of the {stage}, with {self._told(best)},"
             who += f" does not walk from its {self.n_starts} starts"
             try:
-                one._times(one.problem.controller(best), [one.problem.window], threads)
+                one._times(one.problem.controller(best), [one.problem.observation_time], threads)
             except InputError as error:
                 raise InputError(f"{who}: {error}") from None
             except SimulationError as error:
@@ -175,7 +175,7 @@ class Sample:
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
     ) -> "xr.Dataset":
-        """FLSS of controllers over (controller, window) with its 95 % Wilson interval, on these starts.
+        """FLSS of controllers over (controller, observation time) with its 95 % Wilson interval, on these starts.
 
         The interval of a mean over variants is that of the mean count, rounded, and too wide rather than too narrow: as
         if all lost stability together.
@@ -185,12 +185,15 @@ class Sample:
         """
         import xarray as xr
 
-        windows, told = self.problem.windows, part_of(progress, 1.0 / len(controllers) / len(self.variants))
+        observation_times, told = (
+            self.problem.observation_times,
+            part_of(progress, 1.0 / len(controllers) / len(self.variants)),
+        )
 
         def losses(variant: str, name: str, controller: Controller) -> np.ndarray:
-            """Number of starts that lose stability, or fall, within each window, (window,)."""
+            """Number of starts that lose stability, or fall, within each observation time, (observation time,)."""
             try:
-                times, ends = self.variants[variant]._times(varied(controller, variant), windows, threads)
+                times, ends = self.variants[variant]._times(varied(controller, variant), observation_times, threads)
             except InputError as error:
                 raise InputError(f"the verdict on {name}: {error}") from None
             if told:
@@ -199,23 +202,29 @@ class Sample:
 
         lost = self._together([[losses(one, *which) for which in controllers.items()] for one in self.variants])
         low, high = wilson_intervals(np.rint(lost), self.n_starts)
-        over, unit = ("controller", "window"), {"units": "1"}
+        over, unit = ("controller", "observation_time"), {"units": "1"}
         return xr.Dataset(
             {
                 "flss": (over, lost / self.n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
                 "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
                 "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
             },
-            coords={"controller": list(controllers), "window": [str(window) for window in windows]},
+            coords={
+                "controller": list(controllers),
+                "observation_time": [str(observation_time) for observation_time in observation_times],
+            },
         )
 
     def _times(
-        self, controller: Controller, windows: list[str | float], threads: int | None
+        self, controller: Controller, observation_times: list[str | float], threads: int | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """When each start loses stability, or falls, (start,), and the ends of its windows, (window, start), both
+        """When each start loses stability, or falls, (start,), and the ends of its observation times, (observation time, start), both
         [time units]; an end is a millionth of a step late, so that what happens in its step is within."""
         p, dt = self.problem, self.problem.stride.dt
-        times = [observation_time(window, self.velocity, p.stride, p.acceleration) for window in windows]
+        times = [
+            observation_duration(observation_time, self.velocity, p.stride, p.acceleration)
+            for observation_time in observation_times
+        ]
         ends = np.array([steps_within(time, p.stride) for time in times]) * dt
         longest = ends.max(axis=0)
         if p.conditions:

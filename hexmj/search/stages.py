@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -14,17 +13,16 @@ import numpy as np
 from hexmj.checks import check_types, path_of, typed, whole
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError, without_extra
-from hexmj.process.progress import Progress, shown
-from hexmj.process.threads import thread_count
+from hexmj.plain import plain
+from hexmj.progress import Progress, shown
 from hexmj.search.domain import Domain
 from hexmj.search.evolution import Evolution
 from hexmj.search.history import Asked, history
 from hexmj.search.problems import Problem
 from hexmj.search.samples import REFUSED, Sample
 from hexmj.starts import check_draw
-from hexmj.storage.locks import locked
-from hexmj.sweeps import Cell, KeptValues
-from hexmj.sweeps.plain_settings import plain
+from hexmj.sweep import CachedValues, Cell
+from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,7 +127,7 @@ def search(
         from hexmj.physics.settling import check_adhesion
 
         check_adhesion(problem.conditions, problem.stride, effort.seed)
-    with shown(progress, "searching") as told, locked(folder) if folder else nullcontext():
+    with shown(progress, "searching") as told:
         return _search(problem, effort, folder, threads, told)
 
 
@@ -145,7 +143,7 @@ def _search(
         sample.settle(threads)
     searcher = _searcher(effort, domain)
     kept = {
-        stage: KeptValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
+        stage: CachedValues(Cell(stage, sample.costs, {}), folder, threads=threads) for stage, sample in samples.items()
     }
 
     def costs(stage: str, candidates: np.ndarray) -> np.ndarray:

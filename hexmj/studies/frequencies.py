@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.intervals import paired_difference, wilson_intervals
+from hexmj.stats import paired_difference, wilson_intervals
 
 if TYPE_CHECKING:
     import xarray as xr

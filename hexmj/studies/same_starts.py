@@ -8,10 +8,10 @@ from hexmj.checks import check_types
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
+from hexmj.io import attributes
 from hexmj.measures.kinematic import settings
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.starts import check_draw
-from hexmj.storage.attributes import attributes
 from hexmj.timing import Acceleration, Stride
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class SameStarts:
     _: KW_ONLY
     n_starts: int = 100
     """Number of starts, the same in every cell."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     seed: int = 0
     """Of the starts."""
@@ -62,7 +62,7 @@ class SameStarts:
     def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
         """A result with all that is needed to run the study again: what all studies have, and its own; conditions but
         for lists."""
-        same = self.window, self.n_starts, self.seed, self.stride, self.acceleration
+        same = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         conditions = {name: value for name, value in self.conditions.settings().items() if name not in self.lists}
         told = settings({self.controller.name: self.controller}, *same) | own | {"conditions": conditions}
         return table.assign_attrs(attributes({"study": study} | told))

@@ -3,7 +3,6 @@
 import socket
 
 from hexmj.errors import InputError
-from hexmj.storage.literal import literal
 
 MOST_PORT = 65535
 
@@ -22,7 +21,7 @@ def check_port(host: str, port: int) -> None:
     except (OSError, UnicodeError) as error:
         unknown = isinstance(error, socket.gaierror | UnicodeError)
         raise InputError(
-            f"--host {literal(host)}: {'no such name' if unknown else error.strerror}; expected an address of this"
+            f"--host {host}: {'no such name' if unknown else error.strerror}; expected an address of this"
             " machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
     try:

@@ -31,7 +31,7 @@ from pydrake.common.eigen_geometry import Quaternion  # pyright: ignore[reportMi
 from hexmj.body import ROOT_QPOS
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.intervals import wilson_interval
+from hexmj.stats import wilson_interval
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.orders import OrdersFromPlan
 from hexmj.physics.settling import Settled, settle

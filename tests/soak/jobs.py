@@ -22,8 +22,8 @@ from hexmj.measures.kinematic import first_loss
 from hexmj.search.forms import FieldsForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
-from hexmj.storage.results import results_folder, save_dataset
-from hexmj.sweeps import Cell, over_axes, run
+from hexmj.io import results_folder, save
+from hexmj.sweep import Cell, over_axes, run_cells
 from tests.soak import counted
 from tests.soak.counted import Counted
 
@@ -43,15 +43,15 @@ def sweep(folder: Path, n: int = 2, **how: Any) -> None:
     results_folder(folder, [RESULT])
     velocities = [round(0.3 + 0.1 * i, 1) for i in range(n)]
     cells = [Cell(f"V-{v:g}", losses, {"controller": Counted(), "velocity": v}) for v in velocities]
-    found = over_axes({"velocity": n}, run(cells, folder / "walks", **how))
-    save_dataset(found, folder / RESULT)
+    found = over_axes({"velocity": n}, run_cells(cells, folder / "walks", **how))
+    save(found, folder / RESULT)
 
 
 def physical(folder: Path, **how: Any) -> None:
     """Physical cells, by the API."""
     results_folder(folder, [RESULT])
     found = compare(Counted(), [0.3, 0.5], n_starts=2, window=2.0, folder=folder / "walks", **how)
-    save_dataset(found, folder / RESULT)
+    save(found, folder / RESULT)
 
 
 def searched(folder: Path, conditions: hexmj.Conditions | None = None) -> None:
@@ -63,7 +63,7 @@ def searched(folder: Path, conditions: hexmj.Conditions | None = None) -> None:
     )  # fmt: skip
     problem = Problem(FieldsForm(Counted()), 0.5, 0.5, 2.0, conditions=conditions)
     found = search(problem, effort, folder=folder / "evaluations", threads=1)
-    save_dataset(found.history, folder / RESULT)
+    save(found.history, folder / RESULT)
 
 
 def pooled(job: Callable[..., None], folder: Path) -> None:
@@ -82,7 +82,7 @@ def killed(seed: int) -> xr.Dataset:
 
 def loses_a_process(folder: Path, **how: Any) -> None:
     """A sweep of which one process is killed."""
-    run([Cell(f"{seed}", killed, {"seed": seed}) for seed in (0, 1)], folder / "walks", **how)
+    run_cells([Cell(f"{seed}", killed, {"seed": seed}) for seed in (0, 1)], folder / "walks", **how)
 
 
 def command(folder: Path, *more: str) -> None:

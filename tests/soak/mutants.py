@@ -21,7 +21,7 @@ from queue import Queue
 from subprocess import DEVNULL
 from tempfile import TemporaryDirectory
 
-from hexmj.intervals import wilson_interval
+from hexmj.stats import wilson_interval
 
 ROOT = Path(__file__).parents[2]
 COPIED = ("hexmj", "tests", "assets", "examples", "pyproject.toml")

@@ -18,8 +18,8 @@ from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetri
 from hexmj.controllers.losses import planned_losses
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
-from hexmj.process.threads import run_blocks, thread_count
 from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import run_blocks, thread_count
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
 

@@ -20,7 +20,7 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.errors import InputError
-from hexmj.storage.files import SEARCHED, read_toml
+from hexmj.files import SEARCHED, read_toml
 
 OWN = Path(__file__).with_name("own.toml")
 """Sets of our own, with the commands that found or built them."""

@@ -24,8 +24,8 @@ import numpy as np
 
 from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
 from hexmj.errors import InputError
+from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4
-from hexmj.storage.files import read_toml
 
 FOUND = Path(__file__).with_name("evolved.toml")
 """The constants that were found, and how; as the search wrote them."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.errors import RenderingError, without_extra
-from hexmj.process.signals import unheard_by_children
 
 if TYPE_CHECKING:
     import mediapy
@@ -44,8 +43,7 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
     writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, **HOW[path.suffix])
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-        with unheard_by_children():
-            writer.__enter__()
+        writer.__enter__()
     except (OSError, RuntimeError) as error:
         raise RenderingError(f"ffmpeg cannot be run ({error}); reinstall imageio-ffmpeg") from None
     try:

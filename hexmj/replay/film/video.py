@@ -15,14 +15,14 @@ from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
-from hexmj.process.progress import Progress, shown
+from hexmj.files import replacing
+from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.film import encoder
 from hexmj.replay.film.film import MOST_PANELS, Film
 from hexmj.replay.film.overlay import Overlay, lacking
 from hexmj.replay.take import Take, support_on_ground, takes_of
-from hexmj.storage.files import replacing
 
 BRIGHTER = 1.2
 """Without shadows MuJoCo lights nothing beyond its own colour; the ground's is raised by this to make up for it."""

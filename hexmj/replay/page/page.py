@@ -10,9 +10,9 @@ import xarray as xr
 from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import path_of, typed
 from hexmj.errors import InputError
+from hexmj.files import write_text
 from hexmj.replay.page.page_data import shown
 from hexmj.replay.take import takes_of
-from hexmj.storage.files import write_whole
 
 MOST = 2
 """Recordings side by side, at most."""
@@ -39,7 +39,7 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
     path = path_of(path)
     if path.suffix != ".html":
         raise InputError(f"the page cannot be written to {path}; expected a name with .html")
-    return write_whole(path, page_text(recordings, body).encode())
+    return write_text(path, page_text(recordings, body))
 
 
 def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:

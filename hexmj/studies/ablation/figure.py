@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.measures.captions import caption, starts_in_words
-from hexmj.storage.literal import in_figure
+from hexmj.pictures import in_figure
 from hexmj.studies.ablation.study import MEASURES
 from hexmj.studies.league.study import REGIMES
 

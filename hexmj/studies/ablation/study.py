@@ -13,16 +13,16 @@ from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
+from hexmj.io import attributes
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed, velocity_axis
-from hexmj.storage.attributes import attributes
+from hexmj.plain import plain
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.study import FRESH, PERIODS, REGIMES, check_counts
 from hexmj.studies.short_names import short_names
-from hexmj.sweeps import Cell
-from hexmj.sweeps.plain_settings import plain
+from hexmj.sweep import Cell
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class Ablation:
         return {name: one for several in self.models.values() for name, one in several.items()}
 
     def cells(self) -> list[Cell]:
-        """Every controller, velocity and measure; see `sweeps.Study`."""
+        """Every controller, velocity and measure; see `sweep.Study`."""
         from hexmj.physics.settling import check_adhesion
         from hexmj.studies.league import in_physics
 
@@ -135,11 +135,13 @@ class Ablation:
             told: dict[str, Any] = {"entrant": Entrant(controller), "velocity": velocity, "seed": self.seed}
             told |= {"stride": self.stride, "n_starts": self.n_starts}
             if measure in ("start", "walk"):
-                return Cell(f"{name}-{measure}-V-{velocity:g}", on_paper.losses, told | {"window": measure}, time)
+                return Cell(
+                    f"{name}-{measure}-V-{velocity:g}", on_paper.losses, told | {"observation_time": measure}, time
+                )
             if measure == "limit":
                 few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
                 return Cell(f"{name}-limit-V-{velocity:g}", on_paper.regimes, told | few, 10 * time)
-            own = {"controller": controller, "window": "walk", "conditions": self.conditions}
+            own = {"controller": controller, "observation_time": "walk", "conditions": self.conditions}
             walked = told | own | {"n_starts": self.n_physical}
             return Cell(f"{name}-physical-V-{velocity:g}", in_physics.walks, walked, 20 * time)
 
@@ -168,7 +170,11 @@ class Ablation:
         axes = {"controller": names, "measure": list(MEASURES), "whole": ("controller", list(whole_of.values()))}
         settings: dict[str, Any] = {"study": "ablate"}
         settings |= {name: getattr(self, name) for name in ("n_starts", "n_physical", "periods", "seed")}
-        settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride), "window": "walk"}
+        settings |= {
+            "conditions": self.conditions.settings(),
+            "stride": asdict(self.stride),
+            "observation_time": "walk",
+        }
         settings |= {"controllers": {name: plain(one) for name, one in self.controllers.items()}}
         settings["not_printed"] = not_printed(
             {"controllers": {name: settings["controllers"][name] for name in self.models}}

@@ -11,10 +11,10 @@ from hexmj.legs import SIDE
 from hexmj.measures.walk_settings import WalkSettings
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.physics.settling import Settling
-from hexmj.process.threads import check_memory
 from hexmj.rotations import heading, rotated, turned
 from hexmj.studies.biology.names import EACH, JOINTS, SEGMENTS, UNITS
 from hexmj.studies.biology.strides import Strides, last_strides
+from hexmj.threads import check_memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -174,7 +174,7 @@ def _coxae(compiled: CompiledBody) -> np.ndarray:
     return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]
 
 
-def _seen(values: np.ndarray, window: float) -> np.ndarray:
-    """Means over a window [rows] of values, (row,); fewer than these."""
-    width = max(1, round(window))
+def _seen(values: np.ndarray, observation_time: float) -> np.ndarray:
+    """Means over a observation time [rows] of values, (row,); fewer than these."""
+    width = max(1, round(observation_time))
     return np.convolve(values, np.ones(width) / width, "valid")

@@ -14,7 +14,7 @@ from hexmj.phases import unrolled
 from hexmj.studies.biology.animals import ANIMALS, SPEEDS
 from hexmj.studies.biology.names import PHASES, UNITS
 from hexmj.studies.same_starts import SameStarts
-from hexmj.sweeps import Cell
+from hexmj.sweep import Cell
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +30,7 @@ class Biology(SameStarts):
     periods: int = 30
     """Of a single leg; so long do the starts walk, until they have found their gait."""
     n_starts: int = field(default=20, kw_only=True)
-    window: str = field(default="periods", init=False)
+    observation_time: str = field(default="periods", init=False)
     """All walk so many periods."""
     acceleration: None = field(default=None, init=False)
 
@@ -48,7 +48,7 @@ class Biology(SameStarts):
             raise InputError(f"grasp = {self.conditions.grasp}; expected 0, since adhesion is no ground force")
 
     def cells(self) -> list[Cell]:
-        """A cell for each speed; see `sweeps.Study`."""
+        """A cell for each speed; see `sweep.Study`."""
         from hexmj.studies.biology.quantities import quantity_table
 
         def cell(speed: float) -> Cell:
@@ -92,7 +92,7 @@ class Biology(SameStarts):
         measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
         units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
         told = {name: ("row", values, {"units": units[name]}) for name, values in columns.items()}
-        walked = {"window": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
+        walked = {"observation_time": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
         return self.labelled(table.assign(told), "biology", **walked)
 
 

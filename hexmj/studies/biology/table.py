@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from hexmj.io import markdown_table
 from hexmj.measures.drawable_parts import check_axes, what_parts_may_lack
-from hexmj.storage.markdown import markdown_table
 from hexmj.studies.biology.animals import SOURCES
 from hexmj.studies.biology.study import walked_in_words
 

@@ -31,7 +31,7 @@ ROWS = {"kinematic": "on paper (kinematic)", "physical": "falls (physical)"}
 
 
 def disturbed_figure(result: "xr.Dataset") -> "Picture":
-    """A column of panels for each disturbance, a row for each measure; window `whole`, from `DisturbedWalks`."""
+    """A column of panels for each disturbance, a row for each measure; observation time `whole`, from `DisturbedWalks`."""
     from matplotlib.lines import Line2D
 
     from hexmj.pictures import head, picture
@@ -44,7 +44,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Picture":
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
     used = [strategy for strategy in STYLES if strategy in strategies]
     shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
-    one = result.sel(window="whole").sortby("velocity")
+    one = result.sel(observation_time="whole").sortby("velocity")
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
         if measure == "kinematic" and kind.startswith("push"):

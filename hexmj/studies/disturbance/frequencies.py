@@ -9,7 +9,7 @@ from hexmj.studies.frequencies import differences, frequency
 if TYPE_CHECKING:
     import xarray as xr
 
-WINDOWS = ("whole", "short")
+OBSERVATION_TIMES = ("whole", "short")
 """Both begin with the disturbance; `whole` ends an observation time after the walk is at its velocity again, `short`
 an observation time after the disturbance."""
 
@@ -21,17 +21,17 @@ CLOSE = 1e-6
 
 
 def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
-    """Add, over (window, velocity, case), the frequencies of both measures.
+    """Add, over (observation time, velocity, case), the frequencies of both measures.
 
-    `kinematic` is the fraction that loses static stability after the disturbance and within the window, of the
+    `kinematic` is the fraction that loses static stability after the disturbance and within the observation time, of the
     `kinematic_reached` starts that have not lost it before, with its 95 % Wilson interval `_low`, `_high`.
     `kinematic_buys` is what the case's strategy takes off the FLSS of the same disturbance without a strategy, over
     the starts that reach it in both cases, with its 95 % interval.  The same of `physical` where there is one.
     """
-    dims = ("window", "velocity", "case")
+    dims = ("observation_time", "velocity", "case")
     names = data.disturbance.values.tolist()
     without = [names.index(name) for name in names]  # the first case of a disturbance has no strategy
-    new: dict[str, Any] = {"window": list(WINDOWS)}
+    new: dict[str, Any] = {"observation_time": list(OBSERVATION_TIMES)}
     time, back, duration = data.time.values, data.back.values, data.duration.values[:, None, None]
     ends = np.stack((back + duration, time + duration))
     for measure in [name for name, outcome in MEASURES.items() if outcome in data]:

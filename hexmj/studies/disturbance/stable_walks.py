@@ -78,7 +78,7 @@ class StableWalks:
     def times(
         self,
         case: Case,
-        window: float,
+        observation_time: float,
         recovery: Acceleration | None,
         conditions: Conditions | None,
         threads: int | None = None,
@@ -88,7 +88,7 @@ class StableWalks:
 
         Args:
             case: what they meet, and their strategy.
-            window: how long they walk once all are at V again [time units].
+            observation_time: how long they walk once all are at V again [time units].
             recovery: of the strategy 'slow_down'.
             conditions: of the physical walk; without them there is none, and no fall.
             threads: one per core unless given; the times do not depend on it.
@@ -108,7 +108,7 @@ class StableWalks:
         ahead = self._plan(disturbed, self.found.starts, recovery, threads)
         advanced(ahead, int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
-        end = float(back.max() + window)
+        end = float(back.max() + observation_time)
         starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance.of(which))
         time = disturbed.disturbance.step * self.stride.dt
         first = planned_losses(

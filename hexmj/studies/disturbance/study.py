@@ -12,15 +12,15 @@ import numpy as np
 
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError
+from hexmj.io import settings
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.physics.pushes import steps_pushed
 from hexmj.starts import checked_list
-from hexmj.storage.attributes import settings
 from hexmj.studies.disturbance.cases import Answer, Case, Kind, every_case
 from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.disturbance.frequencies import with_flss_after
 from hexmj.studies.same_starts import SameStarts
-from hexmj.sweeps import Cell, over_axes
+from hexmj.sweep import Cell, over_axes
 from hexmj.timing import MOST_STEPS, Acceleration, check_reached, steps_within
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ units; `docs/laboratory.md` tells what was tried."""
 class DisturbedWalks(SameStarts):
     """The same starts in every case, an undisturbed one among them, at every velocity.
 
-    The controller is a `SteerableController`, or `ReadsLegs` around one; `window` is that of `frequencies.WINDOWS`.
+    The controller is a `SteerableController`, or `ReadsLegs` around one; `observation_time` is that of `frequencies.OBSERVATION_TIMES`.
     """
 
     velocities: Sequence[float] = (0.3, 0.5, 0.7)
@@ -64,16 +64,16 @@ class DisturbedWalks(SameStarts):
             least = f" and at least V_r(0), {low:g}, to which it slows down" if slows else ""
             raise InputError(f"velocities = {v.tolist()}; expected above 0{least}")
         check_reached(v, self.stride, self.recovery if slows else None)
-        window, dt = self.observed[1], self.stride.dt
-        if slows and (longest := float((window + self.recovery.duration(v)).max())) > MOST_STEPS * dt:
+        observation_time, dt = self.observed[1], self.stride.dt
+        if slows and (longest := float((observation_time + self.recovery.duration(v)).max())) > MOST_STEPS * dt:
             raise InputError(
-                f"recovery: V and the window after it take {longest:g} time units; expected at most {MOST_STEPS * dt:g}"
+                f"recovery: V and the observation time after it take {longest:g} time units; expected at most {MOST_STEPS * dt:g}"
             )
         if self.physical and "push" in self.disturbances:
             lasts = steps_pushed(self.conditions, self.stride)
-            if (steps_within(window, self.stride) < lasts).any():
+            if (steps_within(observation_time, self.stride) < lasts).any():
                 raise InputError(
-                    f"window = {self.window!r}, {window.min():g} time units; expected at least {lasts * dt:g}, which a"
+                    f"observation time = {self.observation_time!r}, {observation_time.min():g} time units; expected at least {lasts * dt:g}, which a"
                     " push lasts"
                 )
         replace(self.conditions, grasp=self.adhesion)
@@ -89,10 +89,10 @@ class DisturbedWalks(SameStarts):
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.window, self.stride)
+        return observed(self.velocities, self.observation_time, self.stride)
 
     def cells(self) -> list[Cell]:
-        """A cell for each velocity and case; see `sweeps.Study`."""
+        """A cell for each velocity and case; see `sweep.Study`."""
         from hexmj.physics.settling import check_adhesion
 
         check_velocities(self.controller, self.velocities, self.stride)
@@ -106,16 +106,16 @@ class DisturbedWalks(SameStarts):
         def walks(velocity: float) -> StableWalks:
             return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
 
-        def cell(walks: StableWalks, case: Case, window: float) -> Cell:
+        def cell(walks: StableWalks, case: Case, observation_time: float) -> Cell:
             grasping = replace(self.conditions, grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
             settings = {
                 "case": case,
-                "window": window,
+                "observation_time": observation_time,
                 "recovery": self.recovery if case.strategy == "slow_down" else None,
                 "conditions": grasping if self.physical else None,
             }
             name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
-            return Cell(name, walks.times, settings, work=window)
+            return Cell(name, walks.times, settings, work=observation_time)
 
         at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
         return [cell(one, case, time) for one, time in at for case in self.cases]

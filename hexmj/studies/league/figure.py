@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from hexmj.measures.captions import caption, starts_in_words
-from hexmj.storage.literal import in_figure
+from hexmj.pictures import in_figure
 from hexmj.studies.league.table import MEASURES, by_rank, from_one, place
 
 if TYPE_CHECKING:

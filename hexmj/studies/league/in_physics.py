@@ -24,7 +24,7 @@ from hexmj.studies.disturbance.disturbances import TooFewStable
 from hexmj.studies.disturbance.stable_walks import StableWalks
 from hexmj.studies.frequencies import came
 from hexmj.studies.league.entrant import Entrant
-from hexmj.timing import Stride, observation_time, steps_within
+from hexmj.timing import Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +43,7 @@ def unless_refused(
     walked: Callable[[np.ndarray], "xr.Dataset"], n_starts: int, columns: Mapping[str, str]
 ) -> "xr.Dataset":
     """How every start goes; one whose walk is refused is NaN throughout and no outcome: it diverged, its tips are out
-    of reach, or a push still throws it as the window ends.
+    of reach, or a push still throws it as the observation time ends.
 
     Args:
         walked: how some of the starts go, (n,), which does not depend on the others.
@@ -69,7 +69,7 @@ def walks(
     entrant: Entrant,
     controller: Controller,
     velocity: float,
-    window: str | float,
+    observation_time: str | float,
     *,
     n_starts: int,
     seed: int,
@@ -82,7 +82,7 @@ def walks(
     Args, beside those of `WalkSettings`:
         entrant: with whose starts it is walked.
         controller: plans: the entrant's own, or what was made of it.
-        window: 'walk', 'start' or the observation time [time units].
+        observation_time: 'walk', 'start' or the observation time [time units].
 
     Returns:
         Over start all `Outcomes`; of the joints the `work` over the insect's weight [mm] and the greatest `torque` over
@@ -92,7 +92,7 @@ def walks(
         SimulationError: none of the random starts comes to rest, whoever walks.
     """
     starts = entrant.starts(n_starts, seed, velocity, stride)
-    duration = float(observation_time(window, velocity, stride))
+    duration = float(observation_duration(observation_time, velocity, stride))
     steps = int(steps_within(duration, stride))
 
     def walked(which: np.ndarray) -> "xr.Dataset":
@@ -131,7 +131,7 @@ def disturbed(
     entrant: Entrant,
     velocity: float,
     case: Case,
-    window: str | float,
+    observation_time: str | float,
     *,
     n_starts: int,
     seed: int,
@@ -143,7 +143,7 @@ def disturbed(
     """Whether starts `fell` that a disturbance met, over start: 1 or 0, or NaN where too few starts are stable until
     then, the insect fell before, or the walk is refused, see `unless_refused`; arguments as of `StableWalks`."""
     found = StableWalks(entrant.controller, velocity, n_starts, seed, stride, grid)
-    asked = case, float(observation_time(window, velocity, stride)), None, conditions, threads
+    asked = case, float(observation_duration(observation_time, velocity, stride)), None, conditions, threads
     try:
         times = unless_refused(lambda which: found.times(*asked, which)[[*DISTURBED]], n_starts, DISTURBED)
     except TooFewStable:

@@ -11,7 +11,7 @@ from hexmj.measures.kinematic import first_loss
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.league.entrant import Entrant
-from hexmj.timing import Acceleration, Stride, observation_time
+from hexmj.timing import Acceleration, Stride, observation_duration
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def losses(
     entrant: Entrant,
     velocity: float,
-    window: str | float,
+    observation_time: str | float,
     *,
     n_starts: int,
     seed: int,
@@ -33,12 +33,12 @@ def losses(
 
     Args, beside those of `WalkSettings`:
         entrant: who walks.
-        window: 'walk', 'start' or the observation time [time units]; a number, too, from when on V_r is reached.
+        observation_time: 'walk', 'start' or the observation time [time units]; a number, too, from when on V_r is reached.
         leg_lost: index of a leg that is lost.
     """
     controller = entrant.controller if leg_lost is None else LegLost(entrant.controller, leg_lost)
     starts = entrant.starts(n_starts, seed, velocity, stride)
-    duration = float(observation_time(window, velocity, stride))
+    duration = float(observation_duration(observation_time, velocity, stride))
     duration += acceleration.duration(velocity) if acceleration else 0.0
     how = {"stride": stride, "acceleration": acceleration, "threads": threads}
     return _lost(first_loss(starts, controller, velocity, duration, **how))
@@ -48,7 +48,7 @@ def losses_over_range(
     entrant: Entrant,
     low: float,
     high: float,
-    window: str | float,
+    observation_time: str | float,
     *,
     n_starts: int,
     seed: int,
@@ -57,7 +57,7 @@ def losses_over_range(
 ) -> "xr.Dataset":
     """The same where every start has a velocity of its own, uniform from `low` to `high` (Eq. 10)."""
     velocity = np.random.default_rng([seed, 1]).uniform(low, high, n_starts)
-    duration = observation_time(window, velocity, stride)
+    duration = observation_duration(observation_time, velocity, stride)
     starts = draw_starts(n_starts, seed, stride)
     return _lost(first_loss(starts, entrant.controller, velocity, duration, stride=stride, threads=threads))
 

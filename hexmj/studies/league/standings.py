@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.intervals import paired_difference
 from hexmj.measures.velocities import VELOCITY
 from hexmj.phases import circular_mean
+from hexmj.stats import paired_difference
 from hexmj.studies.frequencies import came, differences, frequencies, padded
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.trials import TRIALS

@@ -11,19 +11,19 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import check_velocities
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
+from hexmj.io import attributes
 from hexmj.measures.captions import not_printed
 from hexmj.measures.velocities import observed
 from hexmj.physics.pushes import can_push
+from hexmj.plain import plain
 from hexmj.starts import check_draw
-from hexmj.storage.attributes import attributes
 from hexmj.studies.disturbance.disturbances import GRID
 from hexmj.studies.league import on_paper
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.standings import standings
 from hexmj.studies.league.trials import DISTURBED, GROUNDS, LEGS_LOST, LOAD, TRIALS, crossed, walking
-from hexmj.sweeps import Cell
-from hexmj.sweeps.plain_settings import plain
-from hexmj.timing import Acceleration, Stride, observation_time
+from hexmj.sweep import Cell
+from hexmj.timing import Acceleration, Stride, observation_duration
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +73,7 @@ class League:
     """V_r of the trials."""
     accelerating: bool = True
     """Whether walks on paper accelerate to V_r = 0.9, too, which takes as long as everything else on paper."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     periods: int = PERIODS
     """Cycles that every leg has time for until its limit regime is looked at."""
@@ -104,14 +104,14 @@ class League:
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.window, self.stride)
+        return observed(self.velocities, self.observation_time, self.stride)
 
     def named_cells(self) -> dict[tuple[str, str], Cell]:
         """Every cell by its entrant and what it is asked."""
         return {(name, what): cell for name, entrant in self.entrants.items() for what, cell in self._asked(entrant)}
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`."""
+        """See `sweep.Study`."""
         from hexmj.physics.settling import check_adhesion
 
         for entrant in self.entrants.values():
@@ -124,7 +124,7 @@ class League:
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """All that the table, the figures and the ranks are made of; see `standings.standings`."""
-        told = ("velocities", "n_starts", "n_physical", "n_tried", "tried_at", "window", "periods", "seed")
+        told = ("velocities", "n_starts", "n_physical", "n_tried", "tried_at", "observation_time", "periods", "seed")
         told += ("accelerating",)
         settings: dict[str, Any] = {"study": "league"} | {name: plain(getattr(self, name)) for name in told}
         settings |= {"conditions": self.conditions.settings(), "stride": asdict(self.stride)}
@@ -142,11 +142,18 @@ class League:
             told = {"entrant": entrant, "n_starts": self.n_starts, "seed": self.seed, "stride": self.stride, **own}
             return Cell(f"{entrant.controller.name}-{name}", function, told, float(time * told["n_starts"]))
 
-        window = {"window": self.window}
-        walked = window | {"controller": entrant.controller, "conditions": self.conditions, "n_starts": self.n_physical}
+        observation_time = {"observation_time": self.observation_time}
+        walked = observation_time | {
+            "controller": entrant.controller,
+            "conditions": self.conditions,
+            "n_starts": self.n_physical,
+        }
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
         for v, time in at:
-            yield f"paper {v}", cell(f"paper-V-{v:g}", on_paper.losses, time * PAPER, window | {"velocity": v})
+            yield (
+                f"paper {v}",
+                cell(f"paper-V-{v:g}", on_paper.losses, time * PAPER, observation_time | {"velocity": v}),
+            )
         for v, time in at:
             yield f"physics {v}", cell(f"physics-V-{v:g}", in_physics.walks, time, walked | {"velocity": v})
         if entrant.ideal:
@@ -154,12 +161,12 @@ class League:
         for v, time in at:
             own = {"velocity": v, "n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
             yield f"regime {v}", cell(f"regime-V-{v:g}", on_paper.regimes, 20 * time * PAPER, own)
-        own = window | dict(zip(("low", "high"), RANGE, strict=True))
+        own = observation_time | dict(zip(("low", "high"), RANGE, strict=True))
         yield "range", cell("range", on_paper.losses_over_range, 600 * PAPER, own)
         if self.accelerating:
-            own = window | {"velocity": FINAL, "acceleration": Acceleration()}
+            own = observation_time | {"velocity": FINAL, "acceleration": Acceleration()}
             yield "accelerated", cell("accelerated", on_paper.losses, 10_000 * PAPER, own)
-        tried = window | {"velocity": self.tried_at}
+        tried = observation_time | {"velocity": self.tried_at}
         for trial, leg in LEGS_LOST.items():
             yield f"paper, {trial}", cell(f"paper-{trial}", on_paper.losses, 200 * PAPER, tried | {"leg_lost": leg})
         for trial, function, cost, own in self._tried(entrant):
@@ -169,15 +176,15 @@ class League:
         """Every trial that the entrant can take: what tries it, what that costs, and its own settings."""
         from hexmj.studies.league import in_physics
 
-        window = float(observation_time(self.window, self.tried_at, self.stride))
+        observation_time = float(observation_duration(self.observation_time, self.tried_at, self.stride))
         for trial in TRIALS:
             case = DISTURBED.get(trial)
-            if case and case.kind == "push" and not can_push(self.conditions, self.stride, window):
+            if case and case.kind == "push" and not can_push(self.conditions, self.stride, observation_time):
                 continue
             if case and entrant.steerable:
                 how = {"case": case, "conditions": self.conditions, "grid": GRID}
                 yield trial, in_physics.disturbed, 300, how
-            elif case or (trial in GROUNDS and self.tried_at * window < crossed(self.conditions)):
+            elif case or (trial in GROUNDS and self.tried_at * observation_time < crossed(self.conditions)):
                 continue
             elif one := walking(trial, entrant, self.conditions, self.tried_at, self.stride):
                 yield trial, in_physics.walks, 180, {"controller": one.controller, "conditions": one.conditions}

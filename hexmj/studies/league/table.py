@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.io import markdown_table, settings
 from hexmj.measures.captions import rules, starts_in_words
 from hexmj.measures.drawable_parts import check_axes, check_whole, what_parts_may_lack
-from hexmj.storage.attributes import settings
-from hexmj.storage.markdown import markdown_table
 from hexmj.studies.league.trials import LEGS_LOST, TOLD
 
 if TYPE_CHECKING:

@@ -15,7 +15,6 @@ from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.settling import settle
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
-from hexmj.storage.mjcf import content
 from hexmj.studies.stability_map.mechanisms import fall_direction, mechanisms, static_plan
 from hexmj.timing import Stride
 
@@ -36,7 +35,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
         InputError, SimulationError: no start is left; see `measures.physical.physical_walk`.
     """
     n_starts, conditions = walks.n_starts, walks.conditions
-    files = content(conditions.body.mjcf)
+    files = conditions.body.mjcf.read_bytes()
     stands = standing_starts(n_starts, walks.seed, conditions, walks.stride, threads, files)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
     parts = [part for block in blocks for part in _within_reach(walks, block, threads)]

@@ -49,7 +49,7 @@ def mechanisms(walk: PhysicalWalk, tipped: float = TIPPED) -> np.ndarray:
     """Index in `MECHANISMS` of what happened to each start, (start,).
 
     Args:
-        walk: physical walks kept whole; a loss that the window cuts short counts as survived.
+        walk: physical walks kept whole; a loss that the observation time cuts short counts as survived.
         tipped: as `TIPPED` [rad].
     """
     fell, known = np.isfinite(walk.outcomes.fall), np.isfinite(walk.qpos[..., 0]).sum(axis=0)

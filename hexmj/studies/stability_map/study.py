@@ -10,11 +10,12 @@ from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin, check_velocities
 from hexmj.controllers.protocol import ReadingPlan
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import draw_starts
 from hexmj.studies.same_starts import SameStarts
-from hexmj.sweeps import Cell, over_axes
+from hexmj.sweep import Cell, over_axes
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,7 @@ class StabilityMap(SameStarts):
     def __post_init__(self) -> None:
         typed("over", self.over, Over)
         super().__post_init__()
-        check_distinct("values", self.chosen)
+        distinct("values", self.chosen)
         _ = self.varied, self.observed
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
         if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), ReadingPlan):
@@ -89,10 +90,10 @@ class StabilityMap(SameStarts):
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.window, self.stride, self.acceleration)
+        return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     def cells(self) -> list[Cell]:
-        """A cell for each value and velocity; see `sweeps.Study`."""
+        """A cell for each value and velocity; see `sweep.Study`."""
         from hexmj.physics.settling import check_adhesion
         from hexmj.studies.stability_map.fates import fates
 

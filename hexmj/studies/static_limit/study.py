@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.errors import check_distinct
 from hexmj.measures.compare import with_flss
 from hexmj.measures.velocities import observed
 from hexmj.studies.same_starts import SameStarts
-from hexmj.sweeps import Cell, over_axes
+from hexmj.sweep import Cell, over_axes
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ class StaticLimit(SameStarts):
     def __post_init__(self) -> None:
         super().__post_init__()
         for several in VARIED.values():
-            check_distinct(several, getattr(self, several))
+            distinct(several, getattr(self, several))
         _ = self.varied, self.duration
 
     @property
@@ -60,10 +60,10 @@ class StaticLimit(SameStarts):
     @property
     def duration(self) -> float:
         """Observation time [time units]."""
-        return observed([self.velocity], self.window, self.stride, self.acceleration)[1].item()
+        return observed([self.velocity], self.observation_time, self.stride, self.acceleration)[1].item()
 
     def cells(self) -> list[Cell]:
-        """A cell for each mass of the legs and V_p; see `sweeps.Study`."""
+        """A cell for each mass of the legs and V_p; see `sweep.Study`."""
         from hexmj.physics.settling import check_adhesion
         from hexmj.studies.static_limit.distances import distance_table
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.intervals import wilson_intervals
+from hexmj.stats import wilson_intervals
 from hexmj.timing import Stride, steps_within
 
 if TYPE_CHECKING:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Literal
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import check_velocities
-from hexmj.errors import InputError, check_distinct
+from hexmj.errors import InputError
 from hexmj.measures.velocities import VELOCITY
 from hexmj.starts import checked_list
 from hexmj.studies.same_starts import SameStarts
 from hexmj.studies.terrain.crossings import with_crossings
-from hexmj.sweeps import Cell, over_axes
+from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Stride
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,7 @@ class Terrain(SameStarts):
     """As `Conditions.grasp`, each once."""
     n_starts: int = field(default=30, kw_only=True)
     conditions: Conditions = field(default=FARTHER, kw_only=True)
-    window: str = field(default="distance", init=False)
+    observation_time: str = field(default="distance", init=False)
     """All are told to walk as far."""
     acceleration: None = field(default=None, init=False)
 
@@ -71,7 +72,7 @@ class Terrain(SameStarts):
         if not (v > 0).all():
             raise InputError(f"velocities = {v.tolist()}; expected V > 0, or no obstacle is ever reached")
         for name in ("grounds", "heights", "lengths", "grasps"):
-            check_distinct(name, getattr(self, name))
+            distinct(name, getattr(self, name))
         for name, grounds in SIZED.items():
             if not grounds & {*self.grounds} and [*getattr(self, name)] != [*getattr(Terrain, name)]:
                 one = " or ".join(sorted(grounds))
@@ -106,7 +107,7 @@ class Terrain(SameStarts):
         return max(map(_end, self.obstacles.values())) + behind + self.stride.aep0 - self.stride.pep0
 
     def cells(self) -> list[Cell]:
-        """A cell for each obstacle, grasp and velocity; see `sweeps.Study`."""
+        """A cell for each obstacle, grasp and velocity; see `sweep.Study`."""
         from hexmj.measures.outcome_table import outcome_table
         from hexmj.physics.settling import check_adhesion
 
@@ -134,7 +135,7 @@ class Terrain(SameStarts):
         """
         (ahead, behind), at = reach(self.stride), self.conditions.ground_at
         table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
-        return self.labelled(table, "terrain", window=f"{self.distance:g} / V", distance=self.distance)
+        return self.labelled(table, "terrain", observation_time=f"{self.distance:g} / V", distance=self.distance)
 
     def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """The outcomes over (obstacle, grasp, velocity, start)."""

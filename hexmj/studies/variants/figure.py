@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
+from hexmj.io import settings
 from hexmj.measures.captions import caption, starts_in_words
 from hexmj.measures.drawable_parts import check_starts
 from hexmj.measures.figures import tidy
-from hexmj.storage.attributes import settings
-from hexmj.storage.literal import in_figure
+from hexmj.pictures import in_figure
 from hexmj.studies.variants.study import notes
 
 if TYPE_CHECKING:

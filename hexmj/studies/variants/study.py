@@ -11,16 +11,15 @@ from hexmj.checks import check_types, given, printable, typed
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
-from hexmj.intervals import wilson_intervals
+from hexmj.io import attributes, settings
 from hexmj.legs import GEOMETRIES
 from hexmj.measures.frequency import over_start
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.velocities import observed, velocity_axis
+from hexmj.plain import plain
 from hexmj.starts import check_draw, draw_starts
-from hexmj.storage.attributes import attributes, settings
-from hexmj.storage.mjcf import content
-from hexmj.sweeps import Cell, over_axes
-from hexmj.sweeps.plain_settings import plain
+from hexmj.stats import wilson_intervals
+from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration, Stride
 from hexmj.variants import UNREACHED, instead, naming, variants, varied
 
@@ -38,7 +37,7 @@ class Variants:
     """V_r (when accelerating, its final value), each 0 <= V < 1."""
     n_starts: int = 2000
     """Number of starts."""
-    window: str | float = "walk"
+    observation_time: str | float = "walk"
     """'walk', 'start' or the observation time itself [time units]."""
     seed: int = 0
     """Of the starts."""
@@ -79,12 +78,12 @@ class Variants:
 
         def time(variant: str) -> np.ndarray:
             with naming(variant):
-                return observed(self.velocities, self.window, self.strides[variant], self.acceleration)[1]
+                return observed(self.velocities, self.observation_time, self.strides[variant], self.acceleration)[1]
 
         return np.array([time(variant) for variant in self.variants])
 
     def cells(self) -> list[Cell]:
-        """See `sweeps.Study`."""
+        """See `sweep.Study`."""
         same = {name: getattr(self, name) for name in ("n_starts", "seed", "acceleration", "conditions")}
         times, velocities = dict(zip(self.variants, self.times.tolist(), strict=True)), list(self.velocities)
 
@@ -122,7 +121,7 @@ class Variants:
                 table[name + end] = count.copy(data=values).assign_attrs(units="1")
         table["worst_variant"] = lost.idxmax("variant").assign_attrs(units="1")
         table["instead"] = lost.copy(data=self._instead()).assign_attrs(units="1")
-        told = ("window", "n_starts", "seed", "acceleration", "networks")
+        told = ("observation_time", "n_starts", "seed", "acceleration", "networks")
         settings = {name: plain(getattr(self, name)) for name in told}
         settings["stride"] = asdict(self.strides["usual"])
         settings["conditions"] = self.conditions.settings() if self.conditions else None
@@ -178,7 +177,7 @@ def losses(
         from hexmj.measures.outcome_table import settled_starts
         from hexmj.measures.physical import physical_outcomes
 
-        settled = settled_starts(n_starts, seed, conditions, stride, threads, content(conditions.body.mjcf))
+        settled = settled_starts(n_starts, seed, conditions, stride, threads, conditions.body.mjcf.read_bytes())
         how = {"acceleration": acceleration, "threads": threads}
         time = physical_outcomes(settled, network, velocity, duration, **how).fall
     else:

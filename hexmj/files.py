@@ -1,0 +1,81 @@
+"""Files that are written completely or not at all, and the two formats that hexmj reads: NetCDF and TOML."""
+
+import os
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+from hexmj.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SEARCHED = "searched"
+"""Key under which a TOML file of `hexmj search` names the starts on which it searched."""
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Provide a temporary path beside `path`; at the end of the block the file there replaces `path`."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".part-{uuid4().hex}{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> Path:
+    """Write a text in UTF-8."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def write_netcdf(data: "xr.Dataset", path: Path | str) -> Path:
+    """Write a dataset as NetCDF 4; the bits of all numbers stay.
+
+    Raises:
+        InputError: an attribute or variable that NetCDF cannot hold.
+    """
+    plain = data.drop_encoding()
+    encoding = {name: {"_FillValue": None} for name in plain.variables}
+    with replacing(path) as part:
+        try:
+            plain.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}: NetCDF cannot hold this dataset: {error}") from None
+    return Path(path)
+
+
+def read_netcdf(path: Path | str) -> "xr.Dataset":
+    """Read a dataset that `write_netcdf` wrote.
+
+    Raises:
+        InputError: the file cannot be read, or is no NetCDF.
+    """
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read as NetCDF: {error}") from None
+
+
+def read_toml(path: Path | str) -> dict[str, Any]:
+    """Read the table of a TOML file.
+
+    Raises:
+        InputError: the file cannot be read, or is no TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read as TOML: {error}") from None

@@ -1,0 +1,147 @@
+"""Results on disk: NetCDF with settings as attributes, figures, JSON, and the manifest of a command."""
+
+import json
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.files import read_netcdf, replacing, write_netcdf, write_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+TEXTS = ("study", "model", "over", "reference", "title", "body", "ground")
+"""Attributes that are never JSON, whatever their text looks like."""
+
+MANIFEST = "manifest.json"
+"""Name of the file that says how results were made, or the end of its name."""
+
+LIBRARIES = ("hexmj", "mujoco", "numpy", "scipy", "numba", "xarray", "matplotlib")
+"""Packages whose versions a manifest records."""
+
+
+def load(path: Path | str) -> "xr.Dataset":
+    """Read a result that a command or `save` wrote.
+
+    Args:
+        path: such as "results/compare/comparison.nc".
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    return read_netcdf(path)
+
+
+def save(result: "xr.Dataset", path: Path | str) -> Path:
+    """Write a result as NetCDF, for `load` or any other reader.
+
+    Args:
+        result: of `compare`, `flss`, a study or `record`. Settings that NetCDF has no type for become JSON text.
+        path: of the file, which is replaced if it exists.
+
+    Raises:
+        InputError: the result holds something that NetCDF cannot.
+    """
+    return write_netcdf(result.assign_attrs(attributes(result.attrs)), path)
+
+
+def attributes(settings: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return settings as attributes that NetCDF can hold: texts, numbers and arrays, everything else as JSON text."""
+
+    def plain(value: Any) -> Any:
+        value = value.item() if isinstance(value, np.generic) else value
+        if isinstance(value, str | float | np.ndarray) or (type(value) is int and abs(value) < 2**63):
+            return value
+        return json.dumps(value, default=str)
+
+    return {str(name): plain(value) for name, value in settings.items()}
+
+
+def settings(result: "xr.Dataset") -> dict[str, Any]:
+    """Return what a result was made with: controllers, observation time, starts, seed, conditions.
+
+    Args:
+        result: of `compare`, `flss` or a study, fresh or read from a file.
+
+    Returns:
+        Numbers, texts, lists and dicts by name, such as `settings(result)["conditions"]["vp"]`.
+    """
+    return {str(name): value if name in TEXTS else _parsed(value) for name, value in result.attrs.items()}
+
+
+def _parsed(attribute: Any) -> Any:
+    if not isinstance(attribute, str):
+        return attribute.tolist() if isinstance(attribute, np.generic | np.ndarray) else attribute
+    try:
+        return json.loads(attribute)
+    except ValueError:
+        return attribute
+
+
+def results_folder(path: Path | str) -> Path:
+    """Make a directory for results and return its path.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {path}: {error.strerror}") from None
+    return Path(path)
+
+
+def save_figure(figure: "Figure", path: Path) -> Path:
+    """Write a figure in the format of the path's suffix, without a date."""
+    undated: dict[str, Any] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+    with replacing(path) as part:
+        figure.savefig(part, dpi=150, metadata=undated.get(path.suffix))
+    return path
+
+
+def json_text(value: Any) -> str:
+    """Return JSON with null for numbers that are not finite."""
+    finite = json.loads(json.dumps(value, default=str), parse_constant=lambda _: None)
+    return json.dumps(finite, indent=2)
+
+
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    lines = (heads, ["---"] * len(heads), *rows)
+    return ["| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines]
+
+
+def save_manifest(command: Sequence[str], settings: Mapping[str, Any], files: Sequence[Path], path: Path) -> Path:
+    """Write how files were made: the command's arguments, its settings, and versions.
+
+    Args:
+        command: arguments after `hexmj`.
+        settings: of the results.
+        files: that the command wrote, in the manifest's folder or below it.
+        path: of the manifest.
+    """
+    versions = {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
+    names = [file.relative_to(path.parent).as_posix() for file in files]
+    content = {"command": list(command), "settings": dict(settings), "versions": versions, "files": names}
+    return write_text(path, json_text(content) + "\n")
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """Read a manifest that `save_manifest` wrote.
+
+    Raises:
+        InputError: the file cannot be read, or is no manifest.
+    """
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}") from None
+    if not isinstance(manifest, dict) or not {"command", "settings", "versions", "files"} <= manifest.keys():
+        raise InputError(f"{path} is no manifest of a hexmj command")
+    return manifest

@@ -1,0 +1,336 @@
+"""Sweeps: many cells, each a pure function of its settings, computed on any executor and cached in a folder.
+
+The cache key of a cell is a digest of its function and settings, of hexmj's sources, of the source files of the user's
+classes in the settings and the `.py` files beside them, and of the versions of the packages that compute. Other files
+that a controller reads are not part of the key, unless a field of its dataclass names them.
+"""
+
+import json
+import math
+import os
+import re
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib.metadata import version
+from inspect import getsource, signature
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+
+import numpy as np
+
+from hexmj.errors import InputError, without_extra
+from hexmj.files import read_netcdf, write_netcdf
+from hexmj.plain import digest, plain
+from hexmj.progress import Progress, shown
+from hexmj.threads import cores
+from hexmj.validate import whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PACKAGE = Path(__file__).parent
+LIBRARIES = ("mujoco", "numpy", "scipy", "numba")
+"""Packages whose versions are part of the cache key."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of a sweep. Its result depends on nothing but the function and its settings."""
+
+    name: str
+    """Begins the name of the cell's file."""
+    function: Callable[..., Any]
+    """Function of a module, or a method of a frozen dataclass; returns an `xarray.Dataset`. If it has the arguments
+    `threads` or `progress`, the sweep provides them."""
+    settings: Mapping[str, Any]
+    """Arguments of the function: numbers, texts, paths, arrays, frozen dataclasses, or lists and dicts of these."""
+    work: float = 1.0
+    """Relative cost, for the progress bar."""
+
+    def compute(self, *first: Any, **execution: Any) -> Any:
+        """Call the function with its settings and with those execution arguments that it takes."""
+        accepted = signature(self.function).parameters
+        return self.function(*first, **self.settings, **{k: v for k, v in execution.items() if k in accepted})
+
+    def record(self) -> str:
+        """Return the function, its settings, sources and versions as JSON.
+
+        Raises:
+            InputError: a setting cannot be written as JSON.
+        """
+        things: list[Any] = []
+        record = {
+            "function": plain(self.function, things.append),
+            "of": plain(getattr(self.function, "__self__", None), things.append),
+            "settings": plain(self.settings, things.append),
+        }
+        record["sources"] = _user_sources(things) | {"hexmj": _package_digest()}
+        record["versions"] = {name: version(name) for name in LIBRARIES}
+        return json.dumps(record, sort_keys=True)
+
+    def stem(self, record: str) -> str:
+        """Return the name of the cell's file without its suffix."""
+        readable = re.sub(r"[^A-Za-z0-9.+-]+", "-", self.name)[:100].lstrip(".-")
+        return f"{readable}-{digest(record.encode())}"
+
+
+class Study(Protocol):
+    """A frozen dataclass of settings that defines cells and combines their results."""
+
+    def cells(self) -> Sequence[Cell]:
+        """Return the cells to be computed."""
+        ...
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Combine the results of the cells, given in their order."""
+        ...
+
+
+class Execution(TypedDict, total=False):
+    """How cells are computed; results do not depend on it."""
+
+    executor: Executor | None
+    """Computes the cells in threads, in processes or on other machines that see the folder; by default they are
+    computed in this process, one after another."""
+    progress: Progress | bool | None
+    """True shows a bar; a function receives the fraction done since its last call."""
+    threads: int | None
+    """Threads of each cell; by default one per core, and one with an executor."""
+    fresh: bool
+    """Compute all cells again, and replace those in the folder."""
+
+
+def run_study(study: Study, folder: Path | str | None = None, **execution: Unpack[Execution]) -> "xr.Dataset":
+    """Run a study and return its result; arguments and errors are those of `finished_cells`."""
+    return study.result(run_cells(study.cells(), folder, **execution))
+
+
+def run_cells(
+    cells: Sequence[Cell], folder: Path | str | None = None, **execution: Unpack[Execution]
+) -> list["xr.Dataset"]:
+    """Compute cells and return their results in order; arguments and errors are those of `finished_cells`."""
+    with shown(execution.get("progress"), "computing") as progress:
+        found = dict(finished_cells(cells, folder, **execution | {"progress": progress}))
+    return [found[i] for i in range(len(cells))]
+
+
+def finished_cells(
+    cells: Sequence[Cell], folder: Path | str | None = None, **execution: Unpack[Execution]
+) -> Iterator[tuple[int, "xr.Dataset"]]:
+    """Compute cells and yield each with its index as soon as it is finished.
+
+    Args:
+        cells: to be computed.
+        folder: caches one file per cell; cells that are there are read instead of computed. None caches nothing.
+        execution: see `Execution`.
+
+    Raises:
+        InputError: a setting cannot be part of a cache key, or a worker process died. Any error of a cell, with a note
+            that names the cell.
+    """
+    executor, progress = execution.get("executor"), execution.get("progress")
+    threads, total, done = execution.get("threads"), sum(cell.work for cell in cells), [0.0] * len(cells)
+    paths: list[Path | None] = [None] * len(cells)
+    if folder is not None:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        paths = [Path(folder).absolute() / f"{cell.stem(cell.record())}.nc" for cell in cells]
+        if execution.get("fresh"):
+            for path in filter(None, paths):
+                path.unlink(missing_ok=True)
+
+    def advance(i: int, fraction: float) -> None:
+        done[i] += fraction
+        if callable(progress):
+            progress(fraction * cells[i].work / total)
+
+    if executor is None:
+        how = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in range(len(cells)))
+        computed = ((i, _computed(cells[i], paths[i], **arguments)) for i, arguments in how)
+    else:
+        computed = _on_executor(executor, cells, paths, threads or 1)
+    for i, data in computed:
+        advance(i, 1.0 - done[i])
+        yield i, data
+
+
+def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
+    """Return a cell's result, from its file if that is there."""
+    if path and path.exists():
+        return read_netcdf(path)
+    try:
+        data = cell.compute(**execution)
+    except Exception as error:
+        error.add_note(f"while computing the cell {cell.name}")
+        raise
+    if path is None:
+        return data
+    return read_netcdf(write_netcdf(data.assign_attrs(cell=cell.record()), path))
+
+
+def _on_executor(
+    executor: Executor, cells: Sequence[Cell], paths: Sequence[Path | None], threads: int
+) -> Iterator[tuple[int, "xr.Dataset"]]:
+    futures = {
+        executor.submit(_computed, *task, threads=threads): i for i, task in enumerate(zip(cells, paths, strict=True))
+    }
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    except BrokenExecutor:
+        raise InputError(
+            "A worker process died. Finished cells are cached: start again, with fewer processes if memory ran out."
+        ) from None
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
+    """Combine the results of cells along named axes into one dataset.
+
+    Args:
+        sizes: number of cells along each axis; the last axis varies fastest, as in `itertools.product`.
+        data: results of all cells.
+        concat: options of `xarray.concat`.
+    """
+    import xarray as xr
+
+    if (count := math.prod(sizes.values())) != len(data):
+        raise InputError(f"{len(data)} cells along {dict(sizes)}; expected {count}")
+    rows = list(data)
+    for name, size in reversed(list(sizes.items())):
+        rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
+    return rows[0]
+
+
+class CachedValues:
+    """A function of rows that computes every row once, and caches the values in a text file.
+
+    It calls `function(rows, **settings)`, (row, number) -> (row,), which must treat each row by itself. Every line of
+    the file is one row and its value, in hexadecimal; a last line that was torn by a kill is ignored.
+    """
+
+    def __init__(
+        self, cell: Cell, folder: Path | str | None = None, *, threads: int | None = None, fresh: bool = False
+    ) -> None:
+        """Read the values that the folder holds.
+
+        Args:
+            cell: function, settings and name.
+            folder: holds the file; None keeps values in memory.
+            threads: for the function, if it takes them.
+            fresh: discard the values in the file.
+        """
+        self._cell, self._threads, self._path = cell, threads, None
+        self._values: dict[bytes, float] = {}
+        if folder is not None:
+            self._path = Path(folder) / f"{cell.stem(cell.record())}.txt"
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if fresh:
+                self._path.unlink(missing_ok=True)
+            self._values = dict(_read_values(self._path))
+        self._read = frozenset(self._values)
+        self._replayed: set[bytes] = set()
+        self.known = len(self._read)
+        """Number of values that the file held."""
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """Return the values, (row,), of rows (row, number)."""
+        rows = np.ascontiguousarray(rows, dtype=float)
+        keys = [row.tobytes() for row in rows]
+        self._replayed |= self._read.intersection(keys)
+        new = {key: i for i, key in enumerate(keys) if key not in self._values}
+        if new:
+            values = self._cell.compute(rows[list(new.values())], threads=self._threads).tolist()
+            if self._path:
+                with self._path.open("a") as file:
+                    file.writelines(f"\n{k.hex()} {v.hex()}\n" for k, v in zip(new, values, strict=True))
+            self._values |= zip(new, values, strict=True)
+        return np.array([self._values[key] for key in keys])
+
+    @property
+    def replayed(self) -> int:
+        """Number of distinct rows whose values came from the file."""
+        return len(self._replayed)
+
+
+def _read_values(path: Path) -> Iterator[tuple[bytes, float]]:
+    for line in path.read_text().splitlines(keepends=True) if path.exists() else ():
+        with suppress(ValueError):  # an empty or a torn line
+            row, value = line.split()
+            if line.endswith("\n"):
+                yield bytes.fromhex(row), float.fromhex(value)
+
+
+@contextmanager
+def workers(processes: int = 1, scheduler: str | None = None) -> Iterator[Executor | None]:
+    """Provide an executor: processes of this machine, the workers of a Dask scheduler, or None for this process.
+
+    Args:
+        processes: number of processes.
+        scheduler: address such as "tcp://127.0.0.1:8786"; its workers must see the results' folder.
+    """
+    if scheduler is not None:
+        try:
+            from distributed import Client
+        except ModuleNotFoundError:
+            raise without_extra("dask", "distributed") from None
+        try:
+            client = Client(scheduler, timeout=10, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(f"scheduler = {scheduler!r} cannot be reached: {error}") from None
+        with client:
+            yield client.get_executor(pure=False)
+    elif whole("processes", processes, 1) > 1:
+        with ProcessPoolExecutor(processes, get_context("spawn"), initializer=_end_with_parent) as pool:
+            yield pool
+    else:
+        yield None
+
+
+def threads_each(threads: int | None, processes: int) -> int | None:
+    """Return the threads of each process: as given, else the cores shared among several processes."""
+    return threads if threads is not None or processes == 1 else max(1, cores() // processes)
+
+
+def _end_with_parent() -> None:
+    """End this worker when its parent ends, however that happens; the initializer of a pool's processes."""
+    sys.stdout = sys.stderr  # output of a user's code is not the command's answer
+
+    def watch() -> None:
+        if parent := parent_process():
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _user_sources(things: Iterable[Any]) -> dict[str, str]:
+    """Digests of the source files of the user's classes and functions and of the `.py` files beside them, by module."""
+    found = {}
+    for thing in things:
+        name = thing.__module__
+        if name.partition(".")[0] in sys.stdlib_module_names | {"hexmj", "numpy"} - {"__main__"}:
+            continue
+        if "<locals>" in thing.__qualname__ or "<lambda>" in thing.__qualname__:
+            raise InputError(f"{thing.__qualname__} cannot be cached; expected a function or class of a module")
+        file = getattr(sys.modules.get(name), "__file__", None)
+        beside = {Path(file), *Path(file).parent.glob("*.py")} if file else None
+        found[name] = _files_digest(beside) if beside else digest(getsource(thing).encode())
+    return found
+
+
+@cache
+def _package_digest() -> str:
+    assets = (PACKAGE / "assets", PACKAGE.parent / "assets")
+    return _files_digest([*PACKAGE.rglob("*.py"), *(file for folder in assets for file in folder.glob("*.xml"))])
+
+
+def _files_digest(files: Iterable[Path]) -> str:
+    return digest(b"".join(f"{file.name}\0".encode() + file.read_bytes() for file in sorted(files)))
