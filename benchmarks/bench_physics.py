@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from hexmj import LDVS, ReadsLegs, compare, draw_starts
+from hexmj import LDVS, SensoryFeedback, compare, draw_starts
 from hexmj.controllers.checked_plans import begin
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.backend import STATE
@@ -64,7 +64,7 @@ def test_steps(measure, settled, who):
 @pytest.mark.parametrize("who", ["hexmj", "the open loop"])
 def test_closed_loop(measure, settled, who):
     """The network reads the legs before each of its steps, so these come one by one."""
-    controller = ReadsLegs(LDVS) if who == "hexmj" else LDVS
+    controller = SensoryFeedback(LDVS) if who == "hexmj" else LDVS
     substeps = settled.conditions.substeps(settled.stride)
     measure(
         lambda: physical_outcomes(settled, controller, VELOCITY, DURATION, threads=2),

@@ -15,7 +15,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.body import Servo
-from hexmj.controllers import Controller, Plan, ReadingPlan
+from hexmj.controllers import Controller, Plan, FeedbackPlan
 from hexmj.legs import LEGS, SIDE, Geometry
 
 HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # ahead of the middle, beside it [mm]
@@ -133,7 +133,7 @@ class Larger:
         small["geometry"] = Geometry(**lines)
         faster = acceleration and replace(acceleration, rate=acceleration.rate * self.times)
         plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), faster, threads)
-        if isinstance(plan, ReadingPlan):
+        if isinstance(plan, FeedbackPlan):
             raise hexmj.InputError(f"{self.of.name} reads the legs; expected a controller that goes on by itself")
         return LargerPlan(plan, starts, stride, self.times)
 

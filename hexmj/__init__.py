@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from hexmj.controllers.cruse1998 import Cruse1998 as Cruse1998
     from hexmj.controllers.cruse1998 import Symmetric as Symmetric
     from hexmj.controllers.cruse1998 import Weights as Weights
+    from hexmj.controllers.feedback import SensoryFeedback as SensoryFeedback
     from hexmj.controllers.named import load_controller as load_controller
-    from hexmj.controllers.reads_legs import ReadsLegs as ReadsLegs
     from hexmj.errors import InputError as InputError
     from hexmj.errors import SimulationError as SimulationError
     from hexmj.io import load as load
@@ -67,7 +67,7 @@ _MODULES = {
     "conditions": ("Conditions",),
     "controllers.cruse1998": ("HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Symmetric", "Weights"),
     "controllers.named": ("load_controller",),
-    "controllers.reads_legs": ("ReadsLegs",),
+    "controllers.feedback": ("SensoryFeedback",),
     "errors": ("InputError", "SimulationError"),
     "io": ("load", "save", "settings"),
     "legs": ("CENTRED", "FIG1", "Geometry"),

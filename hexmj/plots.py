@@ -29,7 +29,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "biology": {"biology": "studies.biology.figure:biology_figure"},
     "league": {"league": "studies.league.figure:league_figure", "walks": "studies.league.figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation.figure:ablation_figure"},
-    "readings": {"readings": "paper.readings_figure:readings_figure"},
+    "model_variants": {"model_variants": "paper.readings_figure:readings_figure"},
     "search": {"convergence": "search.convergence:convergence_figure"},
     RECORDING: {"walk": "replay.footfall:walk_figure"},
 }

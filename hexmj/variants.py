@@ -33,7 +33,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 UNREACHED = {"AEP0 11"}
 """Variants that legs of the stick insect do not reach on their usual lines, left out of all physical walks."""
 
-INNER = ("controller", "reading")
+INNER = ("controller", "model_variant")
 """Fields that are varied within: what reads the legs, and how the paper is read."""
 
 Part = TypeVar("Part")

@@ -9,9 +9,9 @@ import numpy as np
 
 import hexmj
 from hexmj.controllers import Sensed
-from hexmj.controllers.rivals.lifted import LiftedPlan
-from hexmj.controllers.rivals.metronomes import Metronome
-from hexmj.controllers.rivals.righetti import Righetti
+from hexmj.controllers.baselines.lifted import LiftedPlan
+from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.righetti import Righetti
 from hexmj.legs import CENTRED
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Change, Own

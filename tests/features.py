@@ -160,7 +160,7 @@ def reproduce() -> Any:
         return answer("reproduce --quick")
 
 
-def readings() -> Any:
+def model_variants() -> Any:
     """Two readings with coarse steps, without refined constants and with a short search."""
     import hexmj.paper.scores as scores
 
@@ -188,7 +188,7 @@ def wrappers() -> Any:
     from hexmj.controllers.leg_lost import LegLost
     from hexmj.controllers.poor_senses import PoorSenses
 
-    feedback = hexmj.ReadsLegs(hexmj.LDVS)
+    feedback = hexmj.SensoryFeedback(hexmj.LDVS)
     wrapped = {"feedback": feedback, "lost leg": LegLost(hexmj.LDVS, 1)}
     wrapped |= {"noise": PoorSenses(feedback, noise=0.1), "delay": PoorSenses(feedback, delay=2.0)}
     starts, how = hexmj.draw_starts(2, seed=1), {"duration": 30.0, "stride": COARSE}
@@ -364,7 +364,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "python examples": examples,
     # These two become scripts.
     "variants": "variants --models ldvs own-V --velocities 0.5 --starts 20 --window start",
-    "readings": readings,
+    "model_variants": model_variants,
 }
 
 OPTIONAL = {"distributed": "flss scheduler", "stable_baselines3": "python stable-baselines3", "viser": "view live"}

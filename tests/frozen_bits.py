@@ -51,7 +51,7 @@ def gaits(seed: int) -> Arrays:
 def compared(seed: int, feedback: bool = False) -> Arrays:
     controllers = {"ldvs": hexmj.LDVS, "uncoordinated": hexmj.UNCOORDINATED}
     if feedback:
-        controllers = {name: hexmj.ReadsLegs(one) for name, one in controllers.items()}
+        controllers = {name: hexmj.SensoryFeedback(one) for name, one in controllers.items()}
     return _table(hexmj.compare(controllers, [0.3, 0.6], n_starts=8, observation_time=60.0, seed=seed))
 
 
@@ -83,7 +83,7 @@ def disturbed_with_feedback(seed: int) -> Arrays:
     from hexmj.sweep import run_study
 
     few: Any = {"velocities": [0.6], "n_starts": 3, "observation_time": 30.0, "seed": seed}
-    halted = DisturbedWalks(hexmj.ReadsLegs(hexmj.LDVS), disturbances=["halt"], strategies=["reorganise"], **few)
+    halted = DisturbedWalks(hexmj.SensoryFeedback(hexmj.LDVS), disturbances=["halt"], strategies=["reorganise"], **few)
     return _table(run_study(halted))
 
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from math import inf
 
 from hexmj.controllers.cruse1998 import Order, Weights
-from hexmj.controllers.cruse1998.readings import Reading
+from hexmj.controllers.cruse1998.model_variants import ModelVariant
 from hexmj.legs import N1, N2, N3, N4
 from hexmj.timing import Acceleration, Stride
 
 LEGS = range(6)
-PRINTED = Reading()
+PRINTED = ModelVariant()
 
 
 @dataclass
@@ -35,24 +35,24 @@ def begin(start: list[float], velocity: float, stride: Stride, acceleration: Acc
     return State(list(start), [1] * 6, [1] * 6, [stride.aep0] * 6, [0.0] * 6, [0.0] * 6, v, velocity)
 
 
-def mechanism_1(d: int, state: State, p: Weights, reading: Reading) -> float:
+def mechanism_1(d: int, state: State, p: Weights, model_variant: ModelVariant) -> float:
     """Of all legs in N^1; of equally strong ones the last counts."""
     shifts = [(state.s[e] - 1) * p.p1[d, e] for e in N1[d]]
-    return sum(shifts) if reading.rear == "sum" else max(reversed(shifts), key=abs)
+    return sum(shifts) if model_variant.rear == "sum" else max(reversed(shifts), key=abs)
 
 
 def mechanism_2(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
     return (stride.aep0 - stride.pep_min) * p.p2[d, e] if state.s[e] == 1 and state.s_old[e] == 0 else 0.0
 
 
-def mechanism_3(d: int, e: int, state: State, p: Weights, reading: Reading) -> float:
-    neutral = p.p31[d, e] + p.p34[d, e] * (state.v if reading.neutral == "present" else state.v_final)
+def mechanism_3(d: int, e: int, state: State, p: Weights, model_variant: ModelVariant) -> float:
+    neutral = p.p31[d, e] + p.p34[d, e] * (state.v if model_variant.neutral == "present" else state.v_final)
     weight = p.p32[d, e] if state.x[e] <= neutral else p.p33[d, e]
-    lasting = reading.contralateral if abs(d - e) == 3 else reading.ipsilateral
+    lasting = model_variant.contralateral if abs(d - e) == 3 else model_variant.ipsilateral
     shift = weight * (1 if lasting == "lasting" else state.s[e]) * (neutral - state.x[e])
-    if reading.cap == "sum":
+    if model_variant.cap == "sum":
         return shift
-    return min(shift, 4.0) if reading.cap == "above" else max(min(shift, 4.0), -4.0)
+    return min(shift, 4.0) if model_variant.cap == "above" else max(min(shift, 4.0), -4.0)
 
 
 def mechanism_4(d: int, e: int, state: State, p: Weights, stride: Stride) -> float:
@@ -61,15 +61,15 @@ def mechanism_4(d: int, e: int, state: State, p: Weights, stride: Stride) -> flo
     return (stride.pep_min - state.aep[d]) * p.p4[d, e] if crossed else 0.0
 
 
-def influences(d: int, state: State, p: Weights, stride: Stride, reading: Reading) -> tuple[float, float]:
+def influences(d: int, state: State, p: Weights, stride: Stride, model_variant: ModelVariant) -> tuple[float, float]:
     """The shifts of PEP and AEP of leg d, from the states of its neighbours."""
-    pep = mechanism_1(d, state, p, reading)
+    pep = mechanism_1(d, state, p, model_variant)
     for e in N2[d]:
         pep += mechanism_2(d, e, state, p, stride)
-    third = [mechanism_3(d, e, state, p, reading) for e in N3[d]]
+    third = [mechanism_3(d, e, state, p, model_variant) for e in N3[d]]
     for shift in third:
         pep += shift
-    if reading.cap == "sum":
+    if model_variant.cap == "sum":
         pep -= max(sum(third) - 4.0, 0.0)
     return pep, sum(mechanism_4(d, e, state, p, stride) for e in N4[d])
 
@@ -87,13 +87,13 @@ def move(d: int, state: State, pep_shift: float, aep_shift: float, stride: Strid
         state.s[d] = 0
 
 
-def step(state: State, p: Weights, order: Order, stride: Stride, reading: Reading) -> None:
+def step(state: State, p: Weights, order: Order, stride: Stride, model_variant: ModelVariant) -> None:
     """One step of all six legs in the order of updates that is asked for."""
     if order == "sequential":
         for d in LEGS:
-            move(d, state, *influences(d, state, p, stride, reading), stride)
+            move(d, state, *influences(d, state, p, stride, model_variant), stride)
         return
-    following = [influences(d, state, p, stride, reading) for d in LEGS]
+    following = [influences(d, state, p, stride, model_variant) for d in LEGS]
     used = following if order == "undelayed" else list(zip(state.pep_shift, state.aep_shift, strict=True))
     for d in LEGS:
         move(d, state, *used[d], stride)
@@ -108,14 +108,14 @@ def walk(
     stride: Stride,
     order: Order = "printed",
     acceleration: Acceleration | None = None,
-    reading: Reading = PRINTED,
+    model_variant: ModelVariant = PRINTED,
 ) -> tuple[list[list[float]], list[list[int]], list[float]]:
     """Tips and states after each step, (step, leg), and V_r during it, (step,)."""
     state = begin(start, velocity, stride, acceleration)
     tips, states, velocities = [], [], []
     for n in range(1, steps + 1):
         velocities.append(state.v)
-        step(state, p, order, stride, reading)
+        step(state, p, order, stride, model_variant)
         tips.append(list(state.x))
         states.append(list(state.s))
         if acceleration:  # Eq. 11

@@ -14,7 +14,7 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.controllers.rivals.walknet import Walknet
+from hexmj.controllers.baselines.walknet import Walknet
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
 from hexmj.studies.ablation.figure import FEWER, NONE, ablation_figure

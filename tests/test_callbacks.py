@@ -11,7 +11,7 @@ from numba import cfunc
 
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
@@ -82,7 +82,7 @@ def test_a_clock_of_the_users_own_goes_on_after_walks_and_resets(settled, ours):
         mujoco.set_mjcb_time(None)
 
 
-@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
+@pytest.mark.parametrize("controller", [LDVS, SensoryFeedback(LDVS)], ids=lambda one: one.name)
 @pytest.mark.parametrize("waits", [False, True], ids=["closes it", "keeps it"])
 def test_who_walks_away_from_a_walk_leaves_no_clock_stopped(settled, controller, waits):
     """After the first chunk; the one that is being stepped meanwhile ends, and nothing goes on."""

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import hexmj
 from hexmj.controllers.protocol import Sensed
-from hexmj.controllers.reads_legs import SensedPlan
+from hexmj.controllers.feedback import SensedPlan
 from hexmj.environments import dm
 from hexmj.legs import MIRROR
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
@@ -16,7 +16,7 @@ from hexmj.physics.settling import settle
 from hexmj.rotations import heading, rotated, turned
 
 LDVS, UNCOORDINATED = hexmj.LDVS, hexmj.UNCOORDINATED
-READING = hexmj.ReadsLegs(LDVS)
+READING = hexmj.SensoryFeedback(LDVS)
 STRIDE = hexmj.Stride()
 
 
@@ -99,7 +99,7 @@ def test_mirrored_starts_give_mirrored_walks():
 def test_a_push_is_that_of_the_open_loop():
     """Without friction the insect moves aside by impulse over mass, though the network's steps come one by one."""
     conditions = hexmj.Conditions(friction=0.0)
-    settled, standing = settle(hexmj.draw_starts(2, 0), conditions), hexmj.ReadsLegs(UNCOORDINATED)
+    settled, standing = settle(hexmj.draw_starts(2, 0), conditions), hexmj.SensoryFeedback(UNCOORDINATED)
     still, speed = (settled.starts, np.zeros(2), STRIDE), []
     for impulse in (0.0, 30.0):
         push = Push(np.array([impulse, -impulse]), np.array([2.0, 2.0]))
@@ -140,7 +140,7 @@ def test_a_swinging_foot_that_meets_the_ground_stands_there(settled):
 def test_a_standing_leg_is_lifted_where_its_tip_is_read(settled):
     """Its target takes up the tip as read when the leg changes its state, and only then."""
     starts, none = settled.starts, np.zeros((1, 6), dtype=bool)
-    plan = hexmj.ReadsLegs(UNCOORDINATED).begin(starts, np.full(12, 0.5), STRIDE)
+    plan = hexmj.SensoryFeedback(UNCOORDINATED).begin(starts, np.full(12, 0.5), STRIDE)
     for behind, stands in ((0.3, True), (-25.0, False)):
         tips = np.full((1, 6), 5.0)
         tips[0, 2] = starts[0, 2] - behind if stands else behind

@@ -137,7 +137,7 @@ def test_the_last_line_says_what_a_set_brings_along(run, tmp_path, monkeypatch, 
 def test_the_last_line_is_silent_on_what_is_as_printed_and_fresh(run, words):
     out = run("flss", *words, "--velocities", 0.4, "--starts", 2, "--observation time", 3)[1]
     assert "found" not in out
-    assert "reading" not in out
+    assert "model_variant" not in out
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj import HWS, LDVS, UNCOORDINATED, Conditions, InputError, ReadsLegs, compare, physical_flss
+from hexmj import HWS, LDVS, UNCOORDINATED, Conditions, InputError, SensoryFeedback, compare, physical_flss
 from hexmj.measures import outcome_table
 from hexmj.measures.compare import Comparison
 from hexmj.studies.disturbance.study import DisturbedWalks
@@ -80,7 +80,7 @@ def test_starts_settle_once(monkeypatch):
 
 STUDIES = {
     "compare": Comparison(BOTH, [0.6], **FEW),
-    "reading": Comparison({"reading": ReadsLegs(LDVS)}, [0.5, 0.6], **FEW),
+    "model_variant": Comparison({"model_variant": SensoryFeedback(LDVS)}, [0.5, 0.6], **FEW),
     "map": StabilityMap(LDVS, "load", [0.0, 0.5], [0.6], **FEW),
     "terrain": Terrain(LDVS, [0.8], grounds=["step"], heights=[3.0], grasps=[0.0], n_starts=2),
     "disturb": DisturbedWalks(LDVS, [0.7], ["halt", "push"], strategies=["reorganise"], **PUSHED),
@@ -89,7 +89,7 @@ STUDIES = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", few_of(STUDIES, "compare", "reading", "map", "terrain", "converge"))
+@pytest.mark.parametrize("name", few_of(STUDIES, "compare", "model_variant", "map", "terrain", "converge"))
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
     here = run_study(STUDIES[name], threads=2)
     assert run_study(STUDIES[name], executor=two_processes).identical(here)

@@ -13,7 +13,7 @@ from coarse_steps import COARSE
 from hexmj.controllers import conformance
 from hexmj.controllers.conformance import FIRST, check_controller, findings
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.baselines.metronomes import Metronome
 from hexmj.errors import InputError
 from stepwise_ldvs import Own
 from tiers import few_of
@@ -33,7 +33,7 @@ def test_the_network_conforms(name, order):
 
 @pytest.mark.thorough
 def test_other_controllers_conform():
-    check_controller(hexmj.ReadsLegs(LDVS))
+    check_controller(hexmj.SensoryFeedback(LDVS))
     check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))
     assert all(finding.well and finding.found for finding in findings(Own()))
     check_controller(BegunOtherwise())

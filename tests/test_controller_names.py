@@ -224,7 +224,7 @@ def test_our_own_sets_are_known_by_any_name(tmp_path):
         ("hexmj:LDVS", {}),
         ("uncoordinated", {}),
         ("walknet", {}),
-        *((one, {"evolved": [0]}) for one in ("evolved", "hexmj.controllers.rivals.evolved:EVOLVED")),
+        *((one, {"evolved": [0]}) for one in ("evolved", "hexmj.controllers.baselines.evolved:EVOLVED")),
         (str(tmp_path / "same.toml"), {"evolved": [0]}),
         (str(tmp_path / "other.toml"), {}),
     ):
@@ -273,7 +273,7 @@ def test_wrong_names_get_one_sentence(mine, name, words):
 
 
 def test_settings_are_plain_data():
-    settings = settings_of(hexmj.ReadsLegs(hexmj.PRESETS["own-0.1"]))
+    settings = settings_of(hexmj.SensoryFeedback(hexmj.PRESETS["own-0.1"]))
     assert set(settings) == {"controller"}
     assert isinstance(settings["controller"]["weights"]["p1"][0], list)
     with pytest.raises(hexmj.InputError, match="expected a controller"):

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, ReadsLegs, Stride, physical_walk
+from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, SensoryFeedback, Stride, physical_walk
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Sensed
-from hexmj.controllers.reads_legs import SensedPlan
+from hexmj.controllers.feedback import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
@@ -44,7 +44,7 @@ def plan(kind, postures=None, acceleration=None, threads=None) -> DisturbedPlan:
 
 def sensing(postures=None, acceleration=None, kind="halt") -> SensedPlan:
     disturbed = Disturbed(LDVS, disturbance(kind), postures, slows=acceleration is not None)
-    return ReadsLegs(disturbed).begin(STABLE.starts, np.full(len(STABLE.starts), V), STRIDE, acceleration)
+    return SensoryFeedback(disturbed).begin(STABLE.starts, np.full(len(STABLE.starts), V), STRIDE, acceleration)
 
 
 def sensed(ids, tips, gained) -> Sensed:
@@ -70,7 +70,7 @@ def test_the_leg_that_is_stopped_is_one_that_protracts_as_the_legs_are_told():
     assert not replace(stopped, kind="halt").awaited(up).any()
     least = Disturbance("leg", np.array([300, 310, 320, 330, 340, 350]), np.array([0, 1, 2, 3, 4, 5]))
     free, *walks = (
-        physical_walk(STABLE.starts, ReadsLegs(one), V, (least.step.max() + 200) * STRIDE.dt)
+        physical_walk(STABLE.starts, SensoryFeedback(one), V, (least.step.max() + 200) * STRIDE.dt)
         for one in (LDVS, Disturbed(LDVS, least), Disturbed(LDVS, replace(least, leg=(least.leg + 3) % 6)))
     )
     goes_on = np.flatnonzero(free.outcomes.fall > (least.step + 200) * STRIDE.dt)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj import HWS, LDVS, Cruse1998, InputError, ReadsLegs, Stride
+from hexmj import HWS, LDVS, Cruse1998, InputError, SensoryFeedback, Stride
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.measures.captions import caption
@@ -114,9 +114,9 @@ def test_disturbed_walks_can_read_their_legs():
         "n_starts": 2,
         "observation_time": 15.0,
     }
-    alone, reading = (run_study(DisturbedWalks(one, **halted)) for one in (LDVS, ReadsLegs(LDVS)))
-    assert np.isfinite(reading.physical.sel(observation_time="whole")).all()
-    assert all(reading[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
+    alone, model_variant = (run_study(DisturbedWalks(one, **halted)) for one in (LDVS, SensoryFeedback(LDVS)))
+    assert np.isfinite(model_variant.physical.sel(observation_time="whole")).all()
+    assert all(model_variant[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
 
 
 @pytest.mark.thorough
@@ -169,7 +169,7 @@ def test_strategies_and_feedback_are_not_for_controllers_that_cannot_be_steered(
     with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
         DisturbedWalks(frozen, **FEW)
     with pytest.raises(InputError, match="rigid cannot be disturbed; expected a controller whose plans can go on"):
-        DisturbedWalks(ReadsLegs(frozen), **FEW)
+        DisturbedWalks(SensoryFeedback(frozen), **FEW)
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, ReadsLegs, Stride, physical_walk
+from hexmj import LDVS, UNCOORDINATED, Conditions, Cruse1998, InputError, SensoryFeedback, Stride, physical_walk
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import is_steerable
-from hexmj.controllers.rivals.table import RIVALS
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
 from hexmj.studies.disturbance.plan import PAUSE, Disturbed
@@ -69,7 +69,7 @@ class MadeForHalf(Lifts):
         return plan
 
 
-@pytest.mark.parametrize("around", [Disturbed(MadeForHalf(), disturbance("push")), ReadsLegs(MadeForHalf())])
+@pytest.mark.parametrize("around", [Disturbed(MadeForHalf(), disturbance("push")), SensoryFeedback(MadeForHalf())])
 def test_what_a_plan_is_made_for_is_handed_on(around: Any):
     with pytest.raises(InputError, match=r"the plan is made for vp = 40\.0; expected that of the conditions, 80\.0"):
         physical_walk(STABLE.starts, around, V, 5.0)
@@ -172,7 +172,7 @@ def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
 def test_a_start_that_is_halted_restarts_beside_tips_that_are_some(monkeypatch):
     """What it hands on is the plan's own to change, and of starts that do not restart it is where they began."""
     starts, given = draw_starts(6, 0), []
-    righetti: Any = RIVALS["righetti"]
+    righetti: Any = BASELINES["righetti"]
     plan_of = type(righetti.begin(starts, np.full(6, 0.5), Stride()))
     restart = plan_of.restart
 

@@ -8,9 +8,9 @@ import pytest
 
 import hexmj
 from hexmj.controllers.cruse1998.presets import network_toml
-from hexmj.controllers.rivals.evolved import Evolved
-from hexmj.controllers.rivals.metronomes import Metronome
-from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
+from hexmj.controllers.baselines.evolved import Evolved
+from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
 from hexmj.errors import InputError
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.league.entrants_by_name import EVERYONE, entrants
@@ -35,7 +35,7 @@ def test_everyone_is_found_and_can_be_asked_everything() -> None:
 
 OWN = """
 from dataclasses import dataclass
-from hexmj.controllers.rivals.metronomes import Metronome
+from hexmj.controllers.baselines.metronomes import Metronome
 
 @dataclass(frozen=True)
 class One(Metronome):

@@ -8,7 +8,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.environments import dm
 from hexmj.legs import CENTRED, FIG1
 from hexmj.measures.physical import physical_walk
@@ -62,8 +62,8 @@ def test_zero_offsets_are_the_physical_walk_to_the_last_bit(velocity: float):
     [
         (HWS, Conditions(vp=200.0, friction=0.5), Stride()),
         (HWS, Conditions(vp=40.0, standing_height=12.0), Stride(dt=0.5, geometry=CENTRED)),
-        (ReadsLegs(LDVS), Conditions(), Stride()),
-        (ReadsLegs(HWS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
+        (SensoryFeedback(LDVS), Conditions(), Stride()),
+        (SensoryFeedback(HWS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
     ],
     ids=["slippery", "slow and centred", "reads the legs", "reads the legs, loaded"],
 )
@@ -87,7 +87,7 @@ def test_other_controllers_and_conditions_are_those_of_the_physical_walk(
 def test_what_is_read_from_the_legs_is_felt():
     """Or the test above would notice nothing."""
     seen = []
-    for controller in (LDVS, ReadsLegs(LDVS)):
+    for controller in (LDVS, SensoryFeedback(LDVS)):
         walking = dm.load(0.3, actions="tips", controller=controller, duration=40.0, seed=7)
         run_steps(walking, 300)
         seen.append(walking.physics.position())

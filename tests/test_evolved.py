@@ -8,8 +8,8 @@ import pytest
 
 import hexmj
 from hexmj.cli.commands import options_of
-from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
-from hexmj.controllers.rivals.lifted import Legs
+from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
+from hexmj.controllers.baselines.lifted import Legs
 from hexmj.gaits import gait
 from hexmj.search.samples import Sample
 from hexmj.files import read_toml

@@ -119,7 +119,7 @@ def test_the_dm_env_face_passes_them_by_shimmy(actions):
     ("controller", "conditions", "stride"),
     [
         (LDVS, Conditions(), Stride()),
-        (hexmj.ReadsLegs(LDVS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
+        (hexmj.SensoryFeedback(LDVS), Conditions(vp=160.0, grasp=0.5, load=0.5), Stride(dt=0.2)),
     ],
     ids=["as usual", "reads the legs, loaded"],
 )
@@ -235,7 +235,7 @@ def test_many_insects_are_single_ones_to_the_last_bit(mode, count, threads):
 
 
 def test_a_plan_that_reads_the_legs_is_told_of_its_own_insects_alone():
-    task: Any = {"actions": "tips", "velocity": 0.8, "duration": 12.0, "controller": hexmj.ReadsLegs(LDVS)}
+    task: Any = {"actions": "tips", "velocity": 0.8, "duration": 12.0, "controller": hexmj.SensoryFeedback(LDVS)}
     actions = some_actions(140, 3, seed=1)
     many = StickInsects(3, **task)
     many.reset(seed=3)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import hexmj
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
 from hexmj.stats import paired_difference
 from hexmj.measures.captions import rules
@@ -202,7 +202,7 @@ def test_a_set_that_is_not_read_as_printed_is_told_everywhere(league: League, da
 
 def test_sequential_sets_and_those_that_read_legs_are_told_too() -> None:
     slow = replace(hexmj.load_controller("lasting"), order="sequential")  # pyright: ignore[reportArgumentType]
-    for one in (slow, ReadsLegs(slow)):
+    for one in (slow, SensoryFeedback(slow)):
         assert rules(plain(one)) == "sequential order, reading lasting"
     for name in ("ldvs", "walknet", "graham"):
         assert rules(plain(hexmj.load_controller(name))) == ""

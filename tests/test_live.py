@@ -13,7 +13,7 @@ from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
@@ -30,7 +30,7 @@ def begun(controller: Controller = LDVS, velocity: float = 0.4) -> LiveWalk:
     return LiveWalk(controller, velocity, STARTS[0])
 
 
-@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS), load_controller("graham")], ids=lambda one: one.name)
+@pytest.mark.parametrize("controller", [LDVS, SensoryFeedback(LDVS), load_controller("graham")], ids=lambda one: one.name)
 def test_a_walk_that_is_left_alone_is_the_measured_one(controller):
     """To the last bit, however it is divided into pictures."""
     live, shown = begun(controller), []
@@ -76,7 +76,7 @@ def test_a_handed_over_plan_is_walked_as_the_new_controller_plans_it():
 
 
 def test_a_controller_that_cannot_go_on_begins_again():
-    live = begun(ReadsLegs(LDVS))
+    live = begun(SensoryFeedback(LDVS))
     live.advance(0.1)
     assert not live.steer(velocity=0.5)
     assert live.moment.seconds < 0.01

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexmj import LDVS, Conditions, InputError, ReadsLegs, Stride, compare
+from hexmj import LDVS, Conditions, InputError, SensoryFeedback, Stride, compare
 from hexmj.body import STICK_INSECT
 from hexmj.studies.stability_map import fates
 from hexmj.studies.stability_map.differences import FLSS, froude
@@ -155,7 +155,7 @@ def test_the_values_of_every_condition_make_sense():
             {"conditions": Conditions(vp=20.0)},
             "vp = 20.0; expected 80.0: values has all that are tried",
         ),
-        ("vp", {"controller": ReadsLegs(LDVS)}, "reads the legs; expected a controller that does not"),
+        ("vp", {"controller": SensoryFeedback(LDVS)}, "reads the legs; expected a controller that does not"),
     ],
 )
 def test_bad_input_is_refused(over, changed, message):

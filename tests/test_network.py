@@ -13,7 +13,7 @@ import plain_network as plain
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Weights, kernel
 from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
-from hexmj.controllers.cruse1998.readings import Reading
+from hexmj.controllers.cruse1998.model_variants import ModelVariant
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.legs import CENTRED, FIG1, MIRROR, Geometry
@@ -26,12 +26,12 @@ NEAR = Geometry(origins=(7.0, 2.0, -4.0), lateral=(10.0, 25.0, 16.0))
 """Legs so near each other that tips pass those ahead of them, and any one may be the foremost."""
 
 RULES = [
-    ("printed", Reading()),
-    ("undelayed", Reading()),
-    ("sequential", Reading()),
-    ("printed", Reading(ipsilateral="lasting")),
-    ("undelayed", Reading("lasting", "lasting", "sum", "strongest", "final")),
-    ("sequential", Reading(contralateral="lasting", cap="both", rear="strongest", neutral="final")),
+    ("printed", ModelVariant()),
+    ("undelayed", ModelVariant()),
+    ("sequential", ModelVariant()),
+    ("printed", ModelVariant(ipsilateral="lasting")),
+    ("undelayed", ModelVariant("lasting", "lasting", "sum", "strongest", "final")),
+    ("sequential", ModelVariant(contralateral="lasting", cap="both", rear="strongest", neutral="final")),
 ]
 """Every choice once at least, alone or with others; each combination is compiled by itself."""
 
@@ -62,15 +62,15 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
 )
 def test_equals_plain_network_to_the_last_bit(seed, size, threads, rules, geometry, velocity, rate):
     rng = np.random.default_rng(seed)
-    p, starts, (order, reading) = random_weights(rng), random_starts(rng, size), rules
-    controller, stride = Cruse1998(p, order, reading=reading), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
+    p, starts, (order, model_variant) = random_weights(rng), random_starts(rng, size), rules
+    controller, stride = Cruse1998(p, order, model_variant=model_variant), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
     acceleration = Acceleration(rate, start=velocity / 2) if rate else None
     steps = 250
     options = {"stride": stride, "acceleration": acceleration, "threads": threads}
     fast = walk(starts, controller, velocity, steps * stride.dt, **options)
     lost = first_loss(starts, controller, velocity, steps * stride.dt, **options)
     for i in rng.choice(size, min(size, 2), replace=False):
-        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, stride, order, acceleration, reading)
+        x, s, v = plain.walk(list(starts[i]), p, velocity, steps, stride, order, acceleration, model_variant)
         assert np.array_equal(fast.x[:, i], x)
         assert np.array_equal(fast.stance[:, i], np.array(s) == 1)
         assert np.array_equal(fast.velocity[:, i], v)

@@ -20,7 +20,7 @@ from hexmj.bodies.numeric import HingeChains
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions, Ground
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.environments import dm
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
@@ -93,7 +93,7 @@ def test_names_alone_change_no_bit(tmp_path: Path):
     other = compile_body(conditions(body))
     assert set(differences(other.model, insect.model)) <= same_home
     assert_allclose(other.home, insect.home, atol=1e-9)
-    for controller in (LDVS, ReadsLegs(LDVS)):
+    for controller in (LDVS, SensoryFeedback(LDVS)):
         ours, theirs = (
             physical_walk(draw_starts(4, 0), controller, 0.5, 30.0, conditions=conditions(one, grasp=0.3, load=0.5))
             for one in (STICK_INSECT, body)

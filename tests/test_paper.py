@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, READINGS
+from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, MODEL_VARIANTS
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import flss, walk
 from hexmj.paper import found_sets as found
@@ -228,7 +228,7 @@ def test_the_shipped_sets_are_judged_on_fresh_starts():
     """Every command names a seed, and none of them is that of the protocol's starts."""
     seeds = {int(one.command.split("--seed ")[1]) for one in found.found_sets()}
     assert seeds and FULL.seed not in seeds
-    places = {one.place[:3] for one in found.found_sets() if one.controller.reading == found.PRINTED}
+    places = {one.place[:3] for one in found.found_sets() if one.controller.model_variant == found.PRINTED}
     assert places == {(w, *at) for w in OBSERVATION_TIMES for at in (*((v, v) for v in FULL.velocities), *RANGES.values())}
 
 
@@ -261,7 +261,7 @@ def test_the_numbers_do_not_depend_on_who_measures(tmp_path):
 @pytest.mark.thorough
 def test_other_readings_stand_beside(tmp_path):
     keys = ("hws-late", "hws-regimes", "p2")
-    alone, _ = reproduce(tmp_path / "alone", replace(TINY, reading=READINGS["lasting"]), only=keys[:2])
+    alone, _ = reproduce(tmp_path / "alone", replace(TINY, model_variant=MODEL_VARIANTS["lasting"]), only=keys[:2])
     told = []
     rows, _ = reproduce(tmp_path, TINY, only=keys, beside=("lasting",), progress=told.append)
     assert sum(told) == pytest.approx(1.0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, READINGS, Cruse1998, Reading, Symmetric, Weights
+from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, MODEL_VARIANTS, Cruse1998, ModelVariant, Symmetric, Weights
 from hexmj.controllers.cruse1998.presets import OWN, network_toml
 from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
 from hexmj.controllers.named import load_controller
@@ -232,7 +232,7 @@ def test_each_of_our_own_sets_names_the_command_that_found_it():
         single = name[-1].isdigit()
         at = words.index("--velocity" if single else "--velocities") + 1
         assert words[at : at + 2 - single] == ([name.rpartition("-")[2]] if single else ["0.1", "0.5"])
-        assert ("--reading" in words) == (PRESETS[name].reading != Reading())
+        assert ("--reading" in words) == (PRESETS[name].model_variant != ModelVariant())
         assert ("--over" in words) == name.startswith("robust")
         if "--begin" in words:
             begun = load_controller(words[words.index("--begin") + 1])
@@ -250,15 +250,15 @@ def test_written_weights_are_read_to_the_same_bits(weights, tmp_path):
 
 
 @pytest.mark.parametrize("order", ["printed", "sequential"])
-@pytest.mark.parametrize("reading", READINGS)
-def test_written_rules_are_read_again(order, reading, tmp_path):
+@pytest.mark.parametrize("model_variant", MODEL_VARIANTS)
+def test_written_rules_are_read_again(order, model_variant, tmp_path):
     path = tmp_path / "network.toml"
-    path.write_text(network_toml(Cruse1998(LDVS.weights, order, reading=READINGS[reading])))
-    assert load_controller(str(path)) == Cruse1998(LDVS.weights, order, "network", READINGS[reading])
+    path.write_text(network_toml(Cruse1998(LDVS.weights, order, model_variant=MODEL_VARIANTS[model_variant])))
+    assert load_controller(str(path)) == Cruse1998(LDVS.weights, order, "network", MODEL_VARIANTS[model_variant])
 
 
 @pytest.mark.parametrize("wrong", ["'wrong'", "['lasting']", "1"])
-@pytest.mark.parametrize(("rule", "valid"), [("order", "sequential"), ("reading", "lasting")])
+@pytest.mark.parametrize(("rule", "valid"), [("order", "sequential"), ("model_variant", "lasting")])
 def test_unknown_rules_are_refused(rule, valid, wrong, tmp_path):
     path = tmp_path / "network.toml"
     path.write_text(f"{rule} = {wrong}\n{network_toml(LDVS)}")
@@ -268,4 +268,4 @@ def test_unknown_rules_are_refused(rule, valid, wrong, tmp_path):
 
 def test_a_reading_without_a_name_is_not_written():
     with pytest.raises(InputError, match="has no name; named ones: printed, lasting"):
-        network_toml(Cruse1998(LDVS.weights, reading=Reading(rear="strongest")))
+        network_toml(Cruse1998(LDVS.weights, model_variant=ModelVariant(rear="strongest")))

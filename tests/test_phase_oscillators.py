@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals.lifted import Legs
-from hexmj.controllers.rivals.phase_oscillators import BIASES, Oscillators, PhaseOscillators
-from hexmj.controllers.rivals.table import RIVALS
+from hexmj.controllers.baselines.lifted import Legs
+from hexmj.controllers.baselines.phase_oscillators import BIASES, Oscillators, PhaseOscillators
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.phases import PAIRS
@@ -28,7 +28,7 @@ def test_a_table_of_phases_says_the_same_of_every_pair_of_legs(name: str) -> Non
 @pytest.mark.parametrize("velocity", few_of([0.3, 0.7], 0.7))
 def test_legs_come_to_swing_as_the_table_says_and_for_the_usual_time(name: str, velocity: float) -> None:
     stride = Stride()
-    found = gait(walk(hexmj.draw_starts(6, 2), RIVALS[f"cpg-{name}"], velocity, 25 * stride.periods(velocity)))
+    found = gait(walk(hexmj.draw_starts(6, 2), BASELINES[f"cpg-{name}"], velocity, 25 * stride.periods(velocity)))
     lag = np.array([-BIASES[name][j, k] for j, k in PAIRS.values()])  # a leg that is ahead swings earlier
     assert found.periodic.all()
     assert np.allclose((found.phase - lag + 0.5) % 1.0, 0.5, atol=0.01)

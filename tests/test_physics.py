@@ -14,7 +14,7 @@ from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError, SimulationError
 from hexmj.gaits import gait
 from hexmj.legs import MIRROR
@@ -88,7 +88,7 @@ def test_measured_tips_follow_the_plan(walked):
     assert walked.outcomes.saturation.max() < 0.02
 
 
-@pytest.mark.parametrize("controller", [LDVS, ReadsLegs(LDVS)], ids=lambda one: one.name)
+@pytest.mark.parametrize("controller", [LDVS, SensoryFeedback(LDVS)], ids=lambda one: one.name)
 def test_progress_is_the_share_of_the_substeps(settled, controller):
     told: list[float] = []
     steps, plan = 45 * settled.substeps, begin(controller, settled.starts, 0.2, settled.stride)
@@ -170,7 +170,7 @@ def test_an_insect_alone_walks_as_among_others():
 
 def test_what_one_is_told_until_it_falls_does_not_depend_on_who_walks_beside_it():
     starts = draw_starts(1000, 0)[[3, 1]]
-    how: Any = {"controller": ReadsLegs(LDVS), "velocity": 0.7, "duration": 34.5}
+    how: Any = {"controller": SensoryFeedback(LDVS), "velocity": 0.7, "duration": 34.5}
     both = physical_walk(starts, **how)
     fallen = both.ordered.time > both.outcomes.fall.min() + 1.0
     for i, start in enumerate(starts):

@@ -8,7 +8,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers.losses import first_losses, planned_losses
-from hexmj.controllers.reads_legs import SensedPlan
+from hexmj.controllers.feedback import SensedPlan
 from hexmj.environments.learned import WithOffsets
 from stepwise_ldvs import Own, same
 
@@ -17,13 +17,13 @@ LDVS = hexmj.LDVS
 
 
 def test_feedback_needs_plans_that_can_be_steered():
-    reading = hexmj.ReadsLegs(Own())
+    model_variant = hexmj.SensoryFeedback(Own())
     with pytest.raises(hexmj.InputError, match="feedback around own; expected a controller whose plans can go on"):
-        reading.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+        model_variant.begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
     with pytest.raises(
         hexmj.InputError, match=r"feedback around .*; expected another: this one reads the legs already"
     ):
-        hexmj.ReadsLegs(hexmj.ReadsLegs(LDVS)).begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
+        hexmj.SensoryFeedback(hexmj.SensoryFeedback(LDVS)).begin(np.zeros((1, 6)), np.array([0.5]), STRIDE)
 
 
 @pytest.mark.parametrize("acceleration", [None, hexmj.Acceleration(rate=0.01)])
@@ -32,11 +32,11 @@ def test_on_paper_reading_the_legs_changes_nothing(name, acceleration):
     """Neither the plan nor its losses, by either way to them."""
     controller, starts = hexmj.PRESETS[name], hexmj.draw_starts(20, 5)
     velocity, steps = np.linspace(0.1, 0.9, 20), np.full(20, 300)
-    reading = hexmj.ReadsLegs(controller)
-    inner, outer = (one.begin(starts, velocity, STRIDE, acceleration) for one in (controller, reading))
+    model_variant = hexmj.SensoryFeedback(controller)
+    inner, outer = (one.begin(starts, velocity, STRIDE, acceleration) for one in (controller, model_variant))
     one, other = inner.advance(300), outer.advance(300)
     assert same(one, replace(other, aep=one.aep))
-    begin = partial(reading.begin, starts, velocity, STRIDE, acceleration)
+    begin = partial(model_variant.begin, starts, velocity, STRIDE, acceleration)
     fast, general = first_losses(begin(), steps), planned_losses(begin(), steps)
     assert np.array_equal(fast, general)
     assert np.array_equal(fast, first_losses(controller.begin(starts, velocity, STRIDE, acceleration), steps))
@@ -48,8 +48,8 @@ def test_feedback_goes_on_from_the_legs_as_a_plan_begins_with_them():
     plans = [LDVS.begin(starts, velocity, STRIDE) for _ in range(2)]
     for plan in plans:
         plan.see(plan.tips, np.tile(~lifted, (20, 1)))
-    reading, step = SensedPlan(plans[0]).advance(300), plans[1].advance(300)
-    assert same(step, replace(reading, aep=step.aep))
+    model_variant, step = SensedPlan(plans[0]).advance(300), plans[1].advance(300)
+    assert same(step, replace(model_variant, aep=step.aep))
     assert not same(step, LDVS.begin(starts, velocity, STRIDE).advance(300))
 
 
@@ -91,7 +91,7 @@ def test_feedback_copies_steps_of_plans_that_fill_the_same_arrays_again(monkeypa
 
 def test_steps_of_feedback_are_whosever_asked_for_them():
     starts, velocity = hexmj.draw_starts(5, 0), np.full(5, 0.5)
-    plan, other = (hexmj.ReadsLegs(LDVS).begin(starts, velocity, STRIDE) for _ in range(2))
+    plan, other = (hexmj.SensoryFeedback(LDVS).begin(starts, velocity, STRIDE) for _ in range(2))
     for _ in range(50):
         usual, step = other.advance(1), plan.advance(1)
         assert np.array_equal(step.x, usual.x) and np.array_equal(step.stance, usual.stance)

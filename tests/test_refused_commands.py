@@ -10,7 +10,7 @@ NONSENSE = [
     (["reproduce", "--only", "nothing"], "claim 'nothing'; valid keys: "),
     (["reproduce", "--quick", "--seed", "-1"], "seed = -1"),
     (["reproduce", "--only", "p2", "--seed", "-1"], "seed = -1"),
-    (["readings", "--only", "lasting", "lasting"], "--only = ['lasting', 'lasting']; expected at least one, and none"),
+    (["model_variants", "--only", "lasting", "lasting"], "--only = ['lasting', 'lasting']; expected at least one, and none"),
     (["reproduce", "--only", "p2", "--beside"], "--beside without names; expected at least one"),
     (["search", "--velocity", "1"], "expected 0 <= low <= high < 1"),
     (["search", "--velocities", "0.5", "0.1"], "velocity range 0.5 to 0.1; expected 0 <= low <= high < 1"),

@@ -47,7 +47,7 @@ def pixels(result: xr.Dataset, which: str | None = None) -> bytes:
 
 
 def flss() -> xr.Dataset:
-    return hexmj.flss(hexmj.ReadsLegs(hexmj.LDVS), [0.3, 0.5], n_starts=40, seed=2**70)
+    return hexmj.flss(hexmj.SensoryFeedback(hexmj.LDVS), [0.3, 0.5], n_starts=40, seed=2**70)
 
 
 def compared() -> xr.Dataset:
@@ -103,7 +103,7 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "recording": recorded,
     "search": searched,
 }
-STUDIES = [name for name in FIGURES if name not in MADE and name != "readings"]  # which takes minutes
+STUDIES = [name for name in FIGURES if name not in MADE and name != "model_variants"]  # which takes minutes
 
 
 def check_it_stays_the_same(result: xr.Dataset, folder: Path) -> None:
@@ -209,7 +209,7 @@ def test_the_title_tells_what_was_chosen():
     assert "height" not in title, "what is as usual is not told"
     assert "ldvs, reading the legs" in hexmj.plot(flss()).get_suptitle()
     walknet = hexmj.flss(hexmj.load_controller("walknet"), [0.5], n_starts=5)
-    assert hexmj.plot(walknet).get_suptitle().count("reading") == 0, "its own reading is another thing"
+    assert hexmj.plot(walknet).get_suptitle().count("model_variant") == 0, "its own reading is another thing"
     lasting = hexmj.flss(hexmj.load_controller("lasting"), [0.5], n_starts=5)
     assert "lasting (reading lasting)" in hexmj.plot(lasting).get_suptitle()
 
@@ -367,7 +367,7 @@ def test_a_damaged_result_is_no_result(tmp_path):
 def test_a_figure_of_walknet_whose_reading_is_not_the_networks(name: str):
     result = hexmj.flss(hexmj.load_controller(name), [0.3], n_starts=3, observation_time="start")
     told = " ".join(text.get_text() for text in hexmj.plot(result).findobj(Text))
-    assert name in told and "reading" not in told
+    assert name in told and "model_variant" not in told
 
 
 def test_what_has_lost_its_velocities_gets_a_sentence():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals.lifted import Legs
-from hexmj.controllers.rivals.righetti import Hopf, Righetti
-from hexmj.controllers.rivals.table import RIVALS
+from hexmj.controllers.baselines.lifted import Legs
+from hexmj.controllers.baselines.righetti import Hopf, Righetti
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
@@ -23,7 +23,7 @@ def state(x: float, y: float) -> Hopf:
 @pytest.mark.slow
 @pytest.mark.parametrize("velocity", few_of([0.4, 0.7], 0.7))
 def test_two_tripods_move_in_anti_phase(velocity: float) -> None:
-    found = gait(walk(hexmj.draw_starts(6, 2), RIVALS["righetti"], velocity, 30 * Stride().periods(velocity)))
+    found = gait(walk(hexmj.draw_starts(6, 2), BASELINES["righetti"], velocity, 30 * Stride().periods(velocity)))
     assert found.periodic.all()
     assert np.allclose(found.phase, 0.5, atol=0.01)
     assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.01)
@@ -77,4 +77,4 @@ def test_a_step_at_which_the_oscillators_diverge_is_refused() -> None:
         (0.5, 0.5, "dt = 0.5 and V_r = 0.5; expected a sho"),
     ):
         with pytest.raises(InputError, match=told) if told else nullcontext():
-            hexmj.first_loss(starts, RIVALS["righetti"], velocity, 200.0, stride=hexmj.Stride(dt=dt))
+            hexmj.first_loss(starts, BASELINES["righetti"], velocity, 200.0, stride=hexmj.Stride(dt=dt))

@@ -8,9 +8,9 @@ import pytest
 
 import hexmj
 from hexmj.controllers.conformance import check_controller
-from hexmj.controllers.rivals.lifted import Lifted
-from hexmj.controllers.rivals.metronomes import Metronome
-from hexmj.controllers.rivals.table import RIVALS
+from hexmj.controllers.baselines.lifted import Lifted
+from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
@@ -21,15 +21,15 @@ from tiers import few_of
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", few_of(RIVALS, "wilson", "cpg-tripod", "tegotae"))
+@pytest.mark.parametrize("name", few_of(BASELINES, "wilson", "cpg-tripod", "tegotae"))
 def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
-    assert hexmj.load_controller(name) is RIVALS[name]
-    check_controller(RIVALS[name])
+    assert hexmj.load_controller(name) is BASELINES[name]
+    check_controller(BASELINES[name])
 
 
-@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("name", BASELINES)
 def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
-    rival, starts, stride = RIVALS[name], hexmj.draw_starts(6, 3), Stride()
+    rival, starts, stride = BASELINES[name], hexmj.draw_starts(6, 3), Stride()
     assert isinstance(rival, Lifted)
     velocity, eq11 = np.full(6, 0.5), Acceleration(rate=0.005)
     plan, other = (Lifted.begin(rival, starts, velocity, stride, eq11) for _ in range(2))
@@ -46,7 +46,7 @@ def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
 @pytest.mark.parametrize(("wave", "name"), [("wilson", "wilson"), ("graham", "graham")])
 @pytest.mark.parametrize("velocity", few_of([0.1, 0.35, 0.8], 0.35))
 def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_one(wave, name, velocity) -> None:
-    metronome, stride = RIVALS[name], Stride()
+    metronome, stride = BASELINES[name], Stride()
     assert isinstance(metronome, Metronome)
     ideal = metronome.ideal_start(velocity, stride)
     starts = np.concatenate([ideal, hexmj.draw_starts(5, 1)])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hexmj.controllers.rivals.lifted import Legs
-from hexmj.controllers.rivals.scores import Nothing, Scores
+from hexmj.controllers.baselines.lifted import Legs
+from hexmj.controllers.baselines.scores import Nothing, Scores
 from hexmj.timing import Stride
 
 RULES = Scores()

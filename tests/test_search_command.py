@@ -14,7 +14,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.cli.commands import options_of
-from hexmj.controllers.cruse1998 import READINGS, Cruse1998
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998
 from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.searched import searched_on
 from tiers import few_of
@@ -330,7 +330,7 @@ def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
 
 def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = "import dataclasses, hexmj\nfrom hexmj.controllers.cruse1998.readings import Reading\n"
+    text = "import dataclasses, hexmj\nfrom hexmj.controllers.cruse1998.model_variants import Reading\n"
     text += "X = dataclasses.replace(hexmj.LDVS, reading=Reading(cap='sum'), name='x')\n"
     (tmp_path / "own.py").write_text(text)
     words = ["search", "--form", "ldvs", "--begin", "own.py:X", "--velocity", 0.5, "--starts", 4, "--budget", 10]
@@ -339,7 +339,7 @@ def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, t
     said = "--begin = own.py:X: its reading has no name; expected --reading beside it, one of printed, lasting"
     assert code == 2 and said in error
     code, out, _ = run(*words, "--reading", "lasting", "--json")
-    assert code == 0 and json.loads(out)["settings"]["problem"]["form"]["reading"]["ipsilateral"] == "lasting"
+    assert code == 0 and json.loads(out)["settings"]["problem"]["form"]["model_variant"]["ipsilateral"] == "lasting"
 
 
 def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
@@ -350,4 +350,4 @@ def test_a_search_keeps_the_rules_of_the_set_that_it_begins_with(tmp_path):
         options_of([*words, *added, "--out", str(tmp_path / expected)]).run()
         found = hexmj.load_controller(str(tmp_path / expected / "found.toml"))
         assert isinstance(found, Cruse1998)
-        assert found.reading == READINGS[expected]
+        assert found.model_variant == MODEL_VARIANTS[expected]

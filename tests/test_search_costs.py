@@ -50,7 +50,7 @@ def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
 def test_the_physical_cost_is_the_physical_flss(feedback):
     conditions = hexmj.Conditions(vp=200.0)
     sample = Sample(Problem(LDVS, 0.6, 0.6, "start", conditions=conditions, feedback=feedback), 12, 0)
-    walked = hexmj.ReadsLegs(hexmj.LDVS) if feedback else hexmj.LDVS
+    walked = hexmj.SensoryFeedback(hexmj.LDVS) if feedback else hexmj.LDVS
     how: Any = {"n_starts": 12, "conditions": conditions}
     expected = hexmj.physical_flss(walked, [0.6], observation_time="start", **how).flss.item()
     assert sample.costs(LDVS.vector(hexmj.LDVS)[None]) == [expected]

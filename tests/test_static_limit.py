@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, Conditions, InputError, ReadsLegs, draw_starts, load_controller, physical_walk
+from hexmj import LDVS, Conditions, InputError, SensoryFeedback, draw_starts, load_controller, physical_walk
 from hexmj.body import STICK_INSECT
 from hexmj.stability import walk_margin
 from hexmj.studies.static_limit.distances import distances
@@ -131,9 +131,9 @@ def test_who_reads_the_legs_is_measured_against_what_these_are_told():
 @pytest.mark.thorough
 def test_a_controller_may_read_the_legs(slower):
     few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
-    reading, alone = run_study(StaticLimit(ReadsLegs(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
-    assert np.array_equal(reading.planned_loss, alone.planned_loss)  # on paper nothing is read
-    assert not np.array_equal(reading.margin, alone.margin)
+    model_variant, alone = run_study(StaticLimit(SensoryFeedback(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
+    assert np.array_equal(model_variant.planned_loss, alone.planned_loss)  # on paper nothing is read
+    assert not np.array_equal(model_variant.margin, alone.margin)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import xarray as xr
 import hexmj
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import ReadingPlan
+from hexmj.controllers.protocol import FeedbackPlan
 from hexmj.legs import LEGS
 from stepwise_ldvs import plan_of, same
 
@@ -28,7 +28,7 @@ def test_a_step_is_broadcast_to_starts_and_legs():
     assert (walk.aep == 4.0).all()
     assert np.isnan(walk.height).all()
     assert plan.done == 2
-    assert not isinstance(plan, ReadingPlan)
+    assert not isinstance(plan, FeedbackPlan)
 
 
 def test_labelled_legs_of_a_step_may_come_in_any_order():
@@ -70,7 +70,7 @@ def test_a_refusal_names_the_step_of_the_walk_though_it_is_looked_at_in_parts():
 def test_a_stepwise_plan_hears_what_it_is_told():
     told = []
     plan = stepwise(lambda v: Step(0.0, True), np.zeros((1, 6)), 0.5, STRIDE, sense=told.append)
-    assert isinstance(plan, ReadingPlan)
+    assert isinstance(plan, FeedbackPlan)
     sensed: Any = object()
     plan.sense(sensed)
     assert told == [sensed]

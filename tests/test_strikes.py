@@ -16,7 +16,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
 from hexmj.environments.single_body import Alone
@@ -106,7 +106,7 @@ def test_depth_is_that_of_mujocos_contacts(ground):
 @pytest.mark.parametrize("name", few_of(CONDITIONS, "step", "fast", "hard landing"))
 def test_feet_never_sink_in(name, monkeypatch):
     """By 2 % of the standing height, wherever and however fast the insect walks, until it has fallen."""
-    controller = ReadsLegs(LDVS) if name == "closed loop" else LDVS
+    controller = SensoryFeedback(LDVS) if name == "closed loop" else LDVS
     settled = settle(draw_starts(16, 4), CONDITIONS[name])
     assert (outcomes(settled, controller=controller).depth <= allowed(settled)).all()
     never_finely(monkeypatch)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.rivals.lifted import Legs
-from hexmj.controllers.rivals.table import RIVALS
-from hexmj.controllers.rivals.tegotae import Phases, Tegotae
+from hexmj.controllers.baselines.lifted import Legs
+from hexmj.controllers.baselines.table import BASELINES
+from hexmj.controllers.baselines.tegotae import Phases, Tegotae
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.timing import Stride
@@ -43,7 +43,7 @@ def test_six_legs_that_carry_equal_parts_go_at_their_own_rate() -> None:
 @pytest.mark.thorough
 def test_a_tripod_comes_of_the_load_alone() -> None:
     stride, starts = Stride(), hexmj.draw_starts(6, 2)
-    found = gait(walk(starts, RIVALS["tegotae"], 0.5, 25 * stride.periods(0.5)))
+    found = gait(walk(starts, BASELINES["tegotae"], 0.5, 25 * stride.periods(0.5)))
     assert found.periodic.all()
     assert np.allclose(found.phase, 0.5, atol=0.02)
     deaf = gait(walk(starts, Tegotae(0.0, 0.0), 0.5, 25 * stride.periods(0.5)))

@@ -20,7 +20,7 @@ from hexmj import (
     STICK_INSECT,
     Conditions,
     InputError,
-    ReadsLegs,
+    SensoryFeedback,
     Stride,
     draw_starts,
     physical_walk,
@@ -194,9 +194,9 @@ def test_where_nothing_is_reached_there_is_no_frequency():
 @pytest.mark.thorough
 def test_a_controller_may_read_the_legs(few):
     """It goes another way, not only at the step, and all its starts are counted."""
-    reading = run_study(Terrain(ReadsLegs(LDVS), **FEW))
-    assert reading.sizes == few.sizes and np.isfinite(reading.flss).all()
-    assert not np.array_equal(reading.speed, few.speed)
+    model_variant = run_study(Terrain(SensoryFeedback(LDVS), **FEW))
+    assert model_variant.sizes == few.sizes and np.isfinite(model_variant.flss).all()
+    assert not np.array_equal(model_variant.speed, few.speed)
 
 
 def test_the_figure_has_a_panel_for_each_kind_of_ground(few):

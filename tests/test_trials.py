@@ -12,7 +12,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.leg_lost import RISE, LegLost
 from hexmj.controllers.poor_senses import PoorSenses
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
@@ -32,7 +32,7 @@ def test_trials_are_what_they_say() -> None:
     assert found["load"].conditions.load == 1.0
     assert found["step"].conditions.ground_height == 3.0
     assert found["lost 2"].controller == LegLost(hexmj.LDVS, 1)
-    assert found["late"].controller == PoorSenses(ReadsLegs(hexmj.LDVS), delay=1.6)
+    assert found["late"].controller == PoorSenses(SensoryFeedback(hexmj.LDVS), delay=1.6)
 
 
 def test_whether_it_reads_is_asked_of_walks_that_are_asked_for() -> None:
@@ -93,8 +93,8 @@ def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() 
 @pytest.mark.thorough
 def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:
     check_controller(LegLost(hexmj.LDVS, 2))
-    check_controller(LegLost(ReadsLegs(hexmj.LDVS), 2))
-    check_controller(PoorSenses(ReadsLegs(hexmj.HWS), 0.1, 1.6))
+    check_controller(LegLost(SensoryFeedback(hexmj.LDVS), 2))
+    check_controller(PoorSenses(SensoryFeedback(hexmj.HWS), 0.1, 1.6))
     with pytest.raises(InputError, match="poor senses of ldvs"):
         hexmj.flss(PoorSenses(hexmj.LDVS, 0.1), [0.5], n_starts=2)
     with pytest.raises(InputError, match="noise = -1"):
@@ -103,19 +103,19 @@ def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None
 
 @pytest.mark.thorough
 def test_poor_senses_that_are_perfect_change_nothing_and_errors_are_a_starts_own() -> None:
-    starts, reading = hexmj.draw_starts(3, 2), ReadsLegs(hexmj.LDVS)
-    plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (reading, PoorSenses(reading)))
+    starts, model_variant = hexmj.draw_starts(3, 2), SensoryFeedback(hexmj.LDVS)
+    plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (model_variant, PoorSenses(model_variant)))
     assert np.array_equal(plain, perfect, equal_nan=True)
-    noisy = PoorSenses(reading, noise=0.1)
+    noisy = PoorSenses(model_variant, noise=0.1)
     together, alone = (physical_walk(some, noisy, 0.5, 40.0).qpos for some in (starts, starts[2:]))
     assert np.array_equal(together[:, 2:], alone, equal_nan=True)
     assert not np.array_equal(together, plain, equal_nan=True)
-    late = physical_walk(starts, PoorSenses(reading, delay=2.0), 0.5, 40.0).qpos
+    late = physical_walk(starts, PoorSenses(model_variant, delay=2.0), 0.5, 40.0).qpos
     assert not np.array_equal(late, plain, equal_nan=True)
 
 
 def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
-    late = PoorSenses(ReadsLegs(hexmj.LDVS), delay=0.04)
+    late = PoorSenses(SensoryFeedback(hexmj.LDVS), delay=0.04)
     with pytest.raises(InputError, match=r"delay = 0.04 with steps of 0.1 time units; expected at least one step"):
         late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
     assert walking("late", Entrant(hexmj.LDVS), Conditions(vp=2.0), 0.3, Stride()) is None

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Problem, ReadsLegs, Stride
+from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Problem, SensoryFeedback, Stride
 from hexmj.controllers import Step, stepwise
-from hexmj.controllers.cruse1998 import Reading
+from hexmj.controllers.cruse1998 import ModelVariant
 from hexmj.legs import CENTRED
 from hexmj.search.samples import Sample
 from hexmj.studies.variants.figure import STYLES, variants_figure
@@ -56,7 +56,7 @@ def test_a_figure_tells_of_the_stride_what_is_not_usual(result):
 def test_a_variant_changes_one_thing(variant):
     changed = [
         name
-        for usual, other in ((part, varied(part, variant)) for part in (Stride(), LDVS, Reading()))
+        for usual, other in ((part, varied(part, variant)) for part in (Stride(), LDVS, ModelVariant()))
         for name in ("aep0", "pep0", "pep_min", "dt", "geometry", "order", "ipsilateral", "contralateral", "cap")
         if getattr(usual, name, None) != getattr(other, name, None)
     ]
@@ -80,9 +80,9 @@ def test_what_an_heir_has_anyway_is_varied_to_what_the_network_has():
 
 def test_what_has_the_changed_value_already_gets_the_usual_one():
     lasting = hexmj.PRESETS["lasting-0.3"]
-    assert varied(lasting, "lasting").reading == Reading()
-    summed = Reading(cap="sum")
-    assert varied(replace(LDVS, reading=summed), "lasting").reading == replace(summed, ipsilateral="lasting")
+    assert varied(lasting, "lasting").model_variant == ModelVariant()
+    summed = ModelVariant(cap="sum")
+    assert varied(replace(LDVS, model_variant=summed), "lasting").model_variant == replace(summed, ipsilateral="lasting")
     assert varied(replace(LDVS, order="sequential"), "sequential").order == "printed"
     assert varied(Stride(pep_min=-15.0), "PEP_min -15") == Stride()
     assert varied(Stride(geometry=CENTRED), "centred") == Stride()
@@ -91,8 +91,8 @@ def test_what_has_the_changed_value_already_gets_the_usual_one():
 @pytest.mark.thorough
 def test_a_row_says_what_is_walked_where_a_set_has_the_variant_anyway():
     assert instead(LDVS, "lasting") == instead(Stride(), "dt 0.2") == {}
-    lasting, sums = hexmj.PRESETS["lasting"], replace(LDVS, reading=Reading(ipsilateral="lasting", cap="sum"))
-    assert instead(ReadsLegs(sums), "lasting") == {"ipsilateral": "standing"}
+    lasting, sums = hexmj.PRESETS["lasting"], replace(LDVS, model_variant=ModelVariant(ipsilateral="lasting", cap="sum"))
+    assert instead(SensoryFeedback(sums), "lasting") == {"ipsilateral": "standing"}
     few: dict[str, Any] = {"n_starts": 2, "observation_time": 3.0, "stride": Stride(dt=0.05, geometry=CENTRED)}
     walked = run_study(Variants({"ldvs": (LDVS, LDVS), "own": (LDVS, lasting)}, (0.3, 0.5), **few))
     told = {
@@ -115,7 +115,7 @@ def test_a_row_says_what_is_walked_where_a_set_has_the_variant_anyway():
 
 
 def test_a_controller_that_reads_the_legs_is_varied_within():
-    assert varied(ReadsLegs(LDVS), "undelayed") == ReadsLegs(replace(LDVS, order="undelayed"))
+    assert varied(SensoryFeedback(LDVS), "undelayed") == SensoryFeedback(replace(LDVS, order="undelayed"))
 
 
 def test_the_usual_variant_is_plain_flss(result):

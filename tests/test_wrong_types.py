@@ -204,7 +204,7 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: LDVS.weights.to_vector(np.array([9, 10])), "size = array([ 9, 10]); expected a whole number"),
     (lambda: general(hexmj.LDVS.weights).to_vector(10), "size = 10; expected 48 or 58"),  # pyright: ignore
     (lambda: hexmj.Weights.from_vector(["0"] * 58), "weights = ['0', '0', "),  # pyright: ignore
-    (lambda: hexmj.ReadsLegs("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
+    (lambda: hexmj.SensoryFeedback("ldvs"), "controller = 'ldvs'; expected a controller"),  # pyright: ignore
     (lambda: hexmj.Conditions(time=3), "time = 3; expected a TimeScale"),  # pyright: ignore
     (lambda: hexmj.Conditions(body="insect"), "body = 'insect'; expected a Body"),  # pyright: ignore
     (lambda: hexmj.Conditions(vp="80"), "vp = '80'; expected a number"),

@@ -82,7 +82,7 @@ class Controlled:
     order: str | None = None
     """Order of updates of the 1998 network: 'printed' (Eq. 6 to the letter), 'undelayed' or 'sequential'; that of the
     set unless given."""
-    reading: str | None = None
+    model_variant: str | None = None
     """Reading of the 1998 paper: 'printed', or 'lasting', in which an anterior leg acts by mechanism 3 while it
     protracts, too; that of the set unless given."""
     feedback: bool = False
@@ -96,7 +96,7 @@ class Controlled:
             InputError: no such controller, or one that has no order of updates or reading, or not this one.
         """
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.reads_legs import ReadsLegs
+        from hexmj.controllers.feedback import SensoryFeedback
 
         found = loaded(name)
         for rule, value in self.rules.items():
@@ -105,26 +105,28 @@ class Controlled:
                     f"--{rule} = {getattr(self, rule)} with {name}; expected it with the 1998 network only"
                 )
             found = replace(found, **{rule: value})
-        return ReadsLegs(found) if self.feedback else found
+        return SensoryFeedback(found) if self.feedback else found
 
     @property
     def rules(self) -> dict[str, Any]:
         """What was given of the 1998 network's order of updates and reading."""
-        from hexmj.controllers.cruse1998.readings import named_reading
+        from hexmj.controllers.cruse1998.model_variants import named_variant
 
-        given = {"order": self.order, "reading": self.reading and named_reading(self.reading)}
+        given = {"order": self.order, "model_variant": self.model_variant and named_variant(self.model_variant)}
         return {name: value for name, value in given.items() if value is not None}
 
     def brought(self, name: str) -> str:
         """Order of updates and reading that a set brings along, where it does not walk as printed; else nothing."""
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.cruse1998.readings import Reading, in_words
+        from hexmj.controllers.cruse1998.model_variants import ModelVariant, in_words
 
         found = loaded(name)
         if not isinstance(found, Cruse1998):
             return ""
-        reading = in_words(found.reading) if isinstance(found.reading, Reading) else str(found.reading)  # an heir's
-        rules = {"order": found.order, "reading": reading}
+        model_variant = (
+            in_words(found.model_variant) if isinstance(found.model_variant, ModelVariant) else str(found.model_variant)
+        )  # an heir's
+        rules = {"order": found.order, "model_variant": model_variant}
         return ", ".join(
             f"{rule} {told}" for rule, told in rules.items() if told != "printed" and rule not in self.rules
         )
@@ -180,5 +182,5 @@ def hiding(usual: Options, names: Collection[str], about: str = "") -> Options:
 STEADY = hiding(Accelerating(), ["acceleration", "initial_velocity"])
 """Of commands whose walks do not accelerate."""
 
-AS_THEY_ARE = hiding(Controlled(), ["order", "reading", "feedback"])
+AS_THEY_ARE = hiding(Controlled(), ["order", "model_variant", "feedback"])
 """Of commands in which all controllers walk as they are."""

@@ -40,7 +40,7 @@ class Readings:
 
     def run(self) -> None:
         """Score, rank, draw, and print the best."""
-        from hexmj.controllers.cruse1998.readings import named_reading
+        from hexmj.controllers.cruse1998.model_variants import named_variant
         from hexmj.paper.readings import combinations, compare_readings, ranking
         from hexmj.paper.readings_figure import readings_figure
         from hexmj.paper.readings_page import HEADS, readings_markdown, readings_rows
@@ -54,20 +54,20 @@ class Readings:
         if self.seed == IDEAL.seed:
             raise InputError(f"--seed = {self.seed}; expected another, since ideal sets are searched on its starts")
         protocol = replace(SCORING, sample=self.starts, gait_starts=self.gait_starts, seed=self.seed)
-        readings = list(combinations(protocol))
+        model_variants = list(combinations(protocol))
         if self.only:
             distinct("--only", self.only)
-            named = [named_reading(name) for name in dict.fromkeys(("printed", *self.only))]
-            readings = [replace(protocol, reading=one) for one in named]
-        best = min(12, len(readings)) if self.best is None else self.best
-        if not 1 <= best <= len(readings):
-            raise InputError(f"--best = {best}; expected 1 to {len(readings)}, as many readings as are tried")
+            named = [named_variant(name) for name in dict.fromkeys(("printed", *self.only))]
+            model_variants = [replace(protocol, model_variant=one) for one in named]
+        best = min(12, len(model_variants)) if self.best is None else self.best
+        if not 1 <= best <= len(model_variants):
+            raise InputError(f"--best = {best}; expected 1 to {len(model_variants)}, as many readings as are tried")
         out = results_folder(self.out)
-        with self.sweepers.at_work("reading") as how:
-            scores = compare_readings(readings, best, out / "scores", **how)
+        with self.sweepers.at_work("model_variant") as how:
+            scores = compare_readings(model_variants, best, out / "scores", **how)
         scores.attrs |= attributes({"only": self.only or ()})
         files = [
-            write_text(out / "readings.md", readings_markdown(scores, readings)),
+            write_text(out / "readings.md", readings_markdown(scores, model_variants)),
             save(scores, out / "readings.nc"),
             save_figure(readings_figure, scores, out / "readings.png"),
         ]
@@ -75,7 +75,7 @@ class Readings:
         files.append(save_manifest(sys.argv[1:], settings, files, out / MANIFEST))
         rows = readings_rows(scores, ranking(scores).tolist()[:best])
         if self.json:
-            told = {"readings": [dict(zip(HEADS, row, strict=True)) for row in rows]}
+            told = {"model_variants": [dict(zip(HEADS, row, strict=True)) for row in rows]}
             print_json(lists_of(scores) | told | {"files": files})
             return
         show("Readings of the 1998 paper", table(HEADS, rows), *map(str, files))

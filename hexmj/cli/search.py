@@ -162,19 +162,19 @@ class Search(WalkingCommand):
     def _as_begun(self) -> Controlled:
         """Planning with the order of updates and the reading of the set that the search begins with, unless given."""
         from hexmj.controllers.cruse1998 import Cruse1998
-        from hexmj.controllers.cruse1998.readings import READINGS, reading_name
+        from hexmj.controllers.cruse1998.model_variants import MODEL_VARIANTS, variant_name
         from hexmj.search.network_forms import FORMS
 
         begun = loaded(self.begin) if self.begin and self.form in FORMS else None
         if type(begun) is not Cruse1998:
             return self.controlled
         taken: dict[str, Any] = {} if self.controlled.order else {"order": begun.order}
-        if not self.controlled.reading:
+        if not self.controlled.model_variant:
             try:
-                taken["reading"] = reading_name(begun.reading)
+                taken["model_variant"] = variant_name(begun.model_variant)
             except InputError:
                 told = f"--begin = {self.begin}: its reading has no name"
-                raise InputError(f"{told}; expected --reading beside it, one of {', '.join(READINGS)}") from None
+                raise InputError(f"{told}; expected --reading beside it, one of {', '.join(MODEL_VARIANTS)}") from None
         return replace(self.controlled, **{rule: name for rule, name in taken.items() if name != "printed"})
 
     def _form(self) -> "Form":

@@ -14,7 +14,7 @@ from hexmj.cli.loaded import seeds_of_searches
 from hexmj.cli.options import Accelerating, Controlled, Walks
 from hexmj.cli.registry import changed
 from hexmj.conditions import Conditions, unusual
-from hexmj.controllers.protocol import Controller, ReadingPlan
+from hexmj.controllers.protocol import Controller, FeedbackPlan
 from hexmj.errors import InputError
 from hexmj.legs import GEOMETRIES
 from hexmj.timing import Stride, observation_duration
@@ -147,7 +147,7 @@ class WalkingCommand:
             starts, acceleration = draw_starts(1, self.walks.seed, stride), self.accelerating.procedure
             v = checked_list(np.unique(numbers("velocities", self.commanded)).tolist())[:1]
             plans = (begin(one, starts, v, stride, acceleration, threads=1) for one in controllers)
-            if not any(isinstance(plan, ReadingPlan) for plan in plans):
+            if not any(isinstance(plan, FeedbackPlan) for plan in plans):
                 raise InputError(
                     f"--contact-gap = {gap:g} with falls only; expected it where a polygon is measured (compare, map,"
                     " converge, walk --physical) or the controller reads the legs"

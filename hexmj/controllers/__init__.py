@@ -4,7 +4,7 @@ A controller of your own is a frozen dataclass with a `name` and a method `begin
 function of one step.
 """
 
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed
 from hexmj.controllers.stepwise import Step, stepwise
 
-__all__ = ["Controller", "Plan", "ReadingPlan", "Sensed", "Step", "stepwise"]
+__all__ = ["Controller", "FeedbackPlan", "Plan", "Sensed", "Step", "stepwise"]

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from hexmj.checks import typed, whole
 from hexmj.controllers.protocol import (
     Controller,
+    FeedbackPlan,
     KnowsItsLimits,
     Plan,
-    ReadingPlan,
     Sensed,
     SteerableController,
     SteerablePlan,
@@ -219,7 +219,7 @@ def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:
     return ", ".join(names + [f"leg {LEGS[leg]}" for leg in at[2:]])
 
 
-def tell(plan: ReadingPlan, sensed: Sensed) -> None:
+def tell(plan: FeedbackPlan, sensed: Sensed) -> None:
     """Tell a plan what is known before its next step.
 
     Raises:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.checks import check_types, whole
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, check_controller_type, limits_within
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, check_controller_type, limits_within
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
@@ -53,7 +53,7 @@ class LegLost:
     ) -> "LamePlan":
         """See `protocol.Controller.begin`."""
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        kind = LameReadingPlan if isinstance(plan, ReadingPlan) else LamePlan
+        kind = LameReadingPlan if isinstance(plan, FeedbackPlan) else LamePlan
         return kind(plan, self.leg, self.held)
 
 
@@ -76,7 +76,7 @@ class LamePlan:
 
 
 class LameReadingPlan(LamePlan):
-    """The same of a `protocol.ReadingPlan`."""
+    """The same of a `protocol.FeedbackPlan`."""
 
     def sense(self, sensed: Sensed) -> None:
         """Hand on what the legs tell, the lost one included."""

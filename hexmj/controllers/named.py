@@ -99,9 +99,9 @@ def _object(name: str) -> bool:
 
 def _rivals() -> dict[str, Controller]:
     """By their names; imported once one is asked for."""
-    from hexmj.controllers.rivals.table import RIVALS
+    from hexmj.controllers.baselines.table import BASELINES
 
-    return RIVALS
+    return BASELINES
 
 
 def _varied(name: str, how: str, which: int) -> Controller:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexmj.checks import check_types
-from hexmj.controllers.protocol import Controller, ReadingPlan, Sensed, check_controller_type, limits_within
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Sensed, check_controller_type, limits_within
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk
@@ -61,15 +61,15 @@ class PoorSenses:
                 f"delay = {self.delay:g} with steps of {stride.dt:g} time units; expected at least one step"
             )
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        if not isinstance(plan, ReadingPlan):
+        if not isinstance(plan, FeedbackPlan):
             raise InputError(f"poor senses of {self.controller.name}; expected a controller whose plans read the legs")
         return PoorlyToldPlan(plan, self.noise * (stride.aep0 - stride.pep0), late)
 
 
 class PoorlyToldPlan:
-    """A `protocol.ReadingPlan` that is told inexactly or late; the error of a start depends on nothing but it."""
+    """A `protocol.FeedbackPlan` that is told inexactly or late; the error of a start depends on nothing but it."""
 
-    def __init__(self, plan: ReadingPlan, error: float, late: int) -> None:
+    def __init__(self, plan: FeedbackPlan, error: float, late: int) -> None:
         """Around a plan at time 0; `error` [mm], `late` in steps."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self._error, self.made_for = plan, error, getattr(plan, "made_for", None)

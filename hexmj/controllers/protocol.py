@@ -76,7 +76,7 @@ class Sensed:
 
 
 @runtime_checkable
-class ReadingPlan(Plan, Protocol):
+class FeedbackPlan(Plan, Protocol):
     """A plan that reads the legs.  On paper nobody tells it anything, and it takes everything to be as ordered."""
 
     def sense(self, sensed: Sensed) -> None:

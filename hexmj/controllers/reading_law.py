@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.controllers.checked_plans import advanced, tell
-from hexmj.controllers.protocol import ReadingPlan, Sensed
+from hexmj.controllers.protocol import FeedbackPlan, Sensed
 from hexmj.controllers.trial import Trial, every_other, mixed, same
 from hexmj.errors import InputError
 from hexmj.timing import Stride
@@ -27,7 +27,7 @@ def told(trial: Trial) -> None:
     Raises:
         InputError: they do not, or the plan changes what it is told.
     """
-    if isinstance(plan := trial.begin(), ReadingPlan):
+    if isinstance(plan := trial.begin(), FeedbackPlan):
         which, last = every_other(trial), len(trial.starts) - 2
         felt = np.random.default_rng(0).uniform(-1.0, 1.0, (TOLD, len(which), NUMBERS))
         felt[:, ~which] = felt[TOLD // 2 :, ::4] = np.nan

@@ -2,11 +2,11 @@
 
 from typing import Any
 
+from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, Evolved
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998
 from hexmj.controllers.cruse1998.presets import own_tables
 from hexmj.controllers.named import parameter_file
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.rivals.evolved import EVOLVED, FOUND, Evolved
 from hexmj.controllers.varied_names import PART
 from hexmj.files import SEARCHED, read_toml
 from hexmj.plain import plain

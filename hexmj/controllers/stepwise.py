@@ -74,7 +74,7 @@ class StepwisePlan:
 
 @dataclass(eq=False)
 class ReadingStepwisePlan(StepwisePlan):
-    """A `protocol.ReadingPlan` that hands on what it is told."""
+    """A `protocol.FeedbackPlan` that hands on what it is told."""
 
     sense: Callable[[Sensed], None] = field(kw_only=True)
     """Takes in what is known before the next step is planned."""

@@ -17,7 +17,7 @@ from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import NO_ARRAY, numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, limits_within
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, limits_within
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import check_made_for
@@ -130,7 +130,7 @@ class WithOffsets:
 
 
 class OffsetPlan:
-    """A `protocol.ReadingPlan`: another plan's tips with a policy's offsets, and the heights that a body gives them."""
+    """A `protocol.FeedbackPlan`: another plan's tips with a policy's offsets, and the heights that a body gives them."""
 
     def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
         """Around a plan at time 0."""
@@ -143,7 +143,7 @@ class OffsetPlan:
 
     def sense(self, sensed: Sensed) -> None:
         """Take in what the policy sees, and what the plan reads if it reads the legs."""
-        if isinstance(self._plan, ReadingPlan):
+        if isinstance(self._plan, FeedbackPlan):
             self._plan.sense(sensed)
         self._told[sensed.ids] = True
         planned = self._stance[sensed.ids], self._tips[sensed.ids]

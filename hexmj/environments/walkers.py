@@ -14,7 +14,7 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.grounds import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.checked_plans import advanced, begin, tell
-from hexmj.controllers.protocol import Plan, ReadingPlan
+from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
 from hexmj.environments.observing import Observer, Places, Planned
 from hexmj.environments.single_body import Alone
@@ -61,7 +61,7 @@ class Together:
     """Of all that began."""
     targets: TipTargets
     """Of all that began."""
-    reading: ReadingPlan | None
+    model_variant: FeedbackPlan | None
     """The same plan if it reads the legs."""
     ahead: int = 0
     """Steps that are planned and not yet walked."""
@@ -112,7 +112,7 @@ class Walkers:
         check_made_for(plan, task.conditions)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)
-        group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, ReadingPlan) else None)
+        group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, FeedbackPlan) else None)
         self._together.append(group)
         self._of |= dict.fromkeys(ids.tolist(), group)
         self.bodies.stand(ids, settled.state, settled.ctrl)
@@ -223,9 +223,9 @@ class Walkers:
 
     def _plan(self, group: Together) -> None:
         ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
-        if group.reading:
+        if group.model_variant:
             here = self.places.qpos[ids], self.places.qvel[ids]
-            tell(group.reading, replace(self._senses.sensed(ids, *here), ids=rows.copy()))
+            tell(group.model_variant, replace(self._senses.sensed(ids, *here), ids=rows.copy()))
             steps = 1
         walk = advanced(group.plan, steps)
         tips = group.targets.follow(walk, rows)

@@ -146,12 +146,12 @@ def rules(controller: Any) -> str:
         return ""
     if "controller" in controller:
         return rules(controller["controller"])
-    from hexmj.controllers.cruse1998.readings import Reading, in_words
+    from hexmj.controllers.cruse1998.model_variants import ModelVariant, in_words
 
-    choices, reading = {one.name for one in fields(Reading)}, controller.get("reading")
-    if "order" not in controller or not isinstance(reading, Mapping) or not choices <= reading.keys():
+    choices, model_variant = {one.name for one in fields(ModelVariant)}, controller.get("model_variant")
+    if "order" not in controller or not isinstance(model_variant, Mapping) or not choices <= model_variant.keys():
         return ""  # such as Walknet, which is read in another way
     found = [f"{controller['order']} order"] if controller["order"] != "printed" else []
-    chosen = Reading(**{name: reading[name] for name in choices})
-    found += [f"reading {in_words(chosen)}"] if chosen != Reading() else []
+    chosen = ModelVariant(**{name: model_variant[name] for name in choices})
+    found += [f"reading {in_words(chosen)}"] if chosen != ModelVariant() else []
     return ", ".join(found)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import given, typed
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.checked_plans import begin, check_repeats, check_same
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.measures.walk_settings import WalkSettings
@@ -175,7 +175,7 @@ def physical_walk_of_plan(
     told: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
         so_far.add(chunk)
-        if isinstance(plan, ReadingPlan):
+        if isinstance(plan, FeedbackPlan):
             told.append(chunk.plan)
         else:
             first = chunk.first // settled.substeps

@@ -19,7 +19,7 @@ A row is calibrated if a constant that the paper leaves out was inferred from th
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from hexmj.controllers.cruse1998 import Reading
+from hexmj.controllers.cruse1998 import ModelVariant
 from hexmj.paper.protocol import RANGES
 from hexmj.paper.quantities import Lost, Named, Phase, Regime, Scatter, Weight
 from hexmj.paper.rules import Band, Rule, Seen, Trend
@@ -61,12 +61,12 @@ class Claim:
         """Constants that were inferred from its number; none if it is held out."""
         return tuple(constant for constant, keys in INFERRED_FROM.items() if self.key in keys)
 
-    def under(self, reading: Reading) -> "Claim":
+    def under(self, model_variant: ModelVariant) -> "Claim":
         """The same claim of sets that were searched under another reading."""
         rule = self.rule
         if not isinstance(rule.quantity, Weight):
             return self
-        return replace(self, rule=replace(rule, quantity=replace(rule.quantity, reading=reading)))
+        return replace(self, rule=replace(rule, quantity=replace(rule.quantity, model_variant=model_variant)))
 
     @property
     def command(self) -> str:

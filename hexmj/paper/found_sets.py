@@ -5,14 +5,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexmj.controllers.cruse1998 import READINGS, Cruse1998, Reading, Symmetric
-from hexmj.controllers.cruse1998.readings import named_reading
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998, ModelVariant, Symmetric
+from hexmj.controllers.cruse1998.model_variants import named_variant
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.timing import OBSERVATION_TIMES
 
 TABLE = Path(__file__).with_name("ideal.toml")
-PRINTED = READINGS["printed"]
+PRINTED = MODEL_VARIANTS["printed"]
 
 SEARCH_SEEDS = 0, 1
 """Seeds of the starts on which they were searched."""
@@ -33,9 +33,9 @@ class FoundSet:
     """Finds it again, with its seed."""
 
     @property
-    def place(self) -> tuple[str, float, float, Reading]:
+    def place(self) -> tuple[str, float, float, ModelVariant]:
         """What it was searched for; no two sets of a table have the same."""
-        return self.observation_time, self.low, self.high, self.controller.reading
+        return self.observation_time, self.low, self.high, self.controller.model_variant
 
 
 @cache
@@ -56,15 +56,15 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
 
 
 def found_set(
-    observation_time: str, low: float, high: float | None = None, reading: Reading = PRINTED
+    observation_time: str, low: float, high: float | None = None, model_variant: ModelVariant = PRINTED
 ) -> Cruse1998 | None:
     """The set for one velocity (Problem 1) or a range (Problem 2); None where no search has been made yet."""
-    place = observation_time, low, low if high is None else high, reading
+    place = observation_time, low, low if high is None else high, model_variant
     return next((one.controller for one in found_sets() if one.place == place), None)
 
 
 def _read(entry: dict[str, Any], where: str) -> FoundSet:
-    if unknown := set(entry) - {"reading"} ^ {"observation_time", "velocities", "command", "symmetric"}:
+    if unknown := set(entry) - {"model_variant"} ^ {"observation_time", "velocities", "command", "symmetric"}:
         raise InputError(f"{where}: {min(unknown)} is missing or unknown; see the head of the file")
     if entry["observation_time"] not in OBSERVATION_TIMES:
         raise InputError(
@@ -80,5 +80,5 @@ def _read(entry: dict[str, Any], where: str) -> FoundSet:
         raise InputError(f"{where}: {min(unknown)} is no parameter of the {form} form; valid: {valid}")
     weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
     name = f"ideal for {entry['observation_time']}, V = {' to '.join(map(str, velocities))}"
-    controller = Cruse1998(weights, name=name, reading=named_reading(entry.get("reading", "printed")))
+    controller = Cruse1998(weights, name=name, model_variant=named_variant(entry.get("model_variant", "printed")))
     return FoundSet(entry["observation_time"], velocities[0], velocities[-1], controller, entry["command"])

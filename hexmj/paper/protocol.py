@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hexmj.checks import check_types, whole
-from hexmj.controllers.cruse1998 import PRESETS, READINGS, Cruse1998, Order, Reading
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order
 from hexmj.errors import InputError
 from hexmj.paper.found_sets import found_set
 from hexmj.paper.measurements import Looks, footfalls, limit_regimes, losses
@@ -16,7 +16,7 @@ from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 
-OWN = {reading: name for name, reading in READINGS.items() if name != "printed"}
+OWN = {model_variant: name for name, model_variant in MODEL_VARIANTS.items() if name != "printed"}
 """Readings under which sets of our own were searched -> what their names begin with, instead of 'own'."""
 
 RANGES = {"wide": (0.1, 0.7), "hws again": (0.1, 0.45), "ldvs again": (0.1, 0.5)}
@@ -54,7 +54,7 @@ class Protocol:
     """Eq. 11, for the accelerated walks and all gaits."""
     order: Order = "printed"
     """Order of updates of all networks."""
-    reading: Reading = field(default_factory=Reading)
+    model_variant: ModelVariant = field(default_factory=ModelVariant)
     """Reading of all networks."""
     looks: Looks = "steps"
     """When it is looked whether a walk is stable (Eq. 7)."""
@@ -82,14 +82,16 @@ class Protocol:
             None where no such set is known.
         """
         if name == "ideal":
-            found = found_set(observation_time, velocity, reading=self.reading)
+            found = found_set(observation_time, velocity, model_variant=self.model_variant)
         elif name == "own":
-            found = PRESETS.get(f"{OWN.get(self.reading, 'own')}-{velocity:g}")
+            found = PRESETS.get(f"{OWN.get(self.model_variant, 'own')}-{velocity:g}")
         else:
             found = (
-                found_set(observation_time, *RANGES[name], reading=self.reading) if name in RANGES else PRESETS[name]
+                found_set(observation_time, *RANGES[name], model_variant=self.model_variant)
+                if name in RANGES
+                else PRESETS[name]
             )
-        return found and replace(found, order=self.order, reading=self.reading)
+        return found and replace(found, order=self.order, model_variant=self.model_variant)
 
 
 FULL = Protocol()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hexmj.controllers.cruse1998 import Reading
+from hexmj.controllers.cruse1998 import ModelVariant
 from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, circular_range, classify, unrolled, wilson_phase
@@ -195,7 +195,7 @@ class Weight:
 
     parameter: str
     over: str | None = None
-    reading: Reading = PRINTED
+    model_variant: ModelVariant = PRINTED
     """Under which the sets were searched."""
     windowed = True
     needs: tuple[str, ...] = ()
@@ -211,7 +211,7 @@ class Weight:
             if (
                 one.observation_time == observation_time
                 and one.low == one.high
-                and one.controller.reading == self.reading
+                and one.controller.model_variant == self.model_variant
             ):
                 value = getattr(one.controller.weights, self.parameter)
                 if self.over:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Unpack, get_args, get_type_hints
 
 import numpy as np
 
-from hexmj.controllers.cruse1998 import Order, Reading
+from hexmj.controllers.cruse1998 import ModelVariant, Order
 from hexmj.io import attributes
 from hexmj.legs import CENTRED, FIG1
 from hexmj.paper.claims import INFERRED_FROM
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "order": get_args(Order),
-    **{name: get_args(hint) for name, hint in get_type_hints(Reading).items() if name != "neutral"},
+    **{name: get_args(hint) for name, hint in get_type_hints(ModelVariant).items() if name != "neutral"},
 }
 """Choices that every walk depends on, the printed one first; all are combined."""
 
@@ -55,14 +55,14 @@ def combinations(protocol: Protocol) -> Iterator[Protocol]:
 
 def read(protocol: Protocol, choices: dict[str, Any]) -> Protocol:
     """A protocol with some of its choices, of `CHOICES` and `ASIDE`, made otherwise."""
-    of_reading = {name: one for name, one in choices.items() if hasattr(protocol.reading, name)}
+    of_reading = {name: one for name, one in choices.items() if hasattr(protocol.model_variant, name)}
     of_protocol = {name: one for name, one in choices.items() if name not in of_reading}
-    return replace(protocol, **of_protocol, reading=replace(protocol.reading, **of_reading))
+    return replace(protocol, **of_protocol, model_variant=replace(protocol.model_variant, **of_reading))
 
 
 def chosen(protocol: Protocol, name: str) -> Any:
     """A choice of a protocol."""
-    return getattr(protocol.reading if hasattr(protocol.reading, name) else protocol, name)
+    return getattr(protocol.model_variant if hasattr(protocol.model_variant, name) else protocol, name)
 
 
 def title(protocol: Protocol) -> str:
@@ -78,7 +78,7 @@ def choice_in(title: str, name: str) -> str:
 
 
 def compare_readings(
-    readings: Sequence[Protocol], best: int = 12, folder: Path | None = None, **how: Unpack[Execution]
+    model_variants: Sequence[Protocol], best: int = 12, folder: Path | None = None, **how: Unpack[Execution]
 ) -> "xr.Dataset":
     """Scores of all readings, and a closer look at the best.
 
@@ -95,35 +95,37 @@ def compare_readings(
     """
     import xarray as xr
 
-    first, then = REFINED * len(readings), best * (math.prod(map(len, ASIDE.values())) - 1 + WITH_IDEALS)
-    with shown(how.get("progress"), "reading") as told:
-        cells = [Cell(title(one), score, {"protocol": one}) for one in readings]
+    first, then = REFINED * len(model_variants), best * (math.prod(map(len, ASIDE.values())) - 1 + WITH_IDEALS)
+    with shown(how.get("progress"), "model_variant") as told:
+        cells = [Cell(title(one), score, {"protocol": one}) for one in model_variants]
         scored = run_cells(cells, folder, **how | {"progress": part_of(told, first / (first + then))})
-        scores = xr.concat(scored, xr.Variable("reading", [title(one) for one in readings]))
+        scores = xr.concat(scored, xr.Variable("model_variant", [title(one) for one in model_variants]))
         order = ranking(scores)[:best]
-        closest = [refined_as(readings[i], scores.isel(reading=i)) for i in order]
+        closest = [refined_as(model_variants[i], scores.isel(model_variant=i)) for i in order]
         closer = look_closer(closest, folder, **how | {"progress": part_of(told, then / (first + then))})
-    one = readings[0]
+    one = model_variants[0]
     settings = {
-        "study": "readings",
+        "study": "model_variants",
         "starts": one.samples * one.sample,
         "gait_starts": one.gait_starts,
         "seed": one.seed,
         "stride": asdict(one.stride),
         "best": best,
     }
-    names = scores.reading.values[order]
+    names = scores.model_variant.values[order]
     return scores.assign(closer).assign_coords(best=names).assign_attrs(attributes(settings))
 
 
-def look_closer(readings: Sequence[Protocol], folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
+def look_closer(
+    model_variants: Sequence[Protocol], folder: Path | None = None, **how: Unpack[Execution]
+) -> "xr.Dataset":
     """Readings with the choices aside, and with ideal sets searched under each; see `compare_readings`."""
     import xarray as xr
 
     asides = [dict(zip(ASIDE, one, strict=True)) for one in product(*ASIDE.values())][1:]
-    looked = [read(one, aside) for one in readings for aside in asides]
+    looked = [read(one, aside) for one in model_variants for aside in asides]
     cells = [Cell(title(one), score_as_is, {"protocol": one}) for one in looked]
-    cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, WITH_IDEALS) for one in readings]
+    cells += [Cell(f"ideal {title(one)}", score_of_ideals, {"protocol": one}, WITH_IDEALS) for one in model_variants]
     found = run_cells(cells, folder, **how)
     judged, searched = found[: len(looked)], found[len(looked) :]
     rows = [xr.concat(judged[i : i + len(asides)], "aside").agrees for i in range(0, len(judged), len(asides))]
@@ -156,7 +158,7 @@ def ranking(scores: "xr.Dataset") -> np.ndarray:
     return np.lexsort((miss, -count))
 
 
-def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray":
+def effects(scores: "xr.Dataset", model_variants: Sequence[Protocol]) -> "xr.DataArray":
     """What a choice alone changes: the mean over all others of held-out claims that agree, (choice, observation time).
 
     The constants are those inferred.
@@ -166,19 +168,19 @@ def effects(scores: "xr.Dataset", readings: Sequence[Protocol]) -> "xr.DataArray
     count = agreeing(scores).sel(constants="inferred")
     rows = {}
     for name, choices in CHOICES.items():
-        of = np.array([choices.index(chosen(one, name)) for one in readings])
+        of = np.array([choices.index(chosen(one, name)) for one in model_variants])
         for i in sorted(set(of.tolist())):
-            rows[f"{name} {choices[i]}"] = count.isel(reading=np.flatnonzero(of == i)).mean("reading")
+            rows[f"{name} {choices[i]}"] = count.isel(model_variant=np.flatnonzero(of == i)).mean("model_variant")
     values = np.stack([row.values for row in rows.values()])
     return xr.DataArray(
         values, {"choice": list(rows), "observation_time": count.observation_time}, ("choice", "observation_time")
     )
 
 
-def gained(scores: "xr.Dataset", reading: str, observation_time: str) -> tuple[list[str], list[str]]:
+def gained(scores: "xr.Dataset", model_variant: str, observation_time: str) -> tuple[list[str], list[str]]:
     """Held-out claims that agree under a reading but not as printed, and the reverse; constants as inferred."""
     kept = [key for key in scores.claim.values if key not in CALIBRATED]
     at = scores.agrees.sel(claim=kept, observation_time=observation_time, constants="inferred") == 1
-    one, printed = at.sel(reading=reading).values, at.sel(reading=AS_PRINTED).values
+    one, printed = at.sel(model_variant=model_variant).values, at.sel(model_variant=AS_PRINTED).values
     keys = np.array(kept)
     return keys[one & ~printed].tolist(), keys[printed & ~one].tolist()

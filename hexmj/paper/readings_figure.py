@@ -33,7 +33,7 @@ def readings_figure(scores: "xr.Dataset") -> "Picture":
     panels = figure.subplots(1, len(CHOICES), sharey=True, width_ratios=[len(one) for one in CHOICES.values()])
     count, shift = agreeing(scores).sel(constants="inferred"), dict(zip(OBSERVATION_TIMES, (-0.13, 0.13), strict=True))
     for axes, (name, choices) in zip(panels, CHOICES.items(), strict=True):
-        of = np.array([choices.index(choice_in(one, name)) for one in scores.reading.values.tolist()])
+        of = np.array([choices.index(choice_in(one, name)) for one in scores.model_variant.values.tolist()])
         for observation_time, (colour, marker, line) in OBSERVATION_TIMES.items():
             values = count.sel(observation_time=observation_time).values
             for i in sorted(set(of.tolist())):
@@ -63,6 +63,6 @@ def readings_figure(scores: "xr.Dataset") -> "Picture":
     figure.legend(handles=dots, frameon=False, fontsize=9, loc="outside lower center", ncols=2)
     head(
         figure,
-        f"{scores.sizes['reading']} readings of the 1998 paper; the printed choice stands first; constants as inferred",
+        f"{scores.sizes['model_variant']} readings of the 1998 paper; the printed choice stands first; constants as inferred",
     )
     return figure

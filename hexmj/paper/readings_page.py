@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
-from hexmj.controllers.cruse1998 import READINGS
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS
 from hexmj.io import markdown_table
 from hexmj.paper.protocol import Protocol
 from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, effects, gained, ranking, title
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HEADS = (
-    "reading",
+    "model_variant",
     *(f"held out, {observation_time}" for observation_time in OBSERVATION_TIMES),
     "calibrated",
     "missed by",
@@ -28,28 +28,29 @@ def readings_rows(scores: "xr.Dataset", places: Sequence[int]) -> list[tuple[str
     held, calibrated = agreeing(scores), agreeing(scores, held_out=False)
     rows = []
     for i in places:
-        one = scores.isel(reading=i)
+        one = scores.isel(model_variant=i)
         cells = [
-            _both(held.isel(reading=i).sel(observation_time=observation_time)) for observation_time in OBSERVATION_TIMES
+            _both(held.isel(model_variant=i).sel(observation_time=observation_time))
+            for observation_time in OBSERVATION_TIMES
         ]
-        of = _both(calibrated.isel(reading=i).max("observation_time"))
+        of = _both(calibrated.isel(model_variant=i).max("observation_time"))
         miss = " / ".join(f"{miss:.2f}" for miss in one.miss.sum("claim").min("observation_time").values)
-        rows.append((one.reading.item(), *cells, of, miss, _constants(one)))
+        rows.append((one.model_variant.item(), *cells, of, miss, _constants(one)))
     return rows
 
 
-def readings_markdown(scores: "xr.Dataset", readings: Sequence[Protocol]) -> str:
+def readings_markdown(scores: "xr.Dataset", model_variants: Sequence[Protocol]) -> str:
     """The page: best readings, what each choice alone changes, if all are combined, a closer look, every reading."""
     ranked = ranking(scores).tolist()
     change = "## What a choice alone changes: held-out claims that agree, mean over all others, constants as inferred"
-    all_combined = len(readings) == math.prod(map(len, CHOICES.values()))
+    all_combined = len(model_variants) == math.prod(map(len, CHOICES.values()))
     sections = {
         "# Readings of the 1998 paper": [
-            _judged_on(scores, readings[0]),
+            _judged_on(scores, model_variants[0]),
             *markdown_table(HEADS, readings_rows(scores, ranked[: scores.sizes["best"]])),
         ],
-        "## As printed, and the named readings": _named_ones(scores, readings),
-        **({change: _changes(scores, readings)} if all_combined else {}),
+        "## As printed, and the named readings": _named_ones(scores, model_variants),
+        **({change: _changes(scores, model_variants)} if all_combined else {}),
         "## A closer look at the best": [*_aside(scores), "", *_ideal_sets(scores)],
         "## Every reading": markdown_table(HEADS, readings_rows(scores, ranked)),
     }  # fmt: skip
@@ -66,18 +67,18 @@ def _judged_on(scores: "xr.Dataset", one: Protocol) -> str:
     )
 
 
-def _named_ones(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
+def _named_ones(scores: "xr.Dataset", model_variants: Sequence[Protocol]) -> list[str]:
     """All that have a name, and what each gains and loses against the printed one."""
-    places = _named(readings)
+    places = _named(model_variants)
     lines = [*markdown_table(HEADS, readings_rows(scores, places)), ""]
-    for name, observation_time in product([title(readings[i]) for i in places[1:]], OBSERVATION_TIMES):
+    for name, observation_time in product([title(model_variants[i]) for i in places[1:]], OBSERVATION_TIMES):
         more, less = (", ".join(keys) or "none" for keys in gained(scores, name, observation_time))
         lines.append(f"- {name}, observation time {observation_time}: gains {more}; loses {less}")
     return lines
 
 
-def _changes(scores: "xr.Dataset", readings: Sequence[Protocol]) -> list[str]:
-    changed = effects(scores, readings)
+def _changes(scores: "xr.Dataset", model_variants: Sequence[Protocol]) -> list[str]:
+    changed = effects(scores, model_variants)
     rows = [
         (
             choice,
@@ -96,14 +97,14 @@ def _aside(scores: "xr.Dataset") -> list[str]:
     looked = (scores.aside_agrees == 1).sel(claim=_held_out(scores)).sum("claim").max("observation_time")
     without = agreeing(scores).sel(constants="refined").max("observation_time")
     rows = [
-        (name, str(without.sel(reading=name).item()), *map(str, looked.sel(best=name).values.tolist()))
+        (name, str(without.sel(model_variant=name).item()), *map(str, looked.sel(best=name).values.tolist()))
         for name in scores.best.values
     ]
     told = (
         "Held-out claims that agree with the choices of which only acceleration or the measure knows: refined"
         " constants, in the better observation time."
     )
-    return [told, "", *markdown_table(("reading", "none of them", *scores.aside.values), rows)]
+    return [told, "", *markdown_table(("model_variant", "none of them", *scores.aside.values), rows)]
 
 
 def _ideal_sets(scores: "xr.Dataset") -> list[str]:
@@ -117,7 +118,7 @@ def _ideal_sets(scores: "xr.Dataset") -> list[str]:
         )
         for name in scores.best.values
     ]
-    heads = ("reading", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
+    heads = ("model_variant", "claims on ideal sets", *(f"V = {v:g}" for v in scores.ideal_velocity.values))
     told = "FLSS of ideal sets that a short search found under each, observation time walk, refined constants."
     return [told, "", *markdown_table(heads, rows)]
 
@@ -126,10 +127,15 @@ def _held_out(scores: "xr.Dataset") -> list[str]:
     return [key for key in scores.claim.values if key not in CALIBRATED]
 
 
-def _named(readings: Sequence[Protocol]) -> list[int]:
-    """Places of the readings that have a name, in the order of `READINGS`."""
-    places = [i for i, one in enumerate(readings) if one.order == CHOICES["order"][0]]
-    return [i for reading in READINGS.values() for i in places if readings[i].reading == reading]
+def _named(model_variants: Sequence[Protocol]) -> list[int]:
+    """Places of the readings that have a name, in the order of `MODEL_VARIANTS`."""
+    places = [i for i, one in enumerate(model_variants) if one.order == CHOICES["order"][0]]
+    return [
+        i
+        for model_variant in MODEL_VARIANTS.values()
+        for i in places
+        if model_variants[i].model_variant == model_variant
+    ]
 
 
 def _both(counts: "xr.DataArray") -> str:

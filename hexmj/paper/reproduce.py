@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from hexmj import io
-from hexmj.controllers.cruse1998.readings import named_reading
+from hexmj.controllers.cruse1998.model_variants import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.io import json_text, results_folder, save
@@ -59,18 +59,22 @@ def reproduce(
         distinct("readings beside", beside)
     if "printed" in beside:
         raise InputError("reading 'printed' beside itself; expected others, beside which it stands anyway")
-    readings = {name: named_reading(name) for name in beside}
+    model_variants = {name: named_variant(name) for name in beside}
     results_folder(out := Path(out))
     if not only:
         results_folder(out / "figures")
     claims = [claim for claim in CLAIMS if not only or claim.key in only]
     with shown(how.get("progress"), "reproducing") as progress:
-        part = how | {"progress": part_of(progress, 1 / (1 + len(readings)))}
+        part = how | {"progress": part_of(progress, 1 / (1 + len(model_variants)))}
         measured = _measurements(_needed(claims, figures=not only), protocol, out / KEPT, part)
         rows = [judge(claim, measured) for claim in claims]
-        for name, reading in readings.items():
-            other = _measurements(_needed(claims, figures=False), replace(protocol, reading=reading), out / KEPT, part)
-            rows = [replace(row, beside=row.beside | {name: judge(row.claim.under(reading), other)}) for row in rows]
+        for name, model_variant in model_variants.items():
+            other = _measurements(
+                _needed(claims, figures=False), replace(protocol, model_variant=model_variant), out / KEPT, part
+            )
+            rows = [
+                replace(row, beside=row.beside | {name: judge(row.claim.under(model_variant), other)}) for row in rows
+            ]
     texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
     files = [write_text(out / name, text) for name, text in zip(TABLES, texts, strict=True)]
     if not only:

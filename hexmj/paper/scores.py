@@ -157,7 +157,7 @@ def score_of_ideals(protocol: Protocol, threads: int | None = None) -> "xr.Datas
 
 
 def _ideal_losses(velocity: float, protocol: Protocol, threads: int | None) -> "xr.Dataset":
-    form = NetworkForm("hws", protocol.order, protocol.reading)
+    form = NetworkForm("hws", protocol.order, protocol.model_variant)
     problem = Problem(form, velocity, velocity, stride=protocol.stride)
     n_starts = protocol.samples * protocol.sample
     effort = replace(IDEAL, begin=PRESETS["hws"], starts=n_starts)

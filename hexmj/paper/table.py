@@ -70,24 +70,28 @@ class Row:
 
 def heads(rows: Sequence[Row]) -> tuple[str, ...]:
     """Of the columns of `Row.cells`."""
-    readings = ("ours", *(rows[0].beside if rows else ()))
-    answers = (f"{reading}, {observation_time}" for reading in readings for observation_time in OBSERVATION_TIMES)
+    model_variants = ("ours", *(rows[0].beside if rows else ()))
+    answers = (
+        f"{model_variant}, {observation_time}"
+        for model_variant in model_variants
+        for observation_time in OBSERVATION_TIMES
+    )
     return "section", "the paper", "its value", "kind", *answers, "fits", "why"
 
 
-def heads_beside(reading: str) -> tuple[str, ...]:
+def heads_beside(model_variant: str) -> tuple[str, ...]:
     """Of the columns of `cells_beside`."""
     return (
         "section",
         "the paper",
         "its value",
-        *(f"{reading}, {observation_time}" for observation_time in OBSERVATION_TIMES),
+        *(f"{model_variant}, {observation_time}" for observation_time in OBSERVATION_TIMES),
     )
 
 
-def cells_beside(rows: Sequence[Row], reading: str) -> list[tuple[str, ...]]:
+def cells_beside(rows: Sequence[Row], model_variant: str) -> list[tuple[str, ...]]:
     """What `heads_beside` names, of each claim: our answers under another reading alone."""
-    return [(one.claim.section, one.claim.words, one.claim.value, *one.beside[reading].ours) for one in rows]
+    return [(one.claim.section, one.claim.words, one.claim.value, *one.beside[model_variant].ours) for one in rows]
 
 
 def judge(claim: Claim, measured: Measured) -> Row:

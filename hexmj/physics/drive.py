@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from hexmj.controllers.checked_plans import tell
-from hexmj.controllers.protocol import Plan, ReadingPlan
+from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.orders import Orders, OrdersFromPlan
 from hexmj.physics.pushes import Push
@@ -54,7 +54,7 @@ def drive(
     insects, orders = Insects(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
     total = int(steps_within(duration, settled.stride)) * settled.substeps
     told, walking = 0.0, np.arange(len(settled.starts))
-    for chunk in _reading(insects, plan, orders) if isinstance(plan, ReadingPlan) else _by_itself(insects, orders):
+    for chunk in _reading(insects, plan, orders) if isinstance(plan, FeedbackPlan) else _by_itself(insects, orders):
         yield chunk
         if progress:
             done = 1.0 if chunk.fell.all() else min(1.0, (chunk.first + chunk.qpos.shape[1]) / total)
@@ -77,7 +77,7 @@ def _by_itself(insects: Insects, orders: OrdersFromPlan) -> Iterator[Chunk]:
             yield chunk
 
 
-def _reading(insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
+def _reading(insects: Insects, plan: FeedbackPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
     """The plan is told what the insects know before each of its steps."""
     ids = np.arange(len(insects.settled.starts))
     while len(ids) and (steps := orders.steps_ahead()):
@@ -87,7 +87,7 @@ def _reading(insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan) -> Ite
 
 
 def _step_by_step(
-    insects: Insects, plan: ReadingPlan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
+    insects: Insects, plan: FeedbackPlan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
 ) -> Iterator[Orders]:
     """Orders for one step after the other, each made from what the last one has brought about."""
     for _ in range(steps):

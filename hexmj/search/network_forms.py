@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.checks import check_types
 from hexmj.controllers.cruse1998 import Cruse1998, Order
-from hexmj.controllers.cruse1998.readings import Reading, in_words
+from hexmj.controllers.cruse1998.model_variants import ModelVariant, in_words
 from hexmj.controllers.cruse1998.weights import (
     BINARY,
     NEIGHBOURS,
@@ -94,8 +94,8 @@ class NetworkForm:
     """Which weights are free."""
     order: Order = "printed"
     """See `Cruse1998.order`."""
-    reading: Reading = field(default_factory=Reading)
-    """See `Cruse1998.reading`."""
+    model_variant: ModelVariant = field(default_factory=ModelVariant)
+    """See `Cruse1998.model_variant`."""
 
     __post_init__ = check_types
 
@@ -123,15 +123,15 @@ class NetworkForm:
     def controller(self, vector: np.ndarray) -> Cruse1998:
         """See `forms.Form.controller`."""
         weights = FORMS[self.name].weights(vector_of(vector, self.names, "parameters"))
-        return Cruse1998(weights, self.order, reading=self.reading)
+        return Cruse1998(weights, self.order, model_variant=self.model_variant)
 
     def vector(self, controller: Controller) -> np.ndarray:
         """See `forms.Form.vector`."""
         check_controller_type(controller)
         if type(controller) is not Cruse1998:
             raise InputError(f"{controller.name} is not made of weights alone; expected a set of the 1998 network")
-        rules = [(one.order, in_words(one.reading)) for one in (controller, self)]
-        for rule, own, wanted in zip(("order", "reading"), *rules, strict=True):
+        rules = [(one.order, in_words(one.model_variant)) for one in (controller, self)]
+        for rule, own, wanted in zip(("order", "model_variant"), *rules, strict=True):
             if own not in (wanted, "printed"):
                 told = f"{rule} = {own}; expected {wanted}, as of what is searched"
                 raise InputError(f"{controller.name} to begin with has {told}")

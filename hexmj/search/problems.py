@@ -7,8 +7,8 @@ import numpy as np
 
 from hexmj.checks import check_types, numbers, typed
 from hexmj.conditions import Conditions, check_ground
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.errors import InputError
 from hexmj.plain import plain
 from hexmj.search.domain import Domain
@@ -50,7 +50,7 @@ class Problem:
     conditions: Conditions | None = None
     """Of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
     feedback: bool = False
-    """Candidates read the legs, see `ReadsLegs`, in physical walks."""
+    """Candidates read the legs, see `SensoryFeedback`, in physical walks."""
     over: Over = "usual"
     """Constants and rules under which a candidate walks, each time from the same starts."""
     ties: Ties = "equal"
@@ -116,7 +116,7 @@ class Problem:
     def controller(self, vector: np.ndarray) -> Controller:
         """A candidate, from (parameter,)."""
         planning = self.form.controller(vector)
-        return ReadsLegs(planning) if self.feedback else planning
+        return SensoryFeedback(planning) if self.feedback else planning
 
     @property
     def minimised(self) -> str:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from hexmj.controllers.checked_plans import begin, begin_at_speed, said, tell
-from hexmj.controllers.protocol import Controller, Plan, ReadingPlan, Sensed, SteerablePlan, is_steerable
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk
 
 
 class Steered:
-    """A `protocol.ReadingPlan` of one start around whatever plan goes on at the moment, whose steps are counted on."""
+    """A `protocol.FeedbackPlan` of one start around whatever plan goes on at the moment, whose steps are counted on."""
 
     def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
         """Begin at `starts`, (1, leg) [mm]."""
@@ -21,7 +21,7 @@ class Steered:
     @property
     def reads(self) -> bool:
         """Whether the plan wants to be told of the legs before each step."""
-        return isinstance(self._plan, ReadingPlan)
+        return isinstance(self._plan, FeedbackPlan)
 
     @property
     def made_for(self) -> object:
@@ -30,7 +30,7 @@ class Steered:
 
     def sense(self, sensed: Sensed) -> None:
         """Hand on what is known."""
-        if isinstance(self._plan, ReadingPlan):
+        if isinstance(self._plan, FeedbackPlan):
             tell(self._plan, sensed)
 
     def advance(self, steps: int) -> PlannedWalk:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.checks import check_types, whole
 from hexmj.controllers.cruse1998 import kernel
-from hexmj.controllers.cruse1998.readings import Reading
+from hexmj.controllers.cruse1998.model_variants import ModelVariant
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
 from hexmj.controllers.losses import planned_losses
 from hexmj.errors import InputError
@@ -48,7 +48,7 @@ class Cruse1998:
     Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
     name: str = "cruse1998"
     """Of the set of weights."""
-    reading: Reading = field(default_factory=Reading)
+    model_variant: ModelVariant = field(default_factory=ModelVariant)
     """Of what the paper's sentences leave open."""
 
     __post_init__ = check_types
@@ -123,7 +123,7 @@ class Cruse1998:
     def _rules(self) -> Rules:
         """As the kernel reads them."""
         chosen: list[tuple[Any, str]] = [(Order, self.order)]
-        chosen += [(hint, getattr(self.reading, name)) for name, hint in get_type_hints(Reading).items()]
+        chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
         return tuple((0,) * get_args(names).index(one) for names, one in chosen)
 
     def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from hexmj.controllers.cruse1998.model_variants import named_variant, variant_name
 from hexmj.controllers.cruse1998.network import Cruse1998
-from hexmj.controllers.cruse1998.readings import named_reading, reading_name
 from hexmj.controllers.cruse1998.weights import (
     HWS_WEIGHTS,
     LDVS_WEIGHTS,
@@ -31,18 +31,18 @@ def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
 
     Args:
         table: either ``[symmetric]`` with fields of `Symmetric`, or ``[weights.p1]`` ... ``[weights.p4]`` with keys
-            ``"d,e"`` (the paper's leg numbers); ``order`` and ``reading`` before it, where they are not the printed.
+            ``"d,e"`` (the paper's leg numbers); ``order`` and ``model_variant`` before it, where they are not the printed.
         where: the file, for a sentence.
         name: of the set.
 
     Raises:
         InputError: a key, type or value that makes no sense.
     """
-    rules = {key: table[key] for key in ("order", "reading") if key in table}
+    rules = {key: table[key] for key in ("order", "model_variant") if key in table}
     weights = _weights({key: value for key, value in table.items() if key not in rules}, where)
     with _of(where):
-        reading = named_reading(rules.get("reading", "printed"))
-        return Cruse1998(weights, rules.get("order", "printed"), name, reading)
+        model_variant = named_variant(rules.get("model_variant", "printed"))
+        return Cruse1998(weights, rules.get("order", "printed"), name, model_variant)
 
 
 @contextmanager
@@ -81,7 +81,7 @@ def network_toml(network: Cruse1998) -> str:
     Raises:
         InputError: a reading without a name.
     """
-    rules, weights = {"order": network.order, "reading": reading_name(network.reading)}, network.weights
+    rules, weights = {"order": network.order, "model_variant": variant_name(network.model_variant)}, network.weights
     lines = [f'{key} = "{value}"' for key, value in rules.items() if value != "printed"]
     if isinstance(weights, Symmetric):
         lines += ["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(weights).items())]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexmj.controllers.checked_plans import begin_at_speed
-from hexmj.controllers.protocol import ReadingPlan, Sensed, SteerableController, SteerablePlan, check_steerable
+from hexmj.controllers.protocol import FeedbackPlan, Sensed, SteerableController, SteerablePlan, check_steerable
 from hexmj.errors import InputError
 from hexmj.studies.disturbance.disturbances import NEVER, Disturbance
 from hexmj.studies.disturbance.strategies import Postures, Rest, reorganise, stand
@@ -58,7 +58,7 @@ class Disturbed:
         if (count := len(self.disturbance.step)) != len(starts):
             raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
         plan = begin_at_speed(self.controller, starts, velocity, stride, acceleration, threads)
-        return DisturbedReadingPlan(self, plan) if isinstance(plan, ReadingPlan) else DisturbedPlan(self, plan)
+        return DisturbedReadingPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
 
 
 class DisturbedPlan:
@@ -162,7 +162,7 @@ class DisturbedPlan:
 
 
 class DisturbedReadingPlan(DisturbedPlan):
-    """The same of a `protocol.ReadingPlan`."""
+    """The same of a `protocol.FeedbackPlan`."""
 
     def sense(self, sensed: Sensed) -> None:
         """Hand on what the legs tell."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import REPEATED, advanced, begin, check_repeats
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController
-from hexmj.controllers.reads_legs import ReadsLegs
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.drive import Push
 from hexmj.physics.settling import settle
@@ -37,7 +37,7 @@ class StableWalks:
     """Walks at one velocity whose plan is stable until they are disturbed."""
 
     controller: Controller
-    """Plans the walks: a `SteerableController`, or `ReadsLegs` around one, in physics."""
+    """Plans the walks: a `SteerableController`, or `SensoryFeedback` around one, in physics."""
     velocity: float
     """V_r, 0 < V < 1."""
     n_starts: int
@@ -55,7 +55,7 @@ class StableWalks:
     @property
     def planner(self) -> SteerableController:
         """What plans on paper, where no legs are read."""
-        inner = self.controller.controller if isinstance(self.controller, ReadsLegs) else self.controller
+        inner = self.controller.controller if isinstance(self.controller, SensoryFeedback) else self.controller
         return inner  # pyright: ignore[reportReturnType]
 
     @cached_property
@@ -119,7 +119,7 @@ class StableWalks:
         if conditions:
             push = Push(np.full(len(time), case.impulse * conditions.body.mass * conditions.vp), time)
             settled = settle(starts, conditions, self.stride, threads)
-            walks = ReadsLegs(disturbed) if isinstance(self.controller, ReadsLegs) else disturbed
+            walks = SensoryFeedback(disturbed) if isinstance(self.controller, SensoryFeedback) else disturbed
             plan = begin(walks, starts, self.velocity, self.stride, recovery, threads=1)
             times["fall"] = outcomes_of_plan(settled, plan, end, lost, push=push, threads=threads).fall
         columns = {

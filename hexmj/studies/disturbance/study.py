@@ -35,7 +35,7 @@ units; `docs/laboratory.md` tells what was tried."""
 class DisturbedWalks(SameStarts):
     """The same starts in every case, an undisturbed one among them, at every velocity.
 
-    The controller is a `SteerableController`, or `ReadsLegs` around one; `observation_time` is that of `frequencies.OBSERVATION_TIMES`.
+    The controller is a `SteerableController`, or `SensoryFeedback` around one; `observation_time` is that of `frequencies.OBSERVATION_TIMES`.
     """
 
     velocities: Sequence[float] = (0.3, 0.5, 0.7)

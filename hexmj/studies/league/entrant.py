@@ -7,8 +7,8 @@ import numpy as np
 
 from hexmj.checks import check_types, numbers
 from hexmj.controllers.checked_plans import begin, said
-from hexmj.controllers.protocol import Controller, ReadingPlan, check_controller_type, is_steerable
-from hexmj.controllers.reads_legs import ReadsLegs
+from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.protocol import Controller, FeedbackPlan, check_controller_type, is_steerable
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import draw_starts
@@ -60,9 +60,9 @@ class Entrant:
     def reading(self, velocity: float, stride: Stride) -> Controller | None:
         """The same controller reading the legs, if it can: by itself, or because its plans, which are asked for at V_r
         and with the stride that it is to walk with, can be steered."""
-        if isinstance(begin(self.controller, draw_starts(1, 0, stride), velocity, stride), ReadingPlan):
+        if isinstance(begin(self.controller, draw_starts(1, 0, stride), velocity, stride), FeedbackPlan):
             return self.controller
-        return ReadsLegs(self.controller) if self.steerable else None
+        return SensoryFeedback(self.controller) if self.steerable else None
 
     @property
     def steerable(self) -> bool:

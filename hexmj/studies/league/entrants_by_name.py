@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping
 
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.controllers.named import load_controller
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.rivals.table import RIVALS
 from hexmj.studies.league.entrant import Entrant
 from hexmj.studies.short_names import short_names
 
@@ -14,7 +14,7 @@ IDEAL = "-ideal"
 NETWORK = ("uncoordinated", "hws", "ldvs", "own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
 """Sets of the 1998 network that take part."""
 
-EVERYONE = (*NETWORK, *RIVALS, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
+EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
 """The whole league."""
 
 FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")

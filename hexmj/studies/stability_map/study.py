@@ -9,7 +9,7 @@ import numpy as np
 from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin, check_velocities
-from hexmj.controllers.protocol import ReadingPlan
+from hexmj.controllers.protocol import FeedbackPlan
 from hexmj.errors import InputError
 from hexmj.measures.velocities import observed, velocity_axis
 from hexmj.starts import draw_starts
@@ -66,7 +66,7 @@ class StabilityMap(SameStarts):
         distinct("values", self.chosen)
         _ = self.varied, self.observed
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
-        if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), ReadingPlan):
+        if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), FeedbackPlan):
             raise InputError(
                 f"{self.controller.name} reads the legs; expected a controller that does not: mechanisms are told"
                 " from the plan alone"

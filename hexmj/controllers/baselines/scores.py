@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
 
 

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers
 from hexmj.timing import Stride
 
 BEHIND = np.array([2.0, 1.0, 0.0, 2.0, 1.0, 0.0])

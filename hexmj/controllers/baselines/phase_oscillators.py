@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, sum_of_legs
+from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, sum_of_legs
 
 NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""

@@ -8,7 +8,7 @@ from hexmj.errors import InputError
 
 
 @dataclass(frozen=True)
-class Reading:
+class ModelVariant:
     """How Section 2 is read, where its words and its equations allow more than one network.
 
     The order of updates, a lag between legs, is `Cruse1998.order`.
@@ -31,36 +31,36 @@ class Reading:
     __post_init__ = check_types
 
 
-READINGS = {"printed": Reading(), "lasting": Reading(ipsilateral="lasting")}
+MODEL_VARIANTS = {"printed": ModelVariant(), "lasting": ModelVariant(ipsilateral="lasting")}
 """Readings by name: to the letter, and with the anterior leg's influence lasting while that leg protracts."""
 
 
-def named_reading(name: str) -> Reading:
+def named_variant(name: str) -> ModelVariant:
     """A reading by its name.
 
     Raises:
         InputError: no such name.
     """
-    if not isinstance(name, str) or name not in READINGS:
-        raise InputError(f"reading = {name!r}; valid names: {', '.join(READINGS)}")
-    return READINGS[name]
+    if not isinstance(name, str) or name not in MODEL_VARIANTS:
+        raise InputError(f"reading = {name!r}; valid names: {', '.join(MODEL_VARIANTS)}")
+    return MODEL_VARIANTS[name]
 
 
-def reading_name(reading: Reading) -> str:
+def variant_name(model_variant: ModelVariant) -> str:
     """The name of a reading.
 
     Raises:
         InputError: it has none.
     """
-    for name, one in READINGS.items():
-        if one == reading:
+    for name, one in MODEL_VARIANTS.items():
+        if one == model_variant:
             return name
-    raise InputError(f"{reading} has no name; named ones: {', '.join(READINGS)}")
+    raise InputError(f"{model_variant} has no name; named ones: {', '.join(MODEL_VARIANTS)}")
 
 
-def in_words(reading: Reading) -> str:
+def in_words(model_variant: ModelVariant) -> str:
     """Its name, or where it has none its choices that are not as printed, such as 'cap sum, neutral final'."""
-    if reading in READINGS.values():
-        return reading_name(reading)
-    chosen = [(one.name, getattr(reading, one.name)) for one in fields(Reading)]
-    return ", ".join(f"{name} {choice}" for name, choice in chosen if choice != getattr(Reading, name))
+    if model_variant in MODEL_VARIANTS.values():
+        return variant_name(model_variant)
+    chosen = [(one.name, getattr(model_variant, one.name)) for one in fields(ModelVariant)]
+    return ", ".join(f"{name} {choice}" for name, choice in chosen if choice != getattr(ModelVariant, name))

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, sum_of_legs
+from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, sum_of_legs
 from hexmj.errors import Refused
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.checks import check_types, whole
-from hexmj.controllers.rivals.lifted import Legs, Lifted
+from hexmj.controllers.baselines.lifted import Legs, Lifted
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
 

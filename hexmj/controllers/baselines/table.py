@@ -1,15 +1,15 @@
 """All rivals by name."""
 
+from hexmj.controllers.baselines.evolved import EVOLVED
+from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
+from hexmj.controllers.baselines.righetti import Righetti
+from hexmj.controllers.baselines.scores import Scores
+from hexmj.controllers.baselines.tegotae import Tegotae
+from hexmj.controllers.baselines.walknet import REACOG, Walknet
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.rivals.evolved import EVOLVED
-from hexmj.controllers.rivals.metronomes import Metronome
-from hexmj.controllers.rivals.phase_oscillators import PhaseOscillators
-from hexmj.controllers.rivals.righetti import Righetti
-from hexmj.controllers.rivals.scores import Scores
-from hexmj.controllers.rivals.tegotae import Tegotae
-from hexmj.controllers.rivals.walknet import REACOG, Walknet
 
-RIVALS: dict[str, Controller] = {
+BASELINES: dict[str, Controller] = {
     one.name: one
     for one in (
         Metronome("wilson", "wilson"),

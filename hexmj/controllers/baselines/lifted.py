@@ -163,7 +163,7 @@ class LiftedPlan:
 
 
 class LoadedPlan(LiftedPlan):
-    """The same as a `protocol.ReadingPlan`, whose rule knows how the weight is spread; nothing else is read."""
+    """The same as a `protocol.FeedbackPlan`, whose rule knows how the weight is spread; nothing else is read."""
 
     _felt: np.ndarray | None = None
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.rivals.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, from_neighbour
 from hexmj.errors import InputError
 from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4

@@ -19,7 +19,7 @@ import numpy as np
 from hexmj.controllers.losses import first_losses
 from hexmj.controllers.protocol import (
     Controller,
-    ReadingPlan,
+    FeedbackPlan,
     Sensed,
     SteerablePlan,
     check_controller_type,
@@ -35,7 +35,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class ReadsLegs:
+class SensoryFeedback:
     """A controller whose plans read the legs, made of one whose plans can be steered."""
 
     controller: Controller
@@ -70,7 +70,7 @@ class ReadsLegs:
             InputError: plans that cannot be steered.
         """
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        if isinstance(plan, ReadingPlan):
+        if isinstance(plan, FeedbackPlan):
             raise InputError(
                 f"feedback around {self.controller.name}; expected another: this one reads the legs already"
             )
@@ -83,7 +83,7 @@ class ReadsLegs:
 
 
 class SensedPlan:
-    """A `protocol.ReadingPlan`: goes on from the tips and contacts that it senses, with targets that load the servos.
+    """A `protocol.FeedbackPlan`: goes on from the tips and contacts that it senses, with targets that load the servos.
 
     Whatever is not sensed is as ordered, so that without `sense` the plan goes on as if nobody walked by it.
     """
