@@ -7,6 +7,7 @@ import subprocess
 from argparse import ArgumentParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import servo_hexapod
 from imageio_ffmpeg import get_ffmpeg_exe

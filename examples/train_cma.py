@@ -79,7 +79,9 @@ def main() -> None:
     rows = [", ".join(f"{number:.3f}" for number in row) for row in search.mean.reshape(3, 5)]
     FOUND.write_text("weights = [\n" + "".join(f"    [{row}],\n" for row in rows) + "]\n", encoding="utf-8")
     print(f"{FOUND} after {time.monotonic() - began:.0f} s")
-    result = hexmj.compare({"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, observation_time="start", seed=77)
+    result = hexmj.compare(
+        {"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, observation_time="start", seed=77
+    )
     for name, falls in zip(("ldvs", "reflexes"), result.physical.values[:, 0], strict=True):
         print(f"{name}: physical FLSS of the start at V = {VELOCITY:g} is {falls:.2f} of 200 fresh starts")
 

@@ -16,7 +16,11 @@ import hexmj
 from hexmj.environments.learned import TILT, TURNING, WithOffsets
 
 FOUND = Path(__file__).with_name("righting.json")
-VELOCITY, WINDOW, STARTS = 0.6, 40.0, 200  # V_r, the observation time `start` [time units], and fresh starts to judge by
+VELOCITY, WINDOW, STARTS = (
+    0.6,
+    40.0,
+    200,
+)  # V_r, the observation time `start` [time units], and fresh starts to judge by
 STRIDE, HELD = hexmj.Stride(dt=0.2), 50  # time step while learning [time units], and steps that an action lasts
 INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # so many actions of each insect between two updates
 SPREAD = 0.2  # of the gains that are tried; it stays

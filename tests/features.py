@@ -39,7 +39,12 @@ sys.path.insert(0, "")  # the working directory has the modules of a user, but n
 REFERENCE = Path(__file__).with_suffix(".json")
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
-RENAMED: dict[str, str] = {}  # key, file name or text in the reference -> its new name
+RENAMED: dict[str, str] = {
+    "window": "observation_time",
+    "reading": "model_variant",
+    "readings": "model_variants",
+    "ReadsLegs": "SensoryFeedback",
+}  # key, file name or text in the reference -> its new name
 IGNORED = {"settings", "replayed"}  # keys and file names that are not compared; see `walk settings`
 TOLERANCE = {"rel_tol": 1e-4, "abs_tol": 1e-6}  # of floating-point numbers
 LONGEST = 12  # longer arrays of numbers are stored as a summary
@@ -181,7 +186,10 @@ def recordings() -> Any:
 
 def kinematic(*models: str) -> Any:
     """Kinematic FLSS of controllers that are loaded by name."""
-    return {name: hexmj.flss(hexmj.load_controller(name), [0.5], n_starts=60, window=60).flss.item() for name in models}
+    return {
+        name: hexmj.flss(hexmj.load_controller(name), [0.5], n_starts=60, observation_time=60).flss.item()
+        for name in models
+    }
 
 
 def wrappers() -> Any:
@@ -230,7 +238,7 @@ def measures() -> Any:
 
 def results() -> Any:
     """Compute, save, load, plot and show results."""
-    few: Any = {"velocities": [0.8], "n_starts": 6, "window": 40.0}
+    few: Any = {"velocities": [0.8], "n_starts": 6, "observation_time": 40.0}
     found = {"flss": hexmj.flss(hexmj.LDVS, **few), "compare": hexmj.compare(hexmj.LDVS, **few)}
     summaries: dict[str, Any] = {"starts": hexmj.settings(found["compare"])["starts"]}
     for name, result in found.items():
@@ -276,11 +284,11 @@ def examples() -> Any:
     return {file.name: bool(run_path(file.name)) for file in EXAMPLES.glob("*.py") if "__main__" in file.read_text()}
 
 
-WALK = "walk --velocity 0.5 --window 16"
-AHEAD = "walk --velocity 0.7 --window 60 --vp 200 --dt 0.5 --physical --ground-at 45"
-FLSS = "flss --starts 100 --window start --velocities"
-FALLS = "flss --physical --velocities 0.8 --starts 6 --window 40"
-SEARCH = "search --window start --starts 20 --budget 20 --refine-budget 0 --verdict-starts 30 --form"
+WALK = "walk --velocity 0.5 --observation-time 16"
+AHEAD = "walk --velocity 0.7 --observation-time 60 --vp 200 --dt 0.5 --physical --ground-at 45"
+FLSS = "flss --starts 100 --observation-time start --velocities"
+FALLS = "flss --physical --velocities 0.8 --starts 6 --observation-time 40"
+SEARCH = "search --observation-time start --starts 20 --budget 20 --refine-budget 0 --verdict-starts 30 --form"
 FILM = "--width 160 --height 120 --fps 10"
 LEAGUE = "league --quick --starts 10 --physical-starts 2 --trial-starts 1 --velocities 0.5 --trial-velocity 0.8"
 FOOT_PATH = "--vp 120 --step-height 9 --standing-height 11 --lift-time 10 --landing-time 15 --contact-gap 5"
@@ -295,14 +303,14 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "walk accelerating": f"{WALK} --physical --acceleration 0.01 --initial-velocity 0.2",
     "walk conditions": f"{WALK} --physical {FOOT_PATH} {MASSES} --settling-time 100",
     "walk stride": f"{WALK} --physical --dt 0.2 --geometry centred --pep0 -9 --aep0 9",
-    "walk order and reading": f"{WALK} --order sequential --reading lasting",
+    "walk order and reading": f"{WALK} --order sequential --model-variant lasting",
     "walk grounds": lambda: {kind: answer(f"{AHEAD} --ground {kind}") for kind in ("step", "gap", "hurdle", "rough")},
     "walk text": lambda: text(f"{WALK} --physical --out text"),
     "walk settings": lambda: {"walk": answer(f"{WALK} --physical --seed 5 --load 1")["settings"]},
     "flss kinematic": f"{FLSS} 0.3 0.6 --seed 7 --format pdf",
     "flss accelerating": f"{FLSS} 0.5 --acceleration 0.001",
     "flss range of, resumption, rerun": lambda: resumed(
-        "flss --velocities 0.7 --starts 600 --range-of 200 --window start"
+        "flss --velocities 0.7 --starts 600 --range-of 200 --observation-time start"
     ),
     "flss physical, resumption, rerun": lambda: resumed(FALLS),
     "flss threads": lambda: same_with("--threads 1", f"{FLSS} 0.5"),
@@ -320,25 +328,29 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "controller learned": f"{FALLS} --model train_cma.py:REFLEXES",
     "check-controller": "check-controller tripod.py:Tripod",
     "check-controller fails": lambda: answer("check-controller broken.py:Broken", code=1),
-    "compare": lambda: resumed("compare --models hws tripod.py:Tripod --velocities 0.7 --starts 4 --window 40"),
-    "compare text": lambda: text("compare --velocities 0.6 --starts 3 --window 20 --no-video --out text"),
+    "compare": lambda: resumed(
+        "compare --models hws tripod.py:Tripod --velocities 0.7 --starts 4 --observation-time 40"
+    ),
+    "compare text": lambda: text("compare --velocities 0.6 --starts 3 --observation-time 20 --no-video --out text"),
     "render one": lambda: shown(f"render walk.nc {FILM}"),
     "render two": lambda: shown(f"render walk.nc plan.nc {FILM} --camera side"),
     "render GIF": lambda: shown(f"render walk.nc {FILM} --camera top --format gif --quality high"),
-    "render planned": lambda: shown(f"render {FILM} --velocity 0.5 --window 8 --beside planned --slow-motion 4"),
-    "render beside": lambda: shown(f"render {FILM} --velocity 0.5 --window 8 --beside hws --camera front"),
+    "render planned": lambda: shown(
+        f"render {FILM} --velocity 0.5 --observation-time 8 --beside planned --slow-motion 4"
+    ),
+    "render beside": lambda: shown(f"render {FILM} --velocity 0.5 --observation-time 8 --beside hws --camera front"),
     "page": lambda: [shown("page walk.nc"), shown("page walk.nc plan.nc")],
     "view live": lambda: view("--velocity 0.5"),
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,
     "league": f"{LEAGUE} --controllers ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
     "ablate": "ablate --models ldvs walknet --velocities 0.8 --starts 10 --physical-starts 1 --dt 0.5",
-    "map V_p": lambda: resumed("map --over vp --values 40 160 --velocities 0.8 --starts 4 --window 20"),
-    "map centre of mass": "map --over centre_of_mass --values -5 0 --velocities 0.8 --starts 3 --window 20 --vp 200",
-    "disturb": "disturb --velocities 0.5 --starts 2 --window 40 --impulses 5 --dt 0.5 --vp 200",
-    "disturb kinematic": "disturb --kinematic --velocities 0.7 --starts 8 --window 40",
+    "map V_p": lambda: resumed("map --over vp --values 40 160 --velocities 0.8 --starts 4 --observation-time 20"),
+    "map centre of mass": "map --over centre_of_mass --values -5 0 --velocities 0.8 --starts 3 --observation-time 20 --vp 200",
+    "disturb": "disturb --velocities 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
+    "disturb kinematic": "disturb --kinematic --velocities 0.7 --starts 8 --observation-time 40",
     "terrain": "terrain --velocities 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",
-    "converge": "converge --velocity 0.7 --vps 200 80 --starts 4 --window start",
+    "converge": "converge --velocity 0.7 --vps 200 80 --starts 4 --observation-time start",
     "biology": "biology --starts 1 --periods 4",
     "reproduce claims": "reproduce --quick --only hws-close ideal-0.4 p4 --beside lasting",
     "reproduce figures": reproduce,
@@ -363,7 +375,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "python stable-baselines3": stable_baselines,
     "python examples": examples,
     # These two become scripts.
-    "variants": "variants --models ldvs own-V --velocities 0.5 --starts 20 --window start",
+    "variants": "variants --models ldvs own-V --velocities 0.5 --starts 20 --observation-time start",
     "model_variants": model_variants,
 }
 
