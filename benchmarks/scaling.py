@@ -20,10 +20,10 @@ from scipy.optimize import nnls
 
 from benchmarks.processor import description
 from hexmj import LDVS, Conditions, Stride, draw_starts, first_loss, flss, physical_flss
-from hexmj.measures.figures import MEASURE_COLOURS
-from hexmj.threads import thread_count
 from hexmj.files import write_text
 from hexmj.io import json_text, results_folder, save_figure
+from hexmj.plotting import MEASURE_STYLES
+from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -222,7 +222,7 @@ def draw(curve: Curve, axes: "Axes") -> None:
     size, seconds, threads = np.array(curve.size, dtype=float), np.array(curve.seconds), curve.against == "threads"
     line = seconds[0] * size[0] / size if threads else seconds[-1] * size / size[-1]
     axes.loglog(size, line, color="0.55", linewidth=0.9, label="proportional")
-    axes.loglog(size, seconds, "o", color=MEASURE_COLOURS[curve.measure], markersize=4.5, label="measured")
+    axes.loglog(size, seconds, "o", color=MEASURE_STYLES[curve.measure], markersize=4.5, label="measured")
     if curve.against == "starts":
         axes.xaxis.set_major_locator(LogLocator(numticks=5))
     else:

@@ -23,11 +23,11 @@ import numpy as np
 from benchmarks.table import print_table
 from hexmj import LDVS, Conditions, SimulationError, Stride, draw_starts
 from hexmj.bodies.loading import compile_body
-from hexmj.stats import wilson_interval
-from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.settling import Settled, settle
 from hexmj.files import write_text
 from hexmj.io import json_text
+from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.settling import Settled, settle
+from hexmj.stats import wilson_interval
 
 VELOCITY, DURATION = 0.5, 40.0
 FINEST = "time step / 4"

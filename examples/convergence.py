@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import hexmj
-from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.studies.static_limit import StaticLimit
 from hexmj.sweep import run_study
 
 folder = Path("results/converge/walks")  # keeps finished walks, where `hexmj converge` keeps them

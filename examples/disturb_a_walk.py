@@ -6,9 +6,7 @@ import hexmj
 from hexmj.controllers.losses import planned_losses
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.settling import settle
-from hexmj.studies.disturbance.disturbances import disturbance_of, find_stable_starts
-from hexmj.studies.disturbance.plan import Disturbed
-from hexmj.studies.disturbance.strategies import collect_postures
+from hexmj.studies.disturbed_walks import Disturbed, collect_postures, disturbance_of, find_stable_starts
 
 V, STARTS = 0.6, 12
 stride = hexmj.Stride()

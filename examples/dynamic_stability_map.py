@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import hexmj
-from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.stability_map import StabilityMap
 from hexmj.sweep import run_study
 
 folder = Path("results/map/walks")  # keeps finished walks, where `hexmj map` keeps them

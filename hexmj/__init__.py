@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from hexmj.measures.kinematic import walk as walk
     from hexmj.measures.physical import PhysicalWalk as PhysicalWalk
     from hexmj.measures.physical import physical_walk as physical_walk
-    from hexmj.plots import plot as plot
+    from hexmj.plotting import plot as plot
     from hexmj.replay.film.film import Film as Film
     from hexmj.replay.film.video import render as render
     from hexmj.replay.page.page import page as page
@@ -74,7 +74,7 @@ _MODULES = {
     "measures.compare": ("compare", "physical_flss"),
     "measures.kinematic": ("first_loss", "flss", "flss_over_range", "walk"),
     "measures.physical": ("PhysicalWalk", "physical_walk"),
-    "plots": ("plot",),
+    "plotting": ("plot",),
     "replay.film.film": ("Film",),
     "replay.film.video": ("render",),
     "replay.page.page": ("page",),

@@ -71,7 +71,7 @@ def other_conditions(seed: int) -> Arrays:
 
 
 def disturbed(seed: int) -> Arrays:
-    from hexmj.studies.disturbance.study import DisturbedWalks
+    from hexmj.studies.disturbance import DisturbedWalks
     from hexmj.sweep import run_study
 
     few: Any = {"velocities": [0.6], "n_starts": 4, "observation_time": 30.0, "seed": seed}
@@ -79,7 +79,7 @@ def disturbed(seed: int) -> Arrays:
 
 
 def disturbed_with_feedback(seed: int) -> Arrays:
-    from hexmj.studies.disturbance.study import DisturbedWalks
+    from hexmj.studies.disturbance import DisturbedWalks
     from hexmj.sweep import run_study
 
     few: Any = {"velocities": [0.6], "n_starts": 3, "observation_time": 30.0, "seed": seed}
@@ -88,7 +88,7 @@ def disturbed_with_feedback(seed: int) -> Arrays:
 
 
 def terrain(seed: int) -> Arrays:
-    from hexmj.studies.terrain.study import Terrain
+    from hexmj.studies.terrain import Terrain
     from hexmj.sweep import run_study
 
     few: Any = {"velocities": [0.6], "heights": [3.0], "lengths": [5.0], "n_starts": 4, "seed": seed}
@@ -96,7 +96,7 @@ def terrain(seed: int) -> Arrays:
 
 
 def mapped(seed: int) -> Arrays:
-    from hexmj.studies.stability_map.study import StabilityMap
+    from hexmj.studies.stability_map import StabilityMap
     from hexmj.sweep import run_study
 
     chosen: Any = {"vp": [40.0, 160.0], "centre_of_mass": [-5.0, 0.0]}
@@ -109,7 +109,7 @@ def mapped(seed: int) -> Arrays:
 
 
 def converged(seed: int) -> Arrays:
-    from hexmj.studies.static_limit.study import StaticLimit
+    from hexmj.studies.static_limit import StaticLimit
     from hexmj.sweep import run_study
 
     return _table(run_study(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, observation_time="start", seed=seed)))

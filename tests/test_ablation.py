@@ -17,8 +17,7 @@ from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.baselines.walknet import Walknet
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
-from hexmj.studies.ablation.figure import FEWER, NONE, ablation_figure
-from hexmj.studies.ablation.study import Ablation, switched, wholes
+from hexmj.studies.ablation import FEWER, NONE, Ablation, ablation_figure, switched, wholes
 from hexmj.sweep import run_study
 
 

@@ -17,13 +17,30 @@ from hexmj.controllers.checked_plans import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import Settled, Settling
-from hexmj.studies.biology.animals import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, timing
-from hexmj.studies.biology.figure import biology_figure
-from hexmj.studies.biology.names import SEGMENTS, UNITS
-from hexmj.studies.biology.quantities import _course, quantities
-from hexmj.studies.biology.strides import Strides, last_strides, onsets, rows_of_a_hop, strides_between
-from hexmj.studies.biology.study import MEASURED, Biology
-from hexmj.studies.biology.table import rows
+from hexmj.studies.biology import (
+    ANIMALS,
+    MEASURED,
+    PAST,
+    SOURCES,
+    SPEEDS,
+    STEP,
+    Animal,
+    Biology,
+    biology_figure,
+    rows,
+    timing,
+)
+from hexmj.studies.quantities import (
+    SEGMENTS,
+    UNITS,
+    Strides,
+    _course,
+    last_strides,
+    onsets,
+    quantities,
+    rows_of_a_hop,
+    strides_between,
+)
 from hexmj.sweep import run_study
 from hexmj.timing import Stride
 from tiers import few_of

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from hexmj.storage.files import digest_of
+from hexmj.sweeps.code import code
+from hexmj.user_code.loaded import importable
 
 import hexmj
 from hexmj.controllers.cruse1998 import presets
 from hexmj.errors import InputError
-from hexmj.storage.files import digest_of
 from hexmj.sweep import Cell
-from hexmj.sweeps.code import code
-from hexmj.user_code.loaded import importable
 from small_cells import MINE, WITHOUT_DASK, Wave, odd_bits, told_how
 from toy_project import TOY, toy_record, write_toy
 

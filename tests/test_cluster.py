@@ -17,13 +17,13 @@ from typing import Any, cast
 
 import pytest
 import xarray as xr
+from hexmj.sweeps.cluster import workers_of
 
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.errors import InputError
 from hexmj.measures.compare import compare
 from hexmj.measures.kinematic import flss
 from hexmj.sweep import Cell, run_cells
-from hexmj.sweeps.cluster import workers_of
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, counted_cells, odd_cells
 from tiers import few_of

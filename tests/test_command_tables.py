@@ -8,9 +8,8 @@ import xarray as xr
 
 from hexmj import LDVS, load
 from hexmj.cli.tables import difference, four_digits, interval
-from hexmj.studies.disturbance.figure import disturbed_figure
-from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
-from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.disturbance import disturbed_figure
+from hexmj.studies.stability_map import StabilityMap, map_figure, mechanisms_figure
 from hexmj.sweep import run_study
 
 

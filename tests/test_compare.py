@@ -19,10 +19,10 @@ import hexmj
 from hexmj import HWS, LDVS, UNCOORDINATED, Conditions, InputError, SensoryFeedback, compare, physical_flss
 from hexmj.measures import outcome_table
 from hexmj.measures.compare import Comparison
-from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.studies.stability_map.study import StabilityMap
-from hexmj.studies.static_limit.study import StaticLimit
-from hexmj.studies.terrain.study import Terrain
+from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.stability_map import StabilityMap
+from hexmj.studies.static_limit import StaticLimit
+from hexmj.studies.terrain import Terrain
 from hexmj.sweep import Cell, run_study
 from tiers import few_of
 

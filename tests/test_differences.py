@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from hexmj.stats import paired_difference
-from hexmj.studies.league.standings import ranks
+from hexmj.studies.standings import ranks
 
 
 def test_a_difference_leaves_out_starts_that_are_not_known_and_takes_parts_of_walks() -> None:

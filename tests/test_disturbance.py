@@ -13,10 +13,18 @@ from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.feedback import SensedPlan
 from hexmj.measures.kinematic import first_loss, walk
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
-from hexmj.studies.disturbance.plan import PAUSE, Disturbed, DisturbedPlan
-from hexmj.studies.disturbance.strategies import Postures, collect_postures, reorganise
-from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.disturbed_walks import (
+    PAUSE,
+    Disturbance,
+    Disturbed,
+    DisturbedPlan,
+    Postures,
+    collect_postures,
+    disturbance_of,
+    find_stable_starts,
+    reorganise,
+)
 from tiers import few_of
 
 STRIDE, V, GRID = Stride(), 0.5, 20

@@ -11,14 +11,10 @@ import xarray as xr
 from hexmj import HWS, LDVS, Cruse1998, InputError, SensoryFeedback, Stride
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.measures.captions import caption
+from hexmj.measures.figures import caption
 from hexmj.measures.kinematic import first_loss
-from hexmj.studies.disturbance import disturbances
-from hexmj.studies.disturbance.cases import Case, every_case
-from hexmj.studies.disturbance.disturbances import SETTLED, TooFewStable, find_stable_starts
-from hexmj.studies.disturbance.frequencies import with_flss_after
-from hexmj.studies.disturbance.stable_walks import StableWalks
-from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.disturbance import DisturbedWalks, disturbances, with_flss_after
+from hexmj.studies.disturbed_walks import SETTLED, Case, StableWalks, TooFewStable, every_case, find_stable_starts
 from hexmj.sweep import run_study
 from hexmj.timing import Acceleration
 

@@ -11,8 +11,7 @@ from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import is_steerable
 from hexmj.controllers.baselines.table import BASELINES
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbance.disturbances import Disturbance, disturbance_of, find_stable_starts
-from hexmj.studies.disturbance.plan import PAUSE, Disturbed
+from hexmj.studies.disturbed_walks import PAUSE, Disturbance, Disturbed, disturbance_of, find_stable_starts
 
 STRIDE, V = Stride(), 0.5
 STABLE = find_stable_starts(LDVS, V, 6, 0, STRIDE, 20)

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from drawing import drawing
+from hexmj import threads
 from hexmj.cli import machine_checks
 from hexmj.cli.machine_checks import CHECKS, Unfit, examine
 from hexmj.controllers.cruse1998 import kernel
 from hexmj.errors import SimulationError
 from hexmj.measures import physical
-from hexmj import threads
 from hexmj.rendering import gl
 
 

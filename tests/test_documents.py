@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexmj.cli.command_words import checked
 
 import hexmj
-from hexmj.cli.command_words import checked
 from hexmj.cli.commands import options_of
 from hexmj.controllers import conformance
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998

@@ -12,11 +12,9 @@ from hexmj.controllers.baselines.evolved import Evolved
 from hexmj.controllers.baselines.metronomes import Metronome
 from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
 from hexmj.errors import InputError
-from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.entrants_by_name import EVERYONE, entrants
-from hexmj.studies.league.study import League
-from hexmj.studies.league.trials import TRIALS
-from hexmj.studies.short_names import short_names
+from hexmj.studies.entrants import EVERYONE, Entrant, entrants, short_names
+from hexmj.studies.league import League
+from hexmj.studies.standings import TRIALS
 from hexmj.timing import Stride
 from standing_still import Still
 

@@ -12,7 +12,6 @@ from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Po
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.gaits import gait
 from hexmj.search.samples import Sample
-from hexmj.files import read_toml
 from hexmj.timing import Stride
 
 L2 = 1

@@ -21,7 +21,7 @@ from hexmj.physics.explosions import MOST_ENERGY, explosion
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.settling import Settled, settle
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbance.cases import every_case
+from hexmj.studies.disturbed_walks import every_case
 from tiers import few_of
 
 LEG, GRAVITY = 31.0, 9810.0

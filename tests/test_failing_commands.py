@@ -9,9 +9,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from hexmj.user_code.loaded import importable
 
 from hexmj.errors import SimulationError
-from hexmj.user_code.loaded import importable
 
 
 def test_compiled_code_that_is_torn_is_a_sentence(run, monkeypatch, tmp_path):

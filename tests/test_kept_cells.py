@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from hexmj.user_code.loaded import importable
 
 from hexmj.errors import InputError
 from hexmj.sweep import Cell, finished_cells, run_cells
-from hexmj.user_code.loaded import importable
 from left_by_cells import calls, contents
 from small_cells import ENVIRONMENT, MINE, assert_same_bits, counted_cells, odd_cells, of_object
 

@@ -11,21 +11,19 @@ import xarray as xr
 import hexmj
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
-from hexmj.stats import paired_difference
-from hexmj.measures.captions import rules
+from hexmj.measures.figures import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.settling import settle
-from hexmj.starts import draw_starts
-from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.entrants_by_name import entrants
-from hexmj.studies.league.figure import FEWER, NOTHING, league_figure, walks_figure
-from hexmj.studies.league.in_physics import walks
-from hexmj.studies.league.on_paper import losses
-from hexmj.studies.league.study import League
-from hexmj.studies.league.table import by_rank, league_markdown, tables
-from hexmj.sweep import run_cells
 from hexmj.plain import plain
+from hexmj.starts import draw_starts
+from hexmj.stats import paired_difference
+from hexmj.studies.entrants import Entrant, entrants
+from hexmj.studies.league import League
+from hexmj.studies.league_cells import losses, walks
+from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
+from hexmj.studies.standings import by_rank, league_markdown, tables
+from hexmj.sweep import run_cells
 from hexmj.timing import Stride
 from standing_still import Still
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from hexmj.cli.commands import options_of
 from hexmj.cli.tables import tables_that_fit
 from hexmj.errors import InputError, RenderingError
-from hexmj.studies.league.study import League
+from hexmj.studies.league import League
 
 SMALL = "--starts 5 --physical-starts 1 --trial-starts 1 --velocities 0.5 --observation time 10 --no-video --out here"
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hexmj.user_code.loaded import importable
 
 import hexmj
 from hexmj.conditions import Conditions
@@ -19,7 +20,6 @@ from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.learned import FELT, MOST, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt, felt_in
 from hexmj.errors import InputError
-from hexmj.user_code.loaded import importable
 from hexmj.view.live import LiveWalk
 
 ROOT = Path(__file__).parents[1]

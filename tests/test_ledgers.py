@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexmj.errors import InputError
-from hexmj.sweep import Cell, CachedValues
+from hexmj.sweep import CachedValues, Cell
 from left_by_cells import calls
 
 

@@ -8,10 +8,10 @@ from scipy.stats import binomtest
 
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
-from hexmj.stats import wilson_interval
 from hexmj.measures.kinematic import KinematicFlss, first_loss, flss, flss_over_range, losses_of_range
 from hexmj.starts import SLAB, draw_slabs, draw_start, draw_starts
-from hexmj.sweep import run_study, run_cells
+from hexmj.stats import wilson_interval
+from hexmj.sweep import run_cells, run_study
 from hexmj.timing import Acceleration, Stride, observation_duration
 
 VELOCITIES = [0.1, 0.3, 0.5, 0.7]

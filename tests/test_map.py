@@ -11,10 +11,8 @@ from numpy.testing import assert_allclose
 
 from hexmj import LDVS, Conditions, InputError, SensoryFeedback, Stride, compare
 from hexmj.body import STICK_INSECT
-from hexmj.studies.stability_map import fates
-from hexmj.studies.stability_map.differences import FLSS, froude
-from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED
-from hexmj.studies.stability_map.study import CONDITIONS, StabilityMap
+from hexmj.studies.mechanisms import MECHANISMS, SAVED
+from hexmj.studies.stability_map import CONDITIONS, FLSS, StabilityMap, fates, froude
 from hexmj.sweep import Cell, run_study
 
 SMALL: dict[str, Any] = {"values": [80.0, 320.0], "velocities": [0.5, 0.7], "n_starts": 12, "observation_time": 60.0}

@@ -4,16 +4,16 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hexmj.studies.variants.study import Variants
 
 import hexmj
 from hexmj import LDVS, Conditions, InputError
 from hexmj.environments import dm
 from hexmj.environments.task import Task
-from hexmj.studies.ablation.study import Ablation
-from hexmj.studies.biology.study import Biology
-from hexmj.studies.league.entrants_by_name import entrants
-from hexmj.studies.league.study import League
-from hexmj.studies.variants.study import Variants
+from hexmj.studies.ablation import Ablation
+from hexmj.studies.biology import Biology
+from hexmj.studies.entrants import entrants
+from hexmj.studies.league import League
 from hexmj.view.live import LiveWalk
 
 STARTS = hexmj.draw_starts(1, 0)

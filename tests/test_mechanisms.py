@@ -11,7 +11,7 @@ from hexmj.legs import FIG1, MIRROR
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.outcomes import Outcomes
 from hexmj.rotations import lean
-from hexmj.studies.stability_map.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
+from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
 from hexmj.walks import AnyWalk, PlannedWalk, Walk
 
 NAMES = np.array(list(MECHANISMS))

@@ -25,7 +25,7 @@ from hexmj.physics.settling import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
 from hexmj.search.samples import Sample
-from hexmj.studies.league.entrants_by_name import entrants
+from hexmj.studies.entrants import entrants
 from hexmj.walks import PlannedWalk
 from tiers import few_of
 

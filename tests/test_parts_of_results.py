@@ -8,24 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hexmj.studies.variants.study import Variants
 from matplotlib.lines import Line2D
 
 import hexmj
 from hexmj.errors import InputError
-from hexmj.plots import FIGURES
+from hexmj.plotting import FIGURES
 from hexmj.search.history import history
-from hexmj.studies.ablation.study import Ablation
-from hexmj.studies.biology.study import Biology
-from hexmj.studies.biology.table import biology_markdown
-from hexmj.studies.disturbance.cases import NO_DISTURBANCE
-from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.studies.league.entrants_by_name import entrants
-from hexmj.studies.league.study import League
-from hexmj.studies.league.table import league_markdown
-from hexmj.studies.stability_map.study import StabilityMap
-from hexmj.studies.static_limit.study import StaticLimit
-from hexmj.studies.terrain.study import Terrain
-from hexmj.studies.variants.study import Variants
+from hexmj.studies.ablation import Ablation
+from hexmj.studies.biology import Biology, biology_markdown
+from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.disturbed_walks import NO_DISTURBANCE
+from hexmj.studies.entrants import entrants
+from hexmj.studies.league import League
+from hexmj.studies.stability_map import StabilityMap
+from hexmj.studies.standings import league_markdown
+from hexmj.studies.static_limit import StaticLimit
+from hexmj.studies.terrain import Terrain
 from hexmj.sweep import run_study
 from tiers import few_of
 

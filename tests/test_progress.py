@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj import progress
 from hexmj.errors import InputError
 from hexmj.measures import kinematic
-from hexmj import progress
 from hexmj.search.network_forms import NetworkForm
 from hexmj.search.stages import search
 from hexmj.view import live

@@ -17,7 +17,7 @@ from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes
 from hexmj.physics.settling import settle
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.timing import Stride
 from tiers import few_of
 

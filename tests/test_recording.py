@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 import xarray as xr
+from hexmj.storage import netcdf
+from hexmj.storage.files import sealed
 from numpy.testing import assert_allclose
 
 from hexmj.bodies.loading import compile_body
@@ -22,8 +24,6 @@ from hexmj.replay.recording import load_recording, record, record_plan, recorded
 from hexmj.replay.take import Take
 from hexmj.rotations import rotated
 from hexmj.starts import draw_starts
-from hexmj.storage import netcdf
-from hexmj.storage.files import sealed
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start, part_of
 

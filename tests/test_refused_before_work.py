@@ -14,13 +14,13 @@ from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
 from hexmj.physics.settling import check_adhesion
-from hexmj.studies.ablation.study import Ablation
-from hexmj.studies.biology.study import Biology
-from hexmj.studies.disturbance.study import DisturbedWalks
-from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.study import League
-from hexmj.studies.stability_map.study import StabilityMap
-from hexmj.studies.terrain.study import Terrain
+from hexmj.studies.ablation import Ablation
+from hexmj.studies.biology import Biology
+from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.entrants import Entrant
+from hexmj.studies.league import League
+from hexmj.studies.stability_map import StabilityMap
+from hexmj.studies.terrain import Terrain
 
 DIVERGES = "oscillators diverge at dt = "
 STEPPED_OVER = "expected V and a step together below 1"

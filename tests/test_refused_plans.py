@@ -11,8 +11,8 @@ from hexmj.controllers.checked_plans import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
+from hexmj.studies.entrants import Entrant
 from hexmj.studies.league import in_physics
-from hexmj.studies.league.entrant import Entrant
 from hexmj.walks import PLANNED, part_of
 from stepwise_ldvs import Own, plan_of
 

@@ -9,12 +9,11 @@ import xarray as xr
 import hexmj
 from hexmj.conditions import Conditions
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
-from hexmj.studies.frequencies import came, frequencies
-from hexmj.studies.league import in_physics
-from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.figure import league_figure, walks_figure
-from hexmj.studies.league.study import League
-from hexmj.studies.league.table import league_markdown
+from hexmj.measures.tables import came, frequencies
+from hexmj.studies.entrants import Entrant
+from hexmj.studies.league import League, in_physics
+from hexmj.studies.league_figure import league_figure, walks_figure
+from hexmj.studies.standings import league_markdown
 from hexmj.timing import Stride
 from standing_still import Still, Stretched
 

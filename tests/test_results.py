@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hexmj.storage import netcdf
 from matplotlib.text import Text
 from PIL import Image
 from xarray.backends.locks import HDF5_LOCK
 
 import hexmj
 from hexmj.errors import InputError
-from hexmj.plots import FIGURES
+from hexmj.plotting import FIGURES
 from hexmj.search.stages import search
-from hexmj.storage import netcdf
 from hexmj.sweep import Study, run_study
 from tiers import few_of
 
@@ -67,15 +67,16 @@ def recorded() -> xr.Dataset:
 
 
 def study(name: str) -> xr.Dataset:
-    from hexmj.studies.ablation.study import Ablation, switched
-    from hexmj.studies.biology.study import Biology
-    from hexmj.studies.disturbance.study import DisturbedWalks
-    from hexmj.studies.league.entrants_by_name import entrants
-    from hexmj.studies.league.study import League
-    from hexmj.studies.stability_map.study import StabilityMap
-    from hexmj.studies.static_limit.study import StaticLimit
-    from hexmj.studies.terrain.study import Terrain
     from hexmj.studies.variants.study import Variants
+
+    from hexmj.studies.ablation import Ablation, switched
+    from hexmj.studies.biology import Biology
+    from hexmj.studies.disturbance import DisturbedWalks
+    from hexmj.studies.entrants import entrants
+    from hexmj.studies.league import League
+    from hexmj.studies.stability_map import StabilityMap
+    from hexmj.studies.static_limit import StaticLimit
+    from hexmj.studies.terrain import Terrain
 
     conditions = hexmj.Conditions(vp=200.0)
     small: dict[str, Callable[[], Study]] = {

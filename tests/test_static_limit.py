@@ -10,9 +10,7 @@ import pytest
 from hexmj import LDVS, Conditions, InputError, SensoryFeedback, draw_starts, load_controller, physical_walk
 from hexmj.body import STICK_INSECT
 from hexmj.stability import walk_margin
-from hexmj.studies.static_limit.distances import distances
-from hexmj.studies.static_limit.figure import static_limit_figure
-from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.studies.static_limit import StaticLimit, distances, static_limit_figure
 from hexmj.sweep import Cell, run_study
 
 FEW: dict[str, Any] = {"n_starts": 12, "observation_time": "start"}

@@ -28,13 +28,13 @@ from hexmj import (
 )
 from hexmj.bodies.grounds import beyond_the_ground, ground_level
 from hexmj.bodies.loading import compile_body
+from hexmj.io import settings
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
+from hexmj.measures.tables import reach
 from hexmj.physics.settling import settle
 from hexmj.replay.film.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
-from hexmj.io import settings
-from hexmj.studies.terrain.figure import terrain_figure
-from hexmj.studies.terrain.study import FARTHER, Terrain, reach
+from hexmj.studies.terrain import FARTHER, Terrain, terrain_figure
 from hexmj.sweep import Cell, run_study
 
 GROUNDS = {

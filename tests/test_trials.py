@@ -16,9 +16,9 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
-from hexmj.studies.league.entrant import Entrant
-from hexmj.studies.league.study import League
-from hexmj.studies.league.trials import DISTURBED, GROUNDS, TRIALS, crossed, walking
+from hexmj.studies.entrants import Entrant
+from hexmj.studies.league import League
+from hexmj.studies.standings import DISTURBED, GROUNDS, TRIALS, crossed, walking
 from hexmj.timing import Stride
 
 LARGER = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)

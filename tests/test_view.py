@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from chromium import tab
+from hexmj import progress
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS, Cruse1998, Symmetric
 from hexmj.controllers.named import load_controller
 from hexmj.measures.physical import physical_walk
-from hexmj import progress
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
 from hexmj.view import live

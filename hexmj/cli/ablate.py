@@ -12,10 +12,10 @@ from hexmj.cli.options import AS_THEY_ARE, STEADY, Accelerating, Controlled, Wal
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import tables_that_fit
 from hexmj.io import settings
-from hexmj.measures.captions import starts_in_words
-from hexmj.studies.ablation import study
-from hexmj.studies.ablation.figure import ablation_figure
-from hexmj.studies.league.study import FRESH
+from hexmj.measures.figures import not_printed, starts_in_words
+from hexmj.measures.tables import FRESH
+from hexmj.studies import ablation as study
+from hexmj.studies.ablation import ablation_figure
 from hexmj.validate import distinct
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Ablate(StudyCommand):
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
     starts: int = study.Ablation.n_starts
     """Number of random starts on paper, the same for all."""
-    physical_starts: int | None = None
+    physical_starts: int = study.Ablation.physical_starts
     """Of these, number of starts that walk in physics; 100 unless given, at most all."""
     out: Path = Path("results/ablate")
     """Folder for figure, NetCDF, manifest and finished walks."""
@@ -49,13 +49,12 @@ class Ablate(StudyCommand):
     def study(self) -> study.Ablation:
         distinct("models", self.models)
         models = study.wholes(self.models)
-        usual = min(study.Ablation.n_physical, max(1, self.starts))
         self.refuse_contact_gap(*(one for several in models.values() for one in several.values()))
         return study.Ablation(
             models,
             self.velocities,
-            self.starts,
-            usual if self.physical_starts is None else self.physical_starts,
+            self.physical_starts,
+            n_starts=self.starts,
             **self.steady,
         )
 
@@ -66,7 +65,8 @@ class Ablate(StudyCommand):
             starts = starts_in_words(one.frequency_starts.max().item())
             yield f"{measure}: {title}; frequency in {starts}, and how far it is above the whole's (* for sure)"
             yield from _tables(one)
-        yield from (f"{words}: {', '.join(names)}" for words, names in settings(result)["not_printed"].items())
+        rules = not_printed(settings(result)["controllers"])
+        yield from (f"{words}: {', '.join(names)}" for words, names in rules.items())
         yield self.conditions_line()
 
 
@@ -82,7 +82,7 @@ def _tables(one: "xr.Dataset") -> "Iterator[Table]":
 def _cell(one: "xr.Dataset") -> str:
     left, physical = one.frequency_starts.item(), one.measure.item() == "physical"
     frequency = "-" if not left else f"{one.frequency.item():.3f}"
-    frequency += f" of {left}" if physical and 0 < left < one.attrs["n_physical"] else ""
+    frequency += f" of {left}" if physical and 0 < left < one.attrs["physical_starts"] else ""
     if one.controller.item() == one.whole.item() or np.isnan(one.more):
         return frequency
     sure = "*" if one.more_low.item() > 0 or one.more_high.item() < 0 else ""

@@ -12,9 +12,8 @@ from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import table
 from hexmj.conditions import Conditions
 from hexmj.files import write_text
-from hexmj.studies.biology import study as biology
-from hexmj.studies.biology.figure import biology_figure
-from hexmj.studies.biology.table import HEADS, biology_markdown, rows
+from hexmj.studies import biology
+from hexmj.studies.biology import HEADS, biology_figure, biology_markdown, table_rows
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +52,7 @@ class Biology(StudyCommand):
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The table, how many walked whole strides, and the conditions."""
         yield f"{self.controlled.controller(self.model).name} beside insects, at 24 mm/s unless told"
-        yield table(HEADS, rows(result))
+        yield table(HEADS, table_rows(result))
         yield f"starts with whole strides: {biology.walked_in_words(result)}; sources in {self.out / TABLE}"
         walks = replace(self.walks, observation_time=f"{self.periods} periods")
         yield replace(self, walks=walks).conditions_line()

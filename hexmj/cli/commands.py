@@ -42,8 +42,6 @@ COMMANDS = {
     "terrain": "Steps, gaps, hurdles and rough ground in physics: how often the insect falls once it has reached"
     f" one.{AGAIN.format('run')}",
     "map": f"Physical FLSS over the velocity and one condition, and why starts fall or do not.{AGAIN.format('run')}",
-    "variants": "FLSS of sets of weights with one constant or rule changed at a time that the paper leaves open,"
-    f" and its mean and worst. A set that has it anyway (*) gets the default instead.{AGAIN.format('run')}",
     "disturb": "Walks that a halt, a stopped leg or a push disturbs, on paper and in physics, and what three strategies"
     f" buy.{AGAIN.format('run')}",
     "biology": "Forces, torques, gait, posture and work of the walking insect beside those of measured"

@@ -12,9 +12,8 @@ from hexmj.cli.options import ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
-from hexmj.measures.captions import starts_in_words
-from hexmj.studies.static_limit.figure import static_limit_figure
-from hexmj.studies.static_limit.study import FINE, VARIED, StaticLimit
+from hexmj.measures.figures import starts_in_words
+from hexmj.studies.static_limit import FINE, StaticLimit, static_limit_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,7 +54,7 @@ class Converge(StudyCommand):
     starts: int = StaticLimit.n_starts
     """Number of random starts, the same for every V_p and mass."""
     out: Path = Path("results/converge")
-    conditions: OmitArgPrefixes[Conditions] = hiding(FINE, VARIED)
+    conditions: OmitArgPrefixes[Conditions] = hiding(FINE, StaticLimit.hidden)
     outputs = Outputs("walking slower and slower", "converge.nc", {"converge.png": static_limit_figure})
 
     def study(self) -> StaticLimit:
@@ -75,7 +74,7 @@ class Converge(StudyCommand):
 
     def shown(self, result: "xr.Dataset") -> Iterable[Any]:
         """The frequencies, the distances from the plan, and the conditions."""
-        from hexmj.studies.static_limit.distances import LOSSES
+        from hexmj.studies.static_limit import LOSSES
 
         name, means = self.controlled.controller(self.model).name, _means(result)
         yield f"{name}, V = {self.velocity:g}, {starts_in_words(self.starts)}: FLSS, with 95 % intervals"
@@ -88,12 +87,12 @@ class Converge(StudyCommand):
             " centre of mass from O [mm]; slip [mm/s] and tracking [mm] to the end"
         )
         yield _table(means, {heading: partial(_number, name=one) for heading, one in OFF.items()})
-        yield self.conditions_line(varied=VARIED)
+        yield self.conditions_line(varied=StaticLimit.hidden)
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
     """Over the starts."""
-    from hexmj.studies.static_limit.distances import LOSSES
+    from hexmj.studies.static_limit import LOSSES
 
     return result.drop_vars(LOSSES.values()).mean("start", keep_attrs=True)
 

@@ -12,12 +12,9 @@ from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import difference, interval, table
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.measures.captions import starts_in_words
-from hexmj.studies.disturbance.cases import PHYSICAL, Answer, Kind
-from hexmj.studies.disturbance.figure import disturbed_figure
-from hexmj.studies.disturbance.frequencies import MEASURES
-from hexmj.studies.disturbance.study import RECOVERY, DisturbedWalks, strategies_in_words
-from hexmj.timing import Acceleration
+from hexmj.measures.figures import starts_in_words
+from hexmj.studies.disturbance import MEASURES, DisturbedWalks, disturbed_figure, strategies_in_words
+from hexmj.studies.disturbed_walks import PHYSICAL, Answer, Kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,9 +38,9 @@ class Disturb(StudyCommand):
     strategies: Sequence[Answer] | None = None
     """Legs go to the nearest posture of undisturbed walking, or the walk begins again from --initial-velocity, or feet
     hold on to the ground; all, beside none, unless given, and none alone where the option has no values."""
-    recovery: float = RECOVERY.rate
+    recovery: float = DisturbedWalks.recovery
     """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper's is 0.00008."""
-    initial_velocity: float = RECOVERY.start
+    initial_velocity: float = DisturbedWalks.initial_velocity
     """V_r(0) to which a walk slows down, a fraction of V_p."""
     adhesion: float = DisturbedWalks.adhesion
     """Adhesion of a foot that the plan lets stand where the strategy is to grasp, in multiples of the insect's
@@ -73,9 +70,10 @@ class Disturb(StudyCommand):
             chosen(self.disturbances, DisturbedWalks.disturbances),
             self.impulses,
             chosen(self.strategies, DisturbedWalks.strategies),
-            Acceleration(self.recovery, self.initial_velocity),
+            self.recovery,
+            self.initial_velocity,
             self.adhesion,
-            not self.kinematic,
+            self.kinematic,
             n_starts=self.starts,
             observation_time=self.walks.time,
             **self.steady,

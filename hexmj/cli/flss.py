@@ -89,7 +89,7 @@ class Flss(WalkingCommand):
         return [*files, save_manifest(sys.argv[1:], settings(result), files, out / MANIFEST)]
 
     def _print(self, result: "xr.Dataset", files: list[Path]) -> None:
-        from hexmj.measures.captions import starts_in_words
+        from hexmj.measures.figures import starts_in_words
 
         columns = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
         report = physical_report(result) if self.physical else {}

@@ -16,11 +16,12 @@ from hexmj.cli.tables import tables_that_fit
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.files import write_text
+from hexmj.measures.tables import FRESH
 from hexmj.replay.film.film import Film
-from hexmj.studies.league import study
-from hexmj.studies.league.entrants_by_name import EVERYONE, FOUR, IDEAL, entrants
-from hexmj.studies.league.figure import league_figure, walks_figure
-from hexmj.studies.league.table import by_rank, league_markdown, tables
+from hexmj.studies import league as study
+from hexmj.studies.entrants import EVERYONE, FOUR, IDEAL, entrants
+from hexmj.studies.league_figure import league_figure, walks_figure
+from hexmj.studies.standings import by_rank, league_markdown, tables
 from hexmj.validate import distinct
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ FIGURES = {"league.png": league_figure, "league_walks.png": walks_figure}
 BEST = 6
 """Who are filmed, at most."""
 
-QUICK: dict[str, Any] = {"velocities": (0.1, 0.5, 0.9), "n_starts": 200, "n_physical": 8, "n_tried": 4}
+QUICK: dict[str, Any] = {"velocities": (0.1, 0.5, 0.9), "n_starts": 200, "physical_starts": 8, "trial_starts": 4}
 """Sizes of a quick look."""
 
 
@@ -57,7 +58,7 @@ class League(StudyCommand):
     """Of these, number of starts that walk in physics at every velocity; 200 unless given, 8 if quick, at most all."""
     trial_starts: int | None = None
     """Of these, number of starts in each trial; 50 unless given, 4 if quick, at most all."""
-    trial_velocity: float = study.League.tried_at
+    trial_velocity: float = study.League.trial_velocity
     """V_r of the trials."""
     quick: bool = False
     """A quick look: four controllers, three velocities and few starts, unless others are given."""
@@ -65,7 +66,7 @@ class League(StudyCommand):
     """Leave the film out."""
     out: Path = Path("results/league")
     """Folder for tables, figure, film, NetCDF, manifest and finished walks."""
-    walks: OmitArgPrefixes[Walks] = Walks(seed=study.FRESH)
+    walks: OmitArgPrefixes[Walks] = Walks(seed=FRESH)
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
     controlled: OmitArgPrefixes[Controlled] = AS_THEY_ARE
     conditions: OmitArgPrefixes[Conditions] = hiding(Conditions(), OF_TRIALS)
@@ -85,18 +86,14 @@ class League(StudyCommand):
         asked = {
             "velocities": self.velocities,
             "n_starts": self.starts,
-            "n_physical": self.physical_starts,
-            "n_tried": self.trial_starts,
+            "physical_starts": self.physical_starts,
+            "trial_starts": self.trial_starts,
         }
         sizes = (QUICK if self.quick else {}) | {name: size for name, size in asked.items() if size is not None}
-        there = max(1, sizes.get("n_starts", study.League.n_starts))
-        for part in ("n_physical", "n_tried"):
-            if asked[part] is None:
-                sizes[part] = min(sizes.get(part, getattr(study.League, part)), there)
         return study.League(
             entrants(self.participants, loaded),
             **sizes,
-            tried_at=self.trial_velocity,
+            trial_velocity=self.trial_velocity,
             observation_time=self.walks.time,
             **self.steady,
         )
@@ -130,7 +127,7 @@ class League(StudyCommand):
 
         if sentence := missing():
             raise RenderingError(sentence)
-        takes_part, v = entrants(self.participants, loaded), result.attrs["tried_at"]
+        takes_part, v = entrants(self.participants, loaded), result.attrs["trial_velocity"]
         best = [name for name in by_rank(result).entrant.values if not takes_part[name].ideal][:BEST]
         shown = []
         for name in best:

@@ -11,9 +11,9 @@ from hexmj.cli.options import Controlled, ControllerName, hiding
 from hexmj.cli.study_command import Outputs, StudyCommand
 from hexmj.cli.tables import difference, interval, table
 from hexmj.errors import InputError
-from hexmj.measures.captions import starts_in_words
 from hexmj.measures.compare import MEASURES
-from hexmj.studies.stability_map.study import Over, StabilityMap
+from hexmj.measures.figures import starts_in_words
+from hexmj.studies.stability_map import Over, StabilityMap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ class Map(StudyCommand):
 
     @property
     def outputs(self) -> Outputs:  # pyright: ignore[reportIncompatibleVariableOverride]
-        from hexmj.studies.stability_map.figure import map_figure, mechanisms_figure
+        from hexmj.studies.stability_map import map_figure, mechanisms_figure
 
         figures = {f"{self.over}.png": map_figure, f"{self.over}-mechanisms.png": mechanisms_figure}
         return Outputs(f"walking over {self.over}", f"{self.over}.nc", figures, f"{self.over}-manifest.json")

@@ -108,7 +108,7 @@ class Render(WalkingCommand):
 
     def _walked(self, controllers: dict[str, Controller]) -> dict[str, Any]:
         """Settings of the walks that are recorded first."""
-        from hexmj.measures.kinematic import settings
+        from hexmj.measures.tables import settings
 
         walks = settings(controllers, n_starts=1, **self.walked)
         told = {"velocity": self.velocity, "start": self.start, "beside": self.beside}

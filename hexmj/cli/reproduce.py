@@ -44,7 +44,7 @@ class Reproduce:
             summary,
             summary_beside,
         )
-        from hexmj.pictures import as_shipped
+        from hexmj.plotting import as_shipped
 
         if self.only == ():
             raise InputError("--only without keys; expected at least one, or no --only for all")

@@ -52,7 +52,7 @@ def difference(one: "xr.Dataset", measure: str) -> str:
 def save_figure(draw: "Callable[[xr.Dataset], Figure]", data: "xr.Dataset", path: Path) -> Path:
     """Draw some data and write the figure."""
     from hexmj.io import save_figure
-    from hexmj.pictures import as_shipped
+    from hexmj.plotting import as_shipped
 
     with as_shipped():
         return save_figure(draw(data), path)

@@ -11,10 +11,9 @@ from hexmj.cli.options import STEADY, Accelerating, ControllerName, Walks, hidin
 from hexmj.cli.study_command import Outputs, StudyCommand, lists_of
 from hexmj.cli.tables import interval, table
 from hexmj.conditions import Conditions
-from hexmj.measures.captions import starts_in_words
-from hexmj.studies.terrain import study as terrain
-from hexmj.studies.terrain.figure import terrain_figure
-from hexmj.studies.terrain.study import FARTHER, VARIED, ObstacleKind
+from hexmj.measures.figures import starts_in_words
+from hexmj.studies import terrain
+from hexmj.studies.terrain import FARTHER, ObstacleKind, terrain_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +45,7 @@ class Terrain(StudyCommand):
         Walks(), ["observation_time"], "Each start walks a distance instead of a time."
     )
     accelerating: OmitArgPrefixes[Accelerating] = STEADY
-    conditions: OmitArgPrefixes[Conditions] = hiding(FARTHER, VARIED)
+    conditions: OmitArgPrefixes[Conditions] = hiding(FARTHER, terrain.Terrain.hidden)
     outputs = Outputs("walking to obstacles", "terrain.nc", {"terrain.png": terrain_figure})
 
     def study(self) -> terrain.Terrain:
@@ -80,7 +79,7 @@ class Terrain(StudyCommand):
             "walks": replace(self.walks, observation_time=f"{distance:g} / V"),
             "conditions": self._on_the_roughest,
         }
-        yield replace(self, **walked).conditions_line(varied=VARIED, walked=distance)
+        yield replace(self, **walked).conditions_line(varied=terrain.Terrain.hidden, walked=distance)
 
     @property
     def _on_the_roughest(self) -> Conditions:

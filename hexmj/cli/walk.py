@@ -39,7 +39,7 @@ class Walk(WalkingCommand):
 
     def run(self) -> None:
         """Walk, and write recording, figure and manifest."""
-        from hexmj.measures.kinematic import settings
+        from hexmj.measures.tables import settings
         from hexmj.replay.footfall import walk_figure
         from hexmj.replay.recording import save_recording
 

@@ -1,110 +1,174 @@
-"""FLSS against velocity as figures, and what other figures share with them."""
+"""Captions of results, and the figures of FLSS against velocity."""
 
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.errors import InputError
+from hexmj.conditions import unusual
 from hexmj.io import settings
-from hexmj.measures.captions import caption, conditions
-from hexmj.measures.drawable_parts import check_starts
-from hexmj.pictures import in_figure
+from hexmj.plotting import BESIDE, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture
+from hexmj.timing import Stride
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-    from hexmj.pictures import Picture
-
-MEASURE_COLOURS = {"kinematic": "#1b6ca8", "measured": "#e08e1b", "physical": "#b3261e", "toppled": "#6a4c93"}
-MEASURE_STYLES: dict[str, dict[str, Any]] = {
-    "kinematic": {"marker": "o", "linestyle": "-"},
-    "measured": {"marker": "s", "linestyle": "--"},
-    "physical": {"marker": "^", "linestyle": "-."},
-    "toppled": {"marker": "x", "linestyle": ":"},
+TERMS = {
+    "vp": "$V_p$ = {:g} mm/s",
+    "step_height": "step height {:g} mm",
+    "standing_height": "standing height {:g} mm",
+    "lift_time": "lift time {:g} ms",
+    "landing_time": "landing time {:g} ms",
+    "load": "load {:g} times the weight",
+    "centre_of_mass": "centre of mass {:g} mm ahead of O",
+    "leg_mass": "legs' mass x {:g}",
+    "friction": "friction {:g}",
+    "grasp": "grasp {:g}",
+    "ground": "ground: {}",
+    "ground_height": "{:g} mm high",
+    "ground_at": "obstacle at {:g} mm",
+    "ground_length": "{:g} mm long",
+    "ground_seed": "seed {:g} of the bumps",
+    "longest_substep": "physics steps of at most {:g} ms",
+    "contact_gap": "contact gap {:g} ms",
+    "settling_time": "settling {:g} ms",
+    "body": "body {}",
 }
-"""What tells the measures apart where colours are not seen."""
+"""Condition -> its text in a caption."""
 
-BESIDE = 0.024
-"""Width in V_r / V_p over which the points of one velocity stand beside each other."""
+STRIDE = {"aep0": "AEP$_0$ = {:g} mm", "pep0": "PEP$_0$ = {:g} mm", "pep_min": "PEP_min = {:g} mm", "dt": "dt = {:g}"}
+"""Field of a stride -> its text in a caption."""
 
-IN_A_ROW = 3
-"""Panels of controllers beside each other, at most."""
+FEW = 3
+"""Most controllers that a caption names."""
 
-MOST_TICKS = 9
-"""Velocities that are written at an axis; of more, round numbers are."""
+COLUMNS = 3
+"""Most panels beside each other."""
 
 
-def comparison_figure(result: "xr.Dataset") -> "Picture":
-    """FLSS against velocity with 95 % intervals, a panel for each controller, from `compare.compare`."""
-    from hexmj.pictures import head, picture
+def caption(result: "xr.Dataset") -> str:
+    """Return a line for a figure's title: controllers, starts, observation time, V_p, and what differs from defaults."""
+    made = settings(result)
+    axis = next((result[name].values for name in ("controller", "entrant") if name in result.coords), None)
+    names = None if axis is None else np.ravel(axis).tolist()
+    physical = conditions_in_words(made) if made.get("physical", True) else ""
+    return "; ".join(
+        filter(None, [_controllers(made, names), *_walks(made), _stride(made.get("stride") or {}), physical])
+    )
 
-    check_starts(result)
+
+def caption_of_at_least(least: int, result: "xr.Dataset") -> str:
+    """Return the caption with the least number of starts that a frequency counts, if that is not all."""
+    more = "" if least == result.attrs.get("starts") else f"; frequencies of at least {least} of them"
+    return caption(result) + more
+
+
+def starts_in_words(number: int) -> str:
+    """Return a number of starts as a text."""
+    return "1 start" if number == 1 else f"{number} starts"
+
+
+def conditions_in_words(made: Mapping[str, Any]) -> str:
+    """Return V_p and the conditions that are not defaults, from a result's settings; empty for a kinematic result."""
+    given = made.get("conditions") or {}
+    shown = {"vp", *unusual(given)} & given.keys()
+    return ", ".join(_unbroken(TERMS[name].format(given[name])) for name in TERMS if name in shown)
+
+
+def not_printed(controllers: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return the networks that do not plan as printed in 1998: order and model variant -> names, from settings by name."""
+    found: dict[str, list[str]] = {}
+    for name, controller in controllers.items():
+        if words := network_rules(controller):
+            found.setdefault(words, []).append(name)
+    return found
+
+
+def network_rules(controller: Any) -> str:
+    """Return the order of updates and the model variant of a network that are not as printed, from its settings."""
+    if not isinstance(controller, Mapping):
+        return ""
+    if "controller" in controller:
+        return network_rules(controller["controller"])
+    from hexmj.controllers.cruse1998.model_variants import ModelVariant, in_words
+
+    choices, variant = {field.name for field in fields(ModelVariant)}, controller.get("model_variant")
+    if "order" not in controller or not isinstance(variant, Mapping) or not choices <= variant.keys():
+        return ""  # another controller, such as Walknet
+    found = [f"{controller['order']} order"] if controller["order"] != "printed" else []
+    chosen = ModelVariant(**{name: variant[name] for name in choices})
+    return ", ".join(found + ([f"model variant {in_words(chosen)}"] if chosen != ModelVariant() else []))
+
+
+def comparison_figure(result: "xr.Dataset") -> "Figure":
+    """Draw FLSS against velocity with 95 % intervals, a panel for each controller, from `compare`."""
     names = result.controller.values
-    columns = min(IN_A_ROW, len(names))
+    columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
     figure = picture(max(5.6, 3.4 * columns), 1.3 + 2.7 * rows)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    shifts = dict(zip(MEASURE_COLOURS, np.linspace(-0.5, 0.5, len(MEASURE_COLOURS)) * BESIDE, strict=True))
+    shifts = np.linspace(-0.5, 0.5, len(MEASURE_STYLES)) * BESIDE
     for axes, name in zip(panels.ravel(), names, strict=False):
-        one = result.sel(controller=name).sortby("velocity")
-        for measure, colour in MEASURE_COLOURS.items():
-            style = {"color": colour, "label": measure, "markersize": 4.5} | MEASURE_STYLES[measure]
-            frequency_curve(axes, one.velocity + shifts[measure], one, measure, **style)
+        data = result.sel(controller=name).sortby("velocity")
+        for (measure, style), shift in zip(MEASURE_STYLES.items(), shifts, strict=True):
+            frequency_curve(axes, data.velocity + shift, data, measure, label=measure, **{"markersize": 4.5} | style)
         axes.set_title(in_figure(name), fontsize=10)
         flss_axes(axes, result.velocity.values)
     for n, axes in enumerate(panels.ravel()):
         axes.set_visible(n < len(names))
-        axes.tick_params(labelbottom=n + columns >= len(names))
-        axes.set(xlabel=axes.get_xlabel() if n + columns >= len(names) else "", ylabel="" if n % columns else "FLSS")
+        lowest = n + columns >= len(names)
+        axes.tick_params(labelbottom=lowest)
+        axes.set(xlabel=axes.get_xlabel() if lowest else "", ylabel="" if n % columns else "FLSS")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
-    title = "Loss of static stability on paper (kinematic) and under the feet (measured); falls (physical)"
-    head(figure, title, caption(result))
+    head(figure, "Loss of static stability: kinematic, and measured under the feet; physical: falls", caption(result))
     return figure
 
 
-def flss_figure(table: "xr.Dataset") -> "Picture":
-    """One curve of FLSS against velocity with its 95 % intervals, from `kinematic.flss` or `compare.physical_flss`."""
-    from hexmj.pictures import head, picture
-
-    check_starts(table)
-    figure, told = picture(6.4, 4.2), settings(table)
-    kind = "physical" if conditions(told) else "kinematic"
-    if ("fall" in table) != (kind == "physical") or (kind == "physical" and table.fall.isnull().any()):
-        raise InputError("a result of kinematic and of physical FLSS; expected one of them")
-    axes = figure.subplots()
-    style = {"color": MEASURE_COLOURS[kind], "markersize": 4.5} | MEASURE_STYLES[kind]
-    named = table.rename(low="flss_low", high="flss_high").sortby("velocity")
-    frequency_curve(axes, named.velocity, named, "flss", **style)
-    flss_axes(axes, table.velocity.values)
-    head(figure, f"{kind} FLSS with 95 % intervals", caption(table))
+def flss_figure(result: "xr.Dataset") -> "Figure":
+    """Draw FLSS against velocity with 95 % intervals, from `flss` or `physical_flss`."""
+    figure, kind = picture(6.4, 4.2), "physical" if "fall" in result else "kinematic"
+    axes, data = figure.subplots(), result.rename(low="flss_low", high="flss_high").sortby("velocity")
+    frequency_curve(axes, data.velocity, data, "flss", **{"markersize": 4.5} | MEASURE_STYLES[kind])
+    flss_axes(axes, result.velocity.values)
+    head(figure, f"{kind} FLSS with 95 % intervals", caption(result))
     return figure
 
 
-def velocity_ticks(axes: "Axes", velocities: np.ndarray) -> None:
-    """Ticks at the velocities that were walked, unless they are too many to be read."""
-    if len(velocities) <= MOST_TICKS:
-        axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
+def _controllers(made: Mapping[str, Any], names: Iterable[str] | None) -> str:
+    """Return the names of a few controllers with what is not as printed in 1998, or only the latter for many."""
+    every = made.get("controllers", {})
+    shown = {name: every.get(name) for name in names if name in every} if names is not None else every
+    if len(shown) > FEW:
+        rules = not_printed(shown)
+        return "; ".join(f"{words}: {', '.join(map(in_figure, found))}" for words, found in rules.items())
+    rules = {name: network_rules(controller) for name, controller in shown.items()}
+    return ", ".join(in_figure(name) + (f" ({words})" if words else "") for name, words in rules.items())
 
 
-def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
-    """Axes of FLSS against velocity."""
-    low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
-    axes.set(xlabel="velocity $V_r / V_p$", xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
-    velocity_ticks(axes, velocities)
-    tidy(axes)
+def _walks(made: Mapping[str, Any]) -> list[str]:
+    """Return starts, observation time, seed and acceleration, as far as a result has them."""
+    time = made.get("observation_time")
+    words = [starts_in_words(made["starts"])] if "starts" in made else []
+    if time is not None:
+        words.append(f"observation time {f'of {time:g} time units' if isinstance(time, float) else time}")
+    words += [f"seed {made['seed']}"] if "seed" in made else []
+    if acceleration := made.get("acceleration"):
+        words.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
+    return words
 
 
-def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", one: "xr.Dataset", name: str, **style: Any) -> None:
-    """One of a result's frequencies, `name`, with its interval `_low`, `_high`, against x, all of one dimension, in the
-    style of `Axes.errorbar`."""
-    low, middle, high = (one[name + end].values for end in ("_low", "", "_high"))
-    dots: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
-    axes.errorbar(x, middle, [middle - low, high - middle], **dots | style)
+def _stride(stride: Mapping[str, Any]) -> str:
+    """Return what differs from the default stride."""
+    usual = asdict(Stride())
+    words = [word.format(stride[name]) for name, word in STRIDE.items() if stride.get(name, usual[name]) != usual[name]]
+    lines = {name: [*values] for name, values in usual["geometry"].items()}
+    words += ["other lines of the tips"] if stride.get("geometry", lines) != lines else []
+    return ", ".join(map(_unbroken, words))
 
 
-def tidy(axes: "Axes") -> None:
-    """A grid, and no frame above and on the right."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.9", linewidth=0.8)
+def _unbroken(text: str) -> str:
+    """Keep a number and its unit in one line."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")

@@ -12,7 +12,6 @@ from hexmj.controllers.checked_plans import begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss, walk
-from hexmj.measures.walk_settings import WalkSettings
 from hexmj.physics.drive import Push, drive
 from hexmj.physics.measured import feet_on_ground, measured_walk
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
@@ -145,12 +144,6 @@ def physical_walk(
         plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
         settled = settle(starts, conditions, stride, threads)
         return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=told)
-
-
-def walk_of_settings(walks: WalkSettings, starts: np.ndarray, threads: int | None) -> PhysicalWalk:
-    """The same as a sweep's cell is told, of some of its starts, (start, leg) [mm]."""
-    how: Any = {"conditions": walks.conditions, "stride": walks.stride, "acceleration": walks.acceleration}
-    return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, threads=threads)
 
 
 def physical_walk_of_plan(

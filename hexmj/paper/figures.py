@@ -11,7 +11,7 @@ import numpy as np
 
 from hexmj.diagrams import spans
 from hexmj.legs import LEGS
-from hexmj.measures.velocities import VELOCITY
+from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import Measured, kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
@@ -190,7 +190,7 @@ def _samples(lost: "xr.DataArray") -> "xr.Dataset":
 
 
 def _figure(width: float, height: float) -> "Figure":
-    from hexmj.pictures import picture
+    from hexmj.plotting import picture
 
     return picture(width, height)
 

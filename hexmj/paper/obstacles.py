@@ -11,9 +11,7 @@ import numpy as np
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import SteerableController
-from hexmj.studies.disturbance.disturbances import disturbance_of, find_stable_starts
-from hexmj.studies.disturbance.plan import Disturbed, DisturbedPlan
-from hexmj.studies.disturbance.strategies import collect_postures
+from hexmj.studies.disturbed_walks import Disturbed, DisturbedPlan, collect_postures, disturbance_of, find_stable_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:

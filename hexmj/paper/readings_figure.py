@@ -4,13 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.measures.figures import tidy
 from hexmj.paper.readings import CALIBRATED, CHOICES, agreeing, choice_in
+from hexmj.plotting import tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hexmj.pictures import Picture
+    from matplotlib.figure import Figure
 
 WORDS = {
     "order": "order\nof updates",
@@ -23,11 +22,11 @@ OBSERVATION_TIMES = {"walk": ("#1b6ca8", "o", "-"), "start": ("#e08e1b", "^", (0
 """Colour of each, its marker and the line of its mean."""
 
 
-def readings_figure(scores: "xr.Dataset") -> "Picture":
+def readings_figure(scores: "xr.Dataset") -> "Figure":
     """Held-out claims that agree, a dot for every reading and observation time, by each choice; bars are means."""
     from matplotlib.lines import Line2D
 
-    from hexmj.pictures import head, picture
+    from hexmj.plotting import head, picture
 
     figure = picture(11.0, 4.4)
     panels = figure.subplots(1, len(CHOICES), sharey=True, width_ratios=[len(one) for one in CHOICES.values()])

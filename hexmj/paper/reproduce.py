@@ -11,7 +11,7 @@ from hexmj.controllers.cruse1998.model_variants import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.io import json_text, results_folder, save
-from hexmj.measures.velocities import VELOCITY
+from hexmj.measures.tables import VELOCITY
 from hexmj.paper.claims import CLAIMS, Claim
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of

@@ -2,13 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from hexmj.measures.figures import tidy
-from hexmj.pictures import in_figure
+from hexmj.plotting import in_figure, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hexmj.pictures import Picture
+    from matplotlib.figure import Figure
 
 FREQUENCY = "FLSS"
 """What a cost is, unless something else is minimised."""
@@ -16,9 +14,9 @@ FREQUENCY = "FLSS"
 STAGE_COLOURS = {"population": "#1b6ca8", "simplex": "#b3261e"}
 
 
-def convergence_figure(history: "xr.Dataset") -> "Picture":
+def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Every candidate's cost and the least so far against the number of evaluations, from `history.history`."""
-    from hexmj.pictures import head, picture
+    from hexmj.plotting import head, picture
 
     figure = picture(6.8, 4.2)
     axes = figure.subplots()

@@ -1,0 +1,169 @@
+"""Tables of results: axes, frequencies with 95 % intervals, and the settings that a result records."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.controllers.protocol import Controller, settings_of
+from hexmj.starts import SAMPLE, checked_list
+from hexmj.stats import paired_difference, wilson_intervals
+from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_duration, steps_within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FRESH = 17
+"""A seed on whose starts no preset was searched."""
+
+PERIODS = 40
+"""Cycles of every leg until its steady-state gait is measured."""
+
+VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
+"""Attributes of an axis of velocities."""
+
+Dims = tuple[str, ...]
+
+
+def reach(stride: Stride) -> tuple[float, float]:
+    """Distance ahead of O that a front foot can have, and distance behind O that a hind foot can have [mm]."""
+    origin = stride.geometry.origin
+    return max(origin) + stride.aep0, -(min(origin) + stride.pep_min)
+
+
+def observed(
+    velocities: Sequence[float] | float,
+    observation_time: str | float,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the velocities of a table and their observation times [time units], both (velocity,).
+
+    Raises:
+        InputError: a velocity is out of range, occurs twice or is not reached within its time, or a time is too short.
+    """
+    v = checked_list(np.atleast_1d(velocities).tolist(), acceleration)
+    check_reached(v, stride, acceleration)
+    duration = observation_duration(observation_time, v, stride, acceleration)
+    check_in_time(v, duration, acceleration)
+    steps_within(duration, stride)
+    return v, duration
+
+
+def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
+    """Return the coordinates for velocities and their observation times, both (velocity,)."""
+    return {
+        "velocity": ("velocity", v, VELOCITY),
+        "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
+    }
+
+
+def settings(
+    controllers: Mapping[str, Controller],
+    observation_time: str | float,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None,
+) -> dict[str, Any]:
+    """Return what is needed to repeat a measure as plain data; every result records it."""
+    return {
+        "controllers": {name: settings_of(controller) for name, controller in controllers.items()},
+        "observation_time": observation_time,
+        "starts": n_starts,
+        "seed": seed,
+        "stride": asdict(stride),
+        "acceleration": asdict(acceleration) if acceleration else None,
+    }
+
+
+def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str] = {}) -> "xr.Dataset":
+    """Return a table of columns, (start,) each; a column without a unit is a plain number."""
+    import xarray as xr
+
+    return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})
+
+
+def losses_by_sample(lost: np.ndarray, first: int = 0) -> np.ndarray:
+    """Count losses in each sample of 1000 starts.
+
+    Args:
+        lost: (velocity, start), of the starts from `first` on.
+        first: index of the first start; the samples at both ends may have fewer starts.
+
+    Returns:
+        (velocity, sample).
+    """
+    begin = np.arange(-(first % SAMPLE), lost.shape[1], SAMPLE).clip(0)
+    return np.add.reduceat(lost, begin, axis=1, dtype=int)
+
+
+def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
+    """Return FLSS with its intervals over velocity, from the losses in each sample, (velocity, sample)."""
+    import xarray as xr
+
+    total = losses.sum(axis=1)
+    low, high = wilson_intervals(total, n_starts)
+    samples = losses[:, : n_starts // SAMPLE] / SAMPLE
+    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
+    columns = {
+        "flss": (total / n_starts, "frequency of the loss of static stability"),
+        "low": (low, "lower end of the 95 % Wilson interval"),
+        "high": (high, "upper end of the 95 % Wilson interval"),
+        "sample_sd": (spread, "standard deviation over samples of 1000 starts"),
+    }
+    table = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
+    return xr.Dataset(table).assign(velocity_axis(velocities, duration))
+
+
+def happened(time: "xr.DataArray") -> "xr.DataArray":
+    """Return whether an event took place: 1 or 0, and NaN where the walk failed."""
+    return (time < np.inf).where(time.notnull())
+
+
+def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:
+    """Return events of each start, 0 or 1, as one array (row, column, start), with NaN for missing starts."""
+    cells = [[np.asarray(cell, dtype=float) for cell in row] for row in rows]
+    array = np.full((len(cells), len(cells[0]), max(len(cell) for row in cells for cell in row)), np.nan)
+    for i, row in enumerate(cells):
+        for j, cell in enumerate(row):
+            array[i, j, : len(cell)] = cell
+    return array
+
+
+def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
+    """Return a frequency with its 95 % Wilson interval, as variables.
+
+    Args:
+        name: of the frequency; the interval is `name_low`, `name_high`.
+        events: (..., start), 0 or 1; NaN does not count.
+        dims: names of the axes before `start`.
+    """
+    starts, count = np.isfinite(events).sum(axis=-1), np.nansum(events, axis=-1)
+    with np.errstate(invalid="ignore"):
+        return columns(name, dims, count / starts, *wilson_intervals(count, starts))
+
+
+def frequencies(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
+    """Return what `frequency` does, and the number of starts, `name_starts`."""
+    starts = np.isfinite(events).sum(axis=-1)
+    return frequency(name, events, dims) | {f"{name}_starts": (dims, starts, {"units": "1"})}
+
+
+def differences(name: str, events: np.ndarray, others: np.ndarray, dims: Dims) -> dict[str, Any]:
+    """Return how much more frequent events are than others on the same starts, with the 95 % interval.
+
+    Args:
+        name: of the difference; the interval is `name_low`, `name_high`.
+        events: (..., start), 0 or 1; NaN does not count.
+        others: broadcasts to the shape of `events`.
+        dims: names of the axes before `start`.
+    """
+    return columns(name, dims, *paired_difference(events, np.broadcast_to(others, events.shape)))
+
+
+def columns(name: str, dims: Dims, *values: np.ndarray) -> dict[str, Any]:
+    """Return a number and the ends of its interval as the variables `name`, `name_low` and `name_high`."""
+    ends = zip(("", "_low", "_high"), values, strict=True)
+    return {f"{name}{end}": (dims, number, {"units": "1"}) for end, number in ends}

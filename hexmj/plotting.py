@@ -1,0 +1,145 @@
+"""Figures: those that belong to results, and what they share. Figures are made without pyplot."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.errors import InputError
+from hexmj.validate import choice
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FIGURES: dict[str, dict[str, str]] = {
+    "flss": {"flss": "measures.figures:flss_figure"},
+    "compare": {"comparison": "measures.figures:comparison_figure"},
+    "map": {
+        "map": "studies.stability_map:map_figure",
+        "mechanisms": "studies.stability_map:mechanisms_figure",
+    },
+    "converge": {"converge": "studies.static_limit:static_limit_figure"},
+    "terrain": {"terrain": "studies.terrain:terrain_figure"},
+    "disturb": {"disturb": "studies.disturbance:disturbed_figure"},
+    "biology": {"biology": "studies.biology:biology_figure"},
+    "league": {"league": "studies.league_figure:league_figure", "walks": "studies.league_figure:walks_figure"},
+    "ablate": {"ablation": "studies.ablation:ablation_figure"},
+    "model_variants": {"model_variants": "paper.readings_figure:readings_figure"},
+    "search": {"convergence": "search.convergence:convergence_figure"},
+    "recording": {"walk": "replay.footfall:walk_figure"},
+}
+"""Attribute `study` of a result -> its figures by name, each a module and a function of it."""
+
+CURVE: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
+"""Style of points with intervals."""
+
+BESIDE = 0.024
+"""Width in V_r / V_p over which the points of one velocity stand beside each other."""
+
+MOST_TICKS = 9
+"""Most velocities that are written at an axis; for more, matplotlib chooses round numbers."""
+
+MEASURE_STYLES: dict[str, dict[str, Any]] = {
+    "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
+    "measured": {"color": "#e08e1b", "marker": "s", "linestyle": "--"},
+    "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-."},
+    "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":"},
+}
+"""Styles of the measures, which differ without colours too."""
+
+
+def plot(result: "xr.Dataset", which: str | None = None) -> "Figure":
+    """Draw a result. A notebook shows the figure, and its method `savefig` writes PNG, PDF or SVG.
+
+    Args:
+        result: of `compare`, `flss`, `physical_flss`, `record` or a study, fresh or as `load` reads it.
+        which: name of the figure, if there are several; by default the first.
+
+    Raises:
+        InputError: no figure belongs to the dataset, or none has this name.
+    """
+    study = "recording" if "planned_stance" in result else str(result.attrs.get("study", ""))
+    if study not in FIGURES:
+        raise InputError(f"A dataset of {study or 'no study'} has no figure; results of {', '.join(FIGURES)} have one")
+    figures = FIGURES[study]
+    module, function = figures[choice("which", which or next(iter(figures)), figures)].split(":")
+    draw: Callable[[xr.Dataset], Figure] = getattr(import_module(f"hexmj.{module}"), function)
+    return draw(result.compute())
+
+
+@contextmanager
+def as_shipped() -> Iterator[None]:
+    """Use matplotlib's own defaults inside the context, so that commands draw the same everywhere."""
+    from matplotlib import rc_context, rcdefaults
+
+    with rc_context():
+        rcdefaults()
+        yield
+
+
+def picture(width: float, height: float) -> "Figure":
+    """Return an empty figure of a size in inches, which notebooks show, and whose parts make room for each other."""
+    return _picture_type()(figsize=(width, height), layout="constrained")
+
+
+@cache
+def _picture_type() -> "type[Figure]":
+    from matplotlib.figure import Figure
+
+    class Picture(Figure):
+        def _repr_png_(self) -> bytes:
+            drawn = BytesIO()
+            self.savefig(drawn, format="png", dpi=100)
+            return drawn.getvalue()
+
+    return Picture
+
+
+def head(figure: "Figure", *lines: str) -> None:
+    """Set the title of a figure. Empty lines are left out, and long ones are wrapped."""
+    figure.suptitle("\n".join(filter(None, lines)), fontsize=10, wrap=True)
+
+
+def in_figure(text: str) -> str:
+    """Return a text in which dollars do not begin a formula."""
+    return text.replace("$", r"\$")
+
+
+def tidy(axes: "Axes") -> None:
+    """Draw a grid, and no frame above and on the right."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", linewidth=0.8)
+
+
+def velocity_ticks(axes: "Axes", velocities: Sequence[float] | np.ndarray) -> None:
+    """Put ticks at the velocities, unless they are too many to be read."""
+    if len(velocities) <= MOST_TICKS:
+        axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
+
+
+def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
+    """Set up axes of FLSS against velocity."""
+    low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
+    axes.set(xlabel="velocity $V_r / V_p$", xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
+    velocity_ticks(axes, velocities)
+    tidy(axes)
+
+
+def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", data: "xr.Dataset", name: str, **style: Any) -> None:
+    """Draw a frequency with its interval against x.
+
+    Args:
+        axes: to draw in.
+        x: (n,).
+        data: holds `name`, `name_low` and `name_high`, (n,) each.
+        name: of the frequency.
+        style: options of `Axes.errorbar`.
+    """
+    low, middle, high = (data[name + end].values for end in ("_low", "", "_high"))
+    axes.errorbar(x, middle, [middle - low, high - middle], **CURVE | style)

@@ -1,0 +1,341 @@
+"""The walking insect beside measured insects: forces, torques, gait, posture and work, with the sources of figures.
+
+Ranges are those of the sources, which say how words were read; NaN stands where no figure was found.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.io import markdown_table
+from hexmj.measures.figures import caption
+from hexmj.phases import unrolled
+from hexmj.plotting import CURVE, head, picture, tidy
+from hexmj.studies.base import Study
+from hexmj.studies.quantities import JOINTS, PHASES, SEGMENTS, UNITS, quantity_table
+from hexmj.sweep import Cell
+from hexmj.validate import whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Verdict = Literal["within", "below", "above", "no figure found", "none measured"]
+
+SOURCES = {
+    "motion capture": "one adult female Carausius morosus, public data of Theunissen and Duerr: phases, way of a step,"
+    " and swings that last 0.10 to 0.16 of the period and 0.14 to 0.17 s, from which period and duty factor follow;"
+    " coxae 'about' 12, 10, 8 mm high, read as 1 mm more or less",
+    "Graham 1983": "J. exp. Biol. 104, 129, Introduction: in Carausius the least velocity of a leg's cycle is 'usually"
+    " close to zero', read as at most a tenth of the mean",
+    "Full et al. 1991": "Full, Blickhan, Ting, J. exp. Biol. 158, 369, Summary: the cockroach Blaberus runs; first legs"
+    " brake, third legs drive, second do both, vertical peaks are equal, forces point to the coxae",
+    "Dallmann et al. 2016": "Dallmann, Duerr, Schmitz, Proc. R. Soc. B 283, 20151708, abstract: Carausius is driven by"
+    " depression torques about the coxa-trochanter joint, read as more than half of the work",
+    "Zill et al. 2018": "Zill, Dallmann, Bueschges, Chaudhry, Schmitz, J. Neurophysiol. 120, 1807, abstract: forces in"
+    " the course of joint torques of freely walking stick insects; the coxa-trochanter's stands in Szczecinski's code"
+    " (nss36/campaniformSensillaModeling, CTrTorqueWaveform.csv), scaled, of no named leg: 0.784 s from zero to zero,"
+    " read as a stance, past half its peak from 0.132 to 0.710 s, greatest at 0.432 s",
+    "Full et al. 1990": "Full, Zuccarello, Tullis, J. exp. Biol. 150, 233, abstract: 4.6 to 8.5 ml oxygen / g / km of a"
+    " beetle, a cricket and a cockroach, at 20.1 J/ml; metabolic, so an upper bound",
+    "Full, Tu 1990": "J. exp. Biol. 148, 129, abstract: Blaberus at 80 to 660 mm/s",
+    "not read": "measured in walking Carausius by Cruse 1976 and Dallmann et al. 2016, whose figures we have not seen",
+    "": "",
+}
+"""Short name -> source."""
+
+ANY = math.inf
+"""Bound of a quantity of which only the sign is known."""
+
+STEP = 16.0, 20.0  # mm
+SWING_SHARE, SWING_REST = (0.10, 0.16), (0.14, 0.17)  # of the period, s
+SEEN_PHASES = {22.0: (0.60, 0.69), 31.0: (0.54, 0.61), 38.0: (0.50, 0.53)}  # at mm/s
+COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # mm, "about"
+ABOUT, APART = 1.0, 28.5  # mm: how "about" is read, and front from hind coxae
+OXYGEN = 20.1  # J/ml
+STANCE = 0.784  # s
+PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # %
+
+SPEED = 24.0
+"""Default speed [mm/s]; V = 0.3 at V_p = 80 mm/s."""
+
+
+@dataclass(frozen=True)
+class Animal:
+    """A quantity as measured in insects; NaN without a figure."""
+
+    quantity: str
+    """Name in `quantities.UNITS`."""
+    low: float = math.nan
+    high: float = math.nan
+    source: str = ""
+    """A key of `SOURCES`."""
+    speed: float = SPEED
+    """Speed at which the model is measured [mm/s]."""
+    depends: bool = False
+    """Whether the animals' figure holds at this speed only."""
+    built_in: bool = False
+    """Whether the body or V_p was chosen by it, so that agreement shows nothing."""
+
+    def verdict(self, value: float) -> Verdict:
+        """Compare a mean of the model; NaN if it was measured in no start."""
+        if math.isnan(self.low) or math.isnan(value):
+            return "no figure found" if math.isnan(self.low) else "none measured"
+        return "below" if value < self.low else "above" if value > self.high else "within"
+
+
+def timing(speed: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the least and the greatest period [s] and duty factor at a speed [mm/s], from a stance of s / v."""
+    (short, long), (share, most), (rest, slowest) = ([x / speed for x in STEP], SWING_SHARE, SWING_REST)
+    period = (short + rest) / (1.0 - share), (long + slowest) / (1.0 - most)
+    duty = short * (1.0 - most) / (short + slowest), long * (1.0 - share) / (long + rest)
+    return period, duty
+
+
+def _each(name: str, low: float = math.nan, high: float = math.nan, source: str = "") -> list[Animal]:
+    """Return a row for each pair of legs."""
+    return [Animal(f"{name}, {segment}", low, high, source) for segment in SEGMENTS]
+
+
+_SEEN = "motion capture"
+_SLOPES = [math.degrees(math.atan2(COXAE["front"] - COXAE["hind"] + off, APART)) for off in (-2 * ABOUT, 2 * ABOUT)]
+
+ANIMALS = (
+    *_each("vertical impulse", source="not read"),
+    Animal("fore-aft impulse, front", -ANY, 0.0, "Full et al. 1991"),
+    Animal("fore-aft impulse, middle", source="Full et al. 1991"),
+    Animal("fore-aft impulse, hind", 0.0, ANY, "Full et al. 1991"),
+    *_each("inward impulse", 0.0, ANY, "Full et al. 1991"),
+    *_each("vertical peak of a leg", source="not read"),
+    Animal("vertical peaks: greatest over least", 1.0, 1.0, "Full et al. 1991"),
+    *(row for joint in JOINTS for row in _each(f"{joint} torque", source="not read")),
+    *(row for end, at in PAST_HALF.items() for row in _each(f"{PAST} {end}", at, at, "Zill et al. 2018")),
+    Animal("work of standing legs at the coxa-trochanter", 50.0, 100.0, "Dallmann et al. 2016"),
+    *(Animal(f"{joint} torque against its movement", source="not read") for joint in JOINTS),
+    *(Animal("phase, ipsilateral", *seen, _SEEN, speed, depends=True) for speed, seen in SEEN_PHASES.items()),
+    *(Animal("phase, contralateral", 0.56, 0.63, _SEEN, speed, depends=True) for speed in SEEN_PHASES),
+    *(Animal("duty factor", *timing(speed)[1], _SEEN, speed, depends=True) for speed in SEEN_PHASES),
+    *(Animal("period", *timing(speed)[0], _SEEN, speed, depends=True) for speed in SEEN_PHASES),
+    Animal("way of a standing foot", *STEP, _SEEN),
+    *(Animal(f"height of the coxae, {pair}", h - ABOUT, h + ABOUT, _SEEN, built_in=True) for pair, h in COXAE.items()),
+    Animal("pitch of the thorax", min(_SLOPES), max(_SLOPES), _SEEN, built_in=True),
+    Animal("pitch, range over the strides"),
+    Animal("height of the centre of mass, range over the strides"),
+    Animal("ripple: least over mean speed", 0.0, 0.1, "Graham 1983"),
+    Animal("cost of transport, positive work"),
+    Animal("cost of transport, all work"),
+    Animal("positive work of the joints", 4.6 * OXYGEN, 8.5 * OXYGEN, "Full et al. 1990"),
+    Animal("work on the centre of mass", 0.9, 0.9, "Full, Tu 1990"),
+)
+"""The rows of the table."""
+
+SPEEDS = tuple(sorted({row.speed for row in ANIMALS}))
+"""Speeds at which the model is measured [mm/s]."""
+
+MEASURED = 3
+"""Periods of a single leg at the end of a walk that are measured, as far as they are whole strides."""
+
+HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
+"""Heads of the table."""
+
+OURS, INSECTS = "#1b6ca8", "#e08e1b"
+COLOURS = ("#1b6ca8", "#2a9d5c", "#6a4c93")
+"""Colours of directions or joints in turn."""
+
+OVER_SPEED = {
+    "phase, ipsilateral": "ipsilateral phase",
+    "duty factor": "duty factor",
+    "period": "period [s]",
+    "ripple: least over mean speed": "least over mean speed",
+}
+"""Quantity -> label of its axis."""
+
+BARS = {
+    "force on both legs [% of the weight]": ("vertical impulse", "fore-aft impulse", "inward impulse"),
+    "torque of a standing leg [mN mm]": tuple(f"{joint} torque" for joint in JOINTS),
+}
+"""Label of an axis -> quantities that stand side by side for each pair of legs."""
+
+
+@dataclass(frozen=True)
+class Biology(Study):
+    """The same starts at every speed at which the animal was measured."""
+
+    controller: Controller
+    """Controller that plans the walks."""
+    periods: int = 30
+    """Periods of a single leg that each start walks; the last three are measured."""
+    n_starts: int = field(default=20, kw_only=True)
+    """Number of random starts, the same at every speed."""
+
+    hidden: ClassVar[tuple[str, ...]] = (
+        "grasp", "ground", "ground_height", "ground_at", "ground_length", "ground_seed",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        whole("periods", self.periods, MEASURED + 1, 1000)
+        if not max(SPEEDS) < self.conditions.vp:
+            raise InputError(f"vp = {self.conditions.vp}; expected more than the fastest walk, {max(SPEEDS):g} mm/s")
+        super().__post_init__()
+
+    @property
+    def velocities(self) -> list[float]:
+        """V_r at each speed."""
+        return np.divide(SPEEDS, self.conditions.vp).tolist()
+
+    def cells(self) -> list[Cell]:
+        """Return a cell for each speed."""
+
+        def cell(speed: float, velocity: float) -> Cell:
+            period = float(self.stride.periods(velocity))
+            walks = self.walks(velocity, self.periods * period, self.conditions)
+            return Cell(
+                f"{speed:g}-mm-s", quantity_table, {"walks": walks, "measured": MEASURED * period}, 1 / velocity
+            )
+
+        self.check_walks(self.velocities)
+        return [cell(*pair) for pair in zip(SPEEDS, self.velocities, strict=True)]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return the quantities of the model beside those of the animals.
+
+        Returns:
+            Over (speed, quantity, start): `value`, NaN where a start fell or made no whole stride. Over row, one for
+            each of `ANIMALS`: `name`, `unit`, the speed `at` which it holds and whether it `depends` on it; `mean` over
+            the starts with its 95 % interval `low`, `high`; `animal_low`, `animal_high` and `source`; the `verdict` on
+            the mean, and whether it was `built_in`; and the number of starts that `walked`.
+        """
+        import xarray as xr
+
+        table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
+        values = [table.value.sel(speed=row.speed, quantity=row.quantity).values for row in ANIMALS]
+        ours = [_mean(starts, row.quantity) for starts, row in zip(values, ANIMALS, strict=True)]
+        columns = {
+            "name": [row.quantity for row in ANIMALS],
+            "unit": [UNITS[row.quantity] for row in ANIMALS],
+            "at": [row.speed for row in ANIMALS],
+            "depends": [row.depends for row in ANIMALS],
+            **dict(zip(("mean", "low", "high"), np.transpose(ours), strict=True)),
+            "animal_low": [row.low for row in ANIMALS],
+            "animal_high": [row.high for row in ANIMALS],
+            "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
+            "built_in": [row.built_in for row in ANIMALS],
+            "source": [row.source for row in ANIMALS],
+            "walked": [np.count_nonzero(np.isfinite(starts)) for starts in values],
+        }
+        measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
+        units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
+        rows = {name: ("row", column, {"units": units[name]}) for name, column in columns.items()}
+        own = {"observation_time": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
+        return self.labelled(table.assign(rows), "biology", **own)
+
+
+def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
+    """Return the mean of the known values and its 95 % interval by Student's t; phases may go beyond 0 or 1."""
+    from scipy.special import stdtrit
+
+    known = unrolled(values) if (phase := quantity in PHASES) else values
+    known = known[np.isfinite(known)]
+    if len(known) < 2:
+        return (float(known.mean()) if len(known) else np.nan), np.nan, np.nan
+    middle, half = known.mean(), stdtrit(len(known) - 1, 0.975) * known.std(ddof=1) / np.sqrt(len(known))
+    middle = middle % 1.0 if phase else middle
+    return middle, middle - half, middle + half
+
+
+def walked(result: "xr.Dataset") -> dict[float, int]:
+    """Return the number of starts that walked whole strides at each speed [mm/s]."""
+    count = result.value.sel(quantity="speed").notnull().sum("start")
+    return dict(zip(result.speed.values.tolist(), count.values.tolist(), strict=True))
+
+
+def walked_in_words(result: "xr.Dataset") -> str:
+    """Return `walked` as a text."""
+    return ", ".join(f"{n} of {result.sizes['start']} at {speed:g} mm/s" for speed, n in walked(result).items())
+
+
+def table_rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the table under `HEADS`."""
+    for n in range(result.sizes["row"]):
+        row = {name: result[name].values[n] for name in result.data_vars if result[name].dims == ("row",)}
+        at = f" at {row['at']:g} mm/s" if row["depends"] else ""
+        unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
+        interval = f" ({row['low']:.3g} to {row['high']:.3g})" if row["low"] < row["high"] else ""
+        insects = _range(row["animal_low"], row["animal_high"])
+        verdict = row["verdict"] + (", built in" if row["built_in"] else "")
+        yield f"{row['name']}{at}{unit}", _range(row["mean"], row["mean"]) + interval, insects, verdict, row["source"]
+
+
+def biology_markdown(result: "xr.Dataset") -> str:
+    """Return the table and its sources as Markdown."""
+    named = {*result.source.values}
+    sources = [f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text]
+    walks = f"Starts with whole strides: {walked_in_words(result)}."
+    return "\n".join([*markdown_table(HEADS, table_rows(result)), "", walks, "", *sources]) + "\n"
+
+
+def _range(low: float, high: float) -> str:
+    """Return a range as a text; "-" if it is not known."""
+    if math.isnan(low):
+        return "-"
+    if math.isinf(low) or math.isinf(high):
+        return f"above {low:.3g}" if math.isinf(high) else f"below {high:.3g}"
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+
+
+def biology_figure(result: "xr.Dataset") -> "Figure":
+    """Draw bars for each pair of legs, and quantities over speed beside the animals' ranges."""
+    figure = picture(11.0, 6.4)
+    axes = figure.subplots(2, 3).ravel()
+    for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
+        _bars(panel, result.value.sel(speed=SPEED), names)
+        panel.set_ylabel(label)
+    for panel, (name, label) in zip(axes[2:], OVER_SPEED.items(), strict=True):
+        _over_speed(panel, result.value.sel(quantity=name), name)
+        panel.set(ylabel=label, xlabel="speed [mm/s]")
+    axes[2].legend(frameon=False, fontsize=9)
+    fewer = [f"{n} at {speed:g}" for speed, n in walked(result).items() if n < result.sizes["start"]]
+    note = f"; whole strides of {', '.join(fewer)} mm/s" if fewer else ""
+    head(figure, f"The walking insect beside measured ones; bars at {SPEED:g} mm/s", caption(result) + note)
+    return figure
+
+
+def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
+    """Draw means and standard deviations over the starts, (quantity, start), a group for each pair of legs."""
+    for n, (name, colour) in enumerate(zip(names, COLOURS, strict=True)):
+        legs = values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS])
+        label = name.removesuffix(" impulse").removesuffix(" torque")
+        style = {"color": colour, "capsize": 2, "label": label, "yerr": legs.std("start", ddof=1)}
+        axes.bar(np.arange(len(SEGMENTS)) + (n - 1) * 0.27, legs.mean("start"), 0.25, **style)
+    axes.set_xticks(range(len(SEGMENTS)), [f"{segment} legs" for segment in SEGMENTS])
+    axes.axhline(0.0, color="0.4", linewidth=0.8)
+    axes.set_xlim(-0.55, len(SEGMENTS) - 0.45)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, low + 1.35 * (high - low))  # room for the legend
+    axes.legend(frameon=False, fontsize=9, loc="upper left")
+    tidy(axes)
+    axes.set_axisbelow(True)
+
+
+def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
+    """Draw a quantity, (speed, start), and the animals' ranges, at one speed or at any."""
+    for row in ANIMALS:
+        if row.quantity == name:
+            ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
+            axes.fill_between(ends, row.low, row.high, color=INSECTS, alpha=0.5, linewidth=0)
+    mean, deviation = values.mean("start"), values.std("start", ddof=1)
+    if name in PHASES:
+        beside = values.copy(data=np.apply_along_axis(unrolled, values.get_axis_num("start"), values.values))
+        mean, deviation = beside.mean("start") % 1.0, beside.std("start", ddof=1)
+    axes.errorbar(values.speed, mean, deviation, label="ours", color=OURS, **CURVE)
+    axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
+    axes.set_xlim(20.0, 40.0)
+    if name.startswith("ripple"):
+        axes.set_ylim(min(0.0, axes.get_ylim()[0]), 1.0)
+    tidy(axes)

@@ -1,1 +1,0 @@
-"""The animal beside the machine: forces, torques, gait, posture and work."""

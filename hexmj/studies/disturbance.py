@@ -1,0 +1,279 @@
+"""Disturbed walks, kinematic and physical: the effect of a halt, a stopped leg or a push, and of three strategies.
+
+At every velocity the same starts are disturbed in the same way at the same times, whatever the strategy. They are the
+seed's first starts whose plan is stable until then.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
+
+import numpy as np
+
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.io import settings
+from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.tables import differences, frequency, velocity_axis
+from hexmj.plotting import frequency_curve, head, picture, tidy, velocity_ticks
+from hexmj.studies.base import Study
+from hexmj.studies.disturbed_walks import (
+    GRID,
+    MOST_IMPULSE,
+    NO_DISTURBANCE,
+    PHYSICAL,
+    Answer,
+    Case,
+    Kind,
+    StableWalks,
+    Strategy,
+)
+from hexmj.sweep import Cell, over_axes
+from hexmj.timing import Acceleration, check_reached, steps_within
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+OBSERVATION_TIMES = ("whole", "short")
+"""Both begin with the disturbance. `whole` ends an observation time after the walk is at its velocity again, `short`
+an observation time after the disturbance."""
+
+MEASURES = {"kinematic": "planned_loss", "physical": "fall"}
+"""Measure of FLSS -> the time whose frequency it is."""
+
+CLOSE = 1e-6
+"""Times that differ by less are equal, but for rounding [time units]."""
+
+STYLES: dict[str, dict[str, Any]] = {
+    "none": {"color": "#b3261e", "marker": "o", "linestyle": "-"},
+    "reorganise": {"color": "#1b6ca8", "marker": "s", "linestyle": "--"},
+    "slow_down": {"color": "#2a9d5c", "marker": "^", "linestyle": "-."},
+    "grasp": {"color": "#e08e1b", "marker": "D", "linestyle": (0, (5, 1))},
+}
+"""Styles of the strategies."""
+
+UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
+BESIDE = 0.05
+"""Room on both sides of the velocities."""
+
+ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
+"""Measure -> label of its row of panels."""
+
+
+@dataclass(frozen=True)
+class DisturbedWalks(Study):
+    """The same starts in every case, an undisturbed one among them, at every velocity."""
+
+    controller: Controller
+    """Controller that plans the walks; its plans can be steered."""
+    velocities: Sequence[float] = (0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
+    disturbances: Sequence[Kind] = ("halt", "leg", "push")
+    """The body is halted, one protracting leg is stopped, or the body is pushed from the side."""
+    impulses: Sequence[float] = (40.0, 60.0)
+    """Impulses of the pushes, in multiples of the insect's mass times V_p."""
+    strategies: Sequence[Answer] = ("reorganise", "slow_down", "grasp")
+    """Beside none: legs go to the nearest posture of undisturbed walking, or the walk begins again from the initial
+    velocity, or feet hold on to the ground."""
+    recovery: float = 0.002
+    """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper's is 0.00008."""
+    initial_velocity: float = Acceleration.start
+    """Velocity V_r(0) to which a walk slows down, as a fraction of V_p."""
+    adhesion: float = 1.0
+    """Adhesion of a standing foot with the strategy 'grasp', in multiples of the insect's weight."""
+    kinematic: bool = False
+    """Leave physics out, and with it pushes and the strategy 'grasp'."""
+    observation_time: str | float = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    n_starts: int = field(default=40, kw_only=True)
+    """Number of random starts that walk stably until they are disturbed, the same in every case."""
+
+    hidden: ClassVar[tuple[str, ...]] = ("grasp",)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        v, slows = self.observed[0], "slow_down" in self.strategies
+        low = self.initial_velocity if slows else 0.0
+        if not ((v > 0) & (v >= low)).all():
+            raise InputError(f"velocities = {v.tolist()}; expected above 0 and at least the initial velocity, {low:g}")
+        check_reached(v, self.stride, self.back if slows else None)
+        if slows:
+            steps_within(self.observed[1] + self.back.duration(v), self.stride)
+        if not self.kinematic and "push" in self.disturbances:
+            self._check_push()
+        replace(self.conditions, grasp=self.adhesion)
+        _ = self._cells()
+
+    def _check_push(self) -> None:
+        from hexmj.physics.pushes import steps_pushed
+
+        lasts = steps_pushed(self.conditions, self.stride)
+        if (steps_within(self.observed[1], self.stride) < lasts).any():
+            least = lasts * self.stride.dt
+            raise InputError(f"observation_time = {self.observation_time!r}; a push lasts {least:g} time units")
+
+    @property
+    def back(self) -> Acceleration:
+        """The acceleration after slowing down."""
+        return Acceleration(self.recovery, self.initial_velocity)
+
+    @property
+    def cases(self) -> list[Case]:
+        """The undisturbed walk, then every disturbance without a strategy and with each."""
+        return every_case(self.disturbances, self.impulses, self.strategies, not self.kinematic)
+
+    def cells(self) -> list[Cell]:
+        """Return a cell for each velocity and case."""
+        grasping = not self.kinematic and "grasp" in self.strategies
+        self.check_walks(self.velocities, *([replace(self.conditions, grasp=self.adhesion)] if grasping else []))
+        return self._cells()
+
+    def _cells(self) -> list[Cell]:
+        def walks(velocity: float) -> StableWalks:
+            return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
+
+        def cell(walks: StableWalks, case: Case, observation_time: float) -> Cell:
+            grasping = replace(self.conditions, grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
+            settings = {
+                "case": case,
+                "observation_time": observation_time,
+                "recovery": self.back if case.strategy == "slow_down" else None,
+                "conditions": None if self.kinematic else grasping,
+            }
+            name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
+            return Cell(name, walks.times, settings, work=observation_time)
+
+        at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
+        return [cell(stable, case, time) for stable, time in at for case in self.cases]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return the times of events, and how often they happen.
+
+        Returns:
+            Over (velocity, case, start) the `disturbed_walks.TIMES`; a case has the coordinates `disturbance` and
+            `strategy`, the first is undisturbed. Over velocity the observation time `duration` [time units] and the
+            number of starts `drawn` to find these. And the frequencies of `with_flss_after`.
+        """
+        table = over_axes({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
+            **velocity_axis(*self.observed),
+            disturbance=("case", [case.disturbance for case in self.cases]),
+            strategy=("case", [case.strategy for case in self.cases]),
+        )
+        drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
+        own = {"recovery": asdict(self.back), "adhesion": self.adhesion, "physical": not self.kinematic}
+        return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=GRID, **own)
+
+
+def every_case(
+    disturbances: Sequence[Kind], impulses: Sequence[float], strategies: Sequence[Answer], physical: bool
+) -> list[Case]:
+    """Return the undisturbed walk, then every disturbance without a strategy and with each.
+
+    Without physics, pushes and the strategy 'grasp' are left out.
+
+    Raises:
+        InputError: a name or an impulse is not allowed, or no disturbance is left.
+    """
+    for name, values, valid in (
+        ("disturbances", disturbances, get_args(Kind)),
+        ("strategies", strategies, get_args(Answer)),
+        ("impulses", impulses, ()),
+    ):
+        if len(set(values)) < len(values) or (valid and not {*values} <= {*valid}):
+            raise InputError(
+                f"{name} = {list(values)}; expected distinct values" + f" of {', '.join(valid)}" * bool(valid)
+            )
+    if not all(0 < impulse <= MOST_IMPULSE for impulse in impulses):
+        raise InputError(f"impulses = {list(impulses)}; expected above 0 and at most {MOST_IMPULSE:g} times m V_p")
+    left_out = () if physical else PHYSICAL
+    kinds: list[Kind] = [kind for kind in disturbances if kind not in left_out]
+    answers: list[Strategy] = ["none", *(answer for answer in strategies if answer not in left_out)]
+    if not kinds or ("push" in kinds and not impulses):
+        raise InputError(f"disturbances = {kinds}; expected at least one, and impulses for pushes")
+    return [Case("push", "none")] + [
+        Case(kind, answer, float(impulse))
+        for kind in kinds
+        for impulse in (impulses if kind == "push" else (0.0,))
+        for answer in answers
+    ]
+
+
+def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
+    """Add frequencies over (observation_time, velocity, case) to the times of events.
+
+    `kinematic` is the fraction of starts that lose static stability after the disturbance and within the observation
+    time, of the `kinematic_reached` starts that have not lost it before, with its 95 % Wilson interval.
+    `kinematic_buys` is what the strategy takes off the FLSS of the same disturbance without a strategy, over the starts
+    that reach it in both cases, with its 95 % interval. The same for `physical`, if there is one.
+    """
+    dims = ("observation_time", "velocity", "case")
+    names = data.disturbance.values.tolist()
+    without = [names.index(name) for name in names]  # the first case of a disturbance has no strategy
+    new: dict[str, Any] = {"observation_time": list(OBSERVATION_TIMES)}
+    time, back, duration = data.time.values, data.back.values, data.duration.values[:, None, None]
+    ends = np.stack((back + duration, time + duration))
+    for measure in [name for name, outcome in MEASURES.items() if outcome in data]:
+        when = data[MEASURES[measure]].values
+        reached = when > time + CLOSE
+        lost = np.where(reached, when <= ends + CLOSE, np.nan)
+        new |= frequency(measure, lost, dims) | differences(f"{measure}_buys", lost[:, :, without], lost, dims)
+        new[f"{measure}_reached"] = (dims[1:], reached.sum(axis=-1), {"units": "1"})
+    return data.assign(new)
+
+
+def strategies_in_words(result: "xr.Dataset") -> str:
+    """Return how the strategies of a result slow down and grasp, as a text."""
+    made, words = settings(result), []
+    if "slow_down" in result.strategy.values and "recovery" in made:
+        words.append("slow down to V = {start:g}, then a = {rate:g}".format(**made["recovery"]))
+    if "grasp" in result.strategy.values and "adhesion" in made:
+        words.append(f"grasp {made['adhesion']:g}")
+    return "; ".join(words)
+
+
+def disturbed_figure(result: "xr.Dataset") -> "Figure":
+    """Draw a column of panels for each disturbance and a row for each measure, with the observation time `whole`."""
+    from matplotlib.lines import Line2D
+
+    names, strategies = result.disturbance.values, result.strategy.values
+    kinds, undisturbed = list(dict.fromkeys(names[names != NO_DISTURBANCE])), names == NO_DISTURBANCE
+    measures = [measure for measure in ROWS if measure in result]
+    figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
+    panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
+    used = [strategy for strategy in STYLES if strategy in strategies]
+    shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
+    data = result.sel(observation_time="whole").sortby("velocity")
+    for (row, column), axes in np.ndenumerate(panels):
+        measure, kind = measures[row], kinds[column]
+        if measure == "kinematic" and kind.startswith("push"):
+            axes.axis("off")
+            axes.text(0.5, 0.5, "a plan does not\nnotice a push", transform=axes.transAxes, ha="center", color="0.4")
+            continue
+        for case in np.flatnonzero(undisturbed):
+            axes.plot(data.velocity, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
+        for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
+            strategy = strategies[case]
+            x = data.velocity + shifts[strategy]
+            frequency_curve(axes, x, data.isel(case=case), measure, **STYLES[strategy])
+        v = data.velocity.values
+        velocity_ticks(axes, v)
+        axes.set(xlim=(v.min() - BESIDE, v.max() + BESIDE), ylim=(-0.03, 1.03))
+        tidy(axes)
+    for column, kind in enumerate(kinds):
+        panels[0, column].set_title(_title(kind), fontsize=10)
+        panels[-1, column].set_xlabel("velocity $V_r / V_p$")
+    for row, measure in enumerate(measures):
+        panels[row, 0].set_ylabel(f"FLSS, {ROWS[measure]}")
+    entries = [Line2D([], [], markersize=4, label=name.replace("_", " "), **STYLES[name]) for name in used]
+    entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
+    least = min(int(data[f"{measure}_reached"].min()) for measure in measures)
+    figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
+    caption = "; ".join(filter(None, [caption_of_at_least(least, result), strategies_in_words(result)]))
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption)
+    return figure
+
+
+def _title(disturbance: str) -> str:
+    kind, _, impulse = disturbance.partition(" ")
+    return {"halt": "body halted", "leg": "one leg stopped"}.get(kind, f"push of {impulse} $m V_p$")

@@ -1,0 +1,152 @@
+"""Why an insect falls, or does not fall although its plan loses static stability: one named mechanism for every start.
+
+A planned loss begins when the plan's margin, seen from the body's own centre of mass, is no longer positive. It is over
+when three conditions hold: the plan is stable again, the centre of mass is above the polygon of the measured feet, and
+the trunk has tilted by less than `TIPPED` for the time constant of an inverted pendulum of the standing height,
+sqrt(h / g). A fall begins as the trunk tips that has last been upright for so long. Its mechanism follows from the lean
+of the trunk since twice that time before, and from the plan's margin since once that time before.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hexmj.bodies.loading import gravity
+from hexmj.rotations import lean
+from hexmj.stability import walk_margin
+from hexmj.walks import Walk
+
+if TYPE_CHECKING:
+    from hexmj.measures.physical import PhysicalWalk
+
+TIPPED = 0.05
+"""Tilt of the trunk beyond which it has tipped [rad]; a walking trunk tilts by 0.01, one that falls by 0.16."""
+
+MECHANISMS = {
+    "never_lost": "no planned loss and no fall",
+    "still_standing": "saved: the centre of mass never left the polygon of the measured feet",
+    "too_short": "saved: it left that polygon, and came back before the trunk had tipped",
+    "landed_in_time": "saved: the trunk had tipped, and the feet that the plan put down held it",
+    "caught": "saved: the trunk came down on a foot that the plan held in the air",
+    "tipped_behind": "fell as the plan lost stability, leaning back",
+    "tipped_ahead": "fell as the plan lost stability, leaning ahead",
+    "thrown": "fell to another side than it had tipped to: a foot met the ground, and its leg threw the trunk",
+    "unplanned": "fell although the margin of the plan was wide",
+    "narrow": "fell although the plan did not lose stability: its margin was narrow",
+}
+"""Mechanism -> its definition. If a start survives several losses, the last of the names that apply counts."""
+
+NARROW = 0.1
+"""Margin of the plan that is narrow, as a share of the standing height: feet that are lifted push the trunk, and legs
+that yield move its centre of mass. Measured: 0 to 0.09."""
+
+SAVED = ("still_standing", "too_short", "landed_in_time", "caught")
+"""Mechanisms of the starts with a planned loss that did not fall."""
+
+_NUMBER = {name: number for number, name in enumerate(MECHANISMS)}
+
+
+def mechanisms(walk: "PhysicalWalk", tipped: float = TIPPED) -> np.ndarray:
+    """Return the mechanism of each start as an index in `MECHANISMS`, (start,).
+
+    Args:
+        walk: physical walks kept whole; a loss that the end of the observation time cuts short counts as survived.
+        tipped: as `TIPPED` [rad].
+    """
+    fell, known = np.isfinite(walk.outcomes.fall), np.isfinite(walk.qpos[..., 0]).sum(axis=0)
+    kept, outside = walk_margin(static_plan(walk)), walk_margin(walk.measured) <= 0.0
+    leans, tilt = lean(walk.qpos[..., 3:7])
+    steps = _time_constant(walk)
+    upright = _long_upright(tilt < tipped, steps)
+    caught = _caught(walk)
+    narrow = NARROW * walk.conditions.standing_height
+    names = np.full(len(fell), _NUMBER["never_lost"])
+    for start, end in enumerate(known):
+        rows = slice(end), start
+        if fell[start]:
+            end = max(end, 1)  # a start that falls within its first step has no known row
+            tips = min(int(np.flatnonzero(np.append(True, upright[rows]))[-1]), end - 1)
+            least = kept[max(tips - steps, 0) : tips + 1, start].min()
+            since = slice(max(tips - 2 * steps, 0), end), start
+            names[start] = _fall(leans[since][tilt[since] >= tipped], leans[end - 1, start], least, narrow)
+            continue
+        for begin, over in _losses(kept[rows] <= 0.0, (upright & ~outside)[rows]):
+            exposed = tilt[begin:over, start][outside[begin:over, start]]
+            names[start] = max(names[start], _rescue(exposed, caught[begin:over, start], tipped))
+    return names
+
+
+def fall_direction(walk: "PhysicalWalk") -> np.ndarray:
+    """Return the direction of each fall, from straight ahead to the left, (start,) [rad]; NaN without a fall."""
+    last = np.maximum(np.isfinite(walk.qpos[..., 0]).sum(axis=0) - 1, 0)
+    ahead, left = np.moveaxis(lean(walk.qpos[..., 3:7])[0][last, np.arange(len(last))], -1, 0)
+    return np.where(np.isfinite(walk.outcomes.fall), np.arctan2(left, ahead), np.nan)
+
+
+def static_plan(walk: "PhysicalWalk") -> Walk:
+    """Return the planned walk, seen from the body's own centre of mass in the home posture."""
+    return replace(walk.planned, x=walk.planned.x - walk.conditions.centre_of_mass)
+
+
+def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
+    """Return the mechanism of a fall.
+
+    Args:
+        tipping: lean of the trunk while it was tipped, (step, 2).
+        last: its lean at last, (2,).
+        least: least margin of the plan within the time constant before [mm].
+        narrow: margin that is narrow [mm].
+    """
+    if (tipping @ last < 0.0).any():
+        return _NUMBER["thrown"]
+    if least > 0.0:
+        return _NUMBER["narrow" if least <= narrow else "unplanned"]
+    return _NUMBER["tipped_ahead" if last[0] > 0.0 else "tipped_behind"]
+
+
+def _rescue(exposed: np.ndarray, caught: np.ndarray, tipped: float) -> int:
+    """Return the mechanism of a survived loss, from the tilt while the centre of mass was outside, (step,)."""
+    if caught.any():
+        return _NUMBER["caught"]
+    if not exposed.size:
+        return _NUMBER["still_standing"]
+    return _NUMBER["landed_in_time" if exposed.max() >= tipped else "too_short"]
+
+
+def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Yield the begin and the end of each planned loss, from one start's steps, both (step,)."""
+    begin = 0
+    while lost[begin:].any():
+        begin += int(np.argmax(lost[begin:]))
+        over = recovered[begin:] & ~lost[begin:]
+        end = begin + int(np.argmax(over)) if over.any() else len(lost)
+        yield begin, end
+        begin = end
+
+
+def _time_constant(walk: "PhysicalWalk") -> int:
+    """Return the time constant of an inverted pendulum of the standing height, sqrt(h / g), in steps of the plan."""
+    seconds = np.sqrt(walk.conditions.standing_height / gravity(walk.conditions.body))
+    return int(np.ceil(seconds / walk.conditions.seconds(walk.stride)))
+
+
+def _long_upright(upright: np.ndarray, steps: int) -> np.ndarray:
+    """Return whether the trunk has been upright for so many steps, (step, start)."""
+    tipped = np.concatenate([np.zeros((steps, upright.shape[1]), dtype=int), np.cumsum(~upright, axis=0)])
+    return tipped[steps:] == tipped[:-steps]
+
+
+def _caught(walk: "PhysicalWalk") -> np.ndarray:
+    """Return where a foot that the plan holds in the air stands after it had left the ground, (step, start, leg).
+
+    A foot that is lowered to its AEP lands instead; without an AEP in the plan no foot is lowered.
+    """
+    stance, stands = walk.planned.stance, walk.measured.stance
+    landing = walk.conditions.landing_distance
+    held = ~stance & ~(walk.planned.x >= walk.planned.aep - landing)
+    step = np.arange(len(stance), dtype=np.int32)[:, None, None]
+    planned_down = np.maximum.accumulate(np.where(stance, step, -1), axis=0)
+    off = np.maximum.accumulate(np.where(stands, -1, step), axis=0)
+    return held & stands & (off > planned_down)

@@ -1,0 +1,360 @@
+"""The last strides of walks that have found their gait, and what is measured of them, one number for each quantity."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.protocol import Controller
+from hexmj.legs import SIDE
+from hexmj.measures.cells import WalkSettings
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
+from hexmj.rotations import heading, rotated, turned
+from hexmj.threads import check_memory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.bodies.compiled import CompiledBody
+    from hexmj.physics.drive import Chunk
+    from hexmj.physics.settling import Settled
+
+SEGMENTS = ("front", "middle", "hind")
+"""Pairs of legs from front to rear."""
+
+JOINTS = ("thorax-coxa", "coxa-trochanter", "femur-tibia")
+"""Joints of a leg with three, from the body outwards."""
+
+WHOLE = {
+    "speed": "mm/s",
+    "ripple: least over mean speed": "1",
+    "period": "s",
+    "duty factor": "1",
+    "way of a standing foot": "mm",
+    "phase, ipsilateral": "1",
+    "phase, contralateral": "1",
+    "vertical peaks: greatest over least": "1",
+    "work of standing legs at the coxa-trochanter": "%",
+    **{f"{joint} torque against its movement": "% of stance" for joint in JOINTS},
+    "pitch of the thorax": "deg",
+    "pitch, range over the strides": "deg",
+    "height of the centre of mass, range over the strides": "mm",
+    "cost of transport, positive work": "1",
+    "cost of transport, all work": "1",
+    "positive work of the joints": "J/kg/m",
+    "work on the centre of mass": "J/kg/m",
+}
+"""Quantities of the whole body, and their units."""
+
+PHASES = "phase, ipsilateral", "phase, contralateral"
+"""Quantities on the circle [0, 1)."""
+
+EACH = {
+    "vertical impulse": "% W",
+    "fore-aft impulse": "% W",
+    "inward impulse": "% W",
+    "vertical peak of a leg": "W",
+    **{f"{joint} torque": "mN mm" for joint in JOINTS},
+    "coxa-trochanter torque past half its peak, from": "% of stance",
+    "coxa-trochanter torque past half its peak, until": "% of stance",
+    "height of the coxae": "mm",
+}
+"""Quantities of each pair of legs, and their units; impulses are of both legs together."""
+
+UNITS = WHOLE | {f"{name}, {segment}": unit for name, unit in EACH.items() for segment in SEGMENTS}
+"""All quantities, and their units."""
+
+FRAME = 0.04
+"""Time over which speed, height and pitch are averaged, as in a film of 25 frames a second [s]."""
+
+PLATE = 0.01
+"""Time over which forces are averaged, as by a force plate [s]."""
+
+KEPT = 1100
+"""Memory of a physics step of a start [bytes]."""
+
+TO_MN_MM, TO_J_PER_KG_M = 1e-3, 1e-3
+"""Factors from g mm^2/s^2 and from mm/s^2."""
+
+HOP = 0.12
+"""A foot swings if it is off the ground for more than this part of the time from PEP_0 to AEP_0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strides:
+    """Whole strides of one start, from one lift-off of leg 1 to another; row t is a physics step."""
+
+    count: int
+    """Number of strides."""
+    step: float
+    """Physics step [s]."""
+    hop: float
+    """Rows off the ground beyond which a foot swings, see `HOP`."""
+    qpos: np.ndarray
+    """(row, position) before each step."""
+    velocity: np.ndarray
+    """(row, 3) of the root [mm/s]."""
+    turning: np.ndarray
+    """(row, joint) velocities of the joints over the step that ends there [rad/s]."""
+    torques: np.ndarray
+    """(row, joint) torques of the servos over that step, damping included [g mm^2/s^2]."""
+    standing: np.ndarray
+    """(row, leg) feet in contact."""
+    centre: np.ndarray
+    """(row, 3) centre of mass in the world [mm]."""
+    every: int
+    """Rows between samples of `ground`: a step of the plan."""
+    ground: np.ndarray
+    """(sample, leg, 3) forces of the ground on the feet, in the world [g mm/s^2]."""
+
+    def lifted(self, leg: int) -> np.ndarray:
+        """Return the rows in which a leg begins to swing, if the strides repeat."""
+        rows = len(self.standing)
+        found = onsets(np.tile(self.standing[:, leg], 3), self.hop)
+        return found[(found >= rows) & (found < 2 * rows)] - rows
+
+    def stances(self, leg: int) -> list[np.ndarray]:
+        """Return the rows of each stance of a leg, from landing to swing; the strides follow each other in a ring."""
+        standing, rows, lifted = self.standing[:, leg], len(self.standing), self.lifted(leg)
+        strides = [np.arange(a, b) % rows for a, b in pairwise([*lifted, *(lifted[:1] + rows)])]
+        return [stride[standing[stride].argmax() :] for stride in strides]
+
+
+def last_strides(
+    settled: "Settled",
+    controller: Controller,
+    velocity: float,
+    duration: float,
+    measured: float,
+    threads: int | None = None,
+) -> Iterator[tuple[int, Strides]]:
+    """Yield each start that does not fall with its whole strides in the last part of the walk.
+
+    Args:
+        settled: starts at rest, with sensors of the feet's forces.
+        controller: plans the walks.
+        velocity: V_r.
+        duration: observation time [time units].
+        measured: last part of it [time units].
+        threads: by default one per core.
+    """
+    from hexmj.physics.drive import drive
+
+    plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
+    first = (duration - measured) / settled.stride.dt * settled.substeps
+    chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
+    walked = chunks[-1].ids[~chunks[-1].fell] if chunks else ()
+    hop = rows_of_a_hop(settled)
+    for start in walked:
+        standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
+        begun = onsets(standing, hop)
+        begun = begun[begun > 1]  # not the strides that begin from rest
+        if len(begun) > 1:
+            yield int(start), strides_between(settled, chunks, start, begun)
+
+
+def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, begun: np.ndarray) -> Strides:
+    """Return the strides of one start between rows in which leg 1 lifts off.
+
+    Args:
+        settled: starts at rest.
+        chunks: consecutive parts of the walks, with the forces of the feet.
+        start: index of the start.
+        begun: rows of lift-off: at least two, none among the first two rows.
+    """
+    columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
+    m, rows = settled.substeps, slice(begun[0], begun[-1])
+    qpos, sensors, torque, standing = (
+        np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
+        for name in ("qpos", "sensors", "torque", "standing")
+    )
+    moved = np.diff(qpos, axis=0) / h  # row t is the velocity at row t + 1
+    return Strides(
+        count=len(begun) - 1,
+        step=h,
+        hop=rows_of_a_hop(settled),
+        qpos=qpos[rows],
+        velocity=moved[begun[0] - 1 : begun[-1] - 1, :3],
+        turning=moved[begun[0] - 1 : begun[-1] - 1, columns.qpos],
+        torques=torque[begun[0] - 1 : begun[-1] - 1],
+        standing=standing[rows],
+        centre=sensors[rows, columns.centre_of_mass],
+        every=m,
+        ground=-sensors[rows][::m, columns.feet_push].reshape(-1, 6, 3),
+    )
+
+
+def rows_of_a_hop(settled: "Settled") -> float:
+    """Return the number of physics steps off the ground beyond which a foot swings, see `HOP`."""
+    stride, step = settled.stride, settled.compiled.model.opt.timestep
+    return HOP * (stride.aep0 - stride.pep0) / settled.conditions.vp / step
+
+
+def onsets(standing: np.ndarray, hop: float) -> np.ndarray:
+    """Return the rows in which a foot, (row,), leaves the ground for longer than a hop."""
+    changes = np.flatnonzero(standing[1:] != standing[:-1]) + 1
+    lifted = changes[~standing[changes]]
+    landed = np.append(changes[standing[changes]], len(standing))
+    return lifted[landed[np.searchsorted(landed, lifted)] - lifted > hop]
+
+
+def quantity_table(walks: WalkSettings, measured: float, threads: int | None = None) -> "xr.Dataset":
+    """Return every quantity of every start, over (quantity, start): a cell of the study. NaN where a start fell.
+
+    Args:
+        walks: settings of the walks.
+        measured: last part of the walks that counts [time units].
+        threads: by default one per core.
+
+    Raises:
+        InputError: the strides do not fit into memory.
+    """
+    import xarray as xr
+
+    from hexmj.physics.settling import Settling
+
+    n_starts, conditions, stride = walks.n_starts, walks.conditions, walks.stride
+    steps = measured / stride.dt * conditions.substeps(stride)
+    check_memory(f"the last strides of {n_starts} starts", KEPT * steps * n_starts)
+    settled = Settling(conditions, stride, threads, pushes=True).at(walks.starts)
+    values = np.full((len(UNITS), n_starts), np.nan)
+    for start, strides in last_strides(settled, walks.controller, walks.velocity, walks.duration, measured, threads):
+        values[:, start] = list(quantities(strides, settled.compiled).values())
+    return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
+
+
+def quantities(strides: Strides, compiled: "CompiledBody") -> dict[str, float]:
+    """Return every quantity by name; NaN without the joints for it, or for a leg that never carries."""
+    parts = (_gait, _forces, _torques, _posture, _work)
+    values = {name: value for part in parts for name, value in part(strides, compiled).items()}
+    for name in EACH.keys() & values.keys():
+        pairs = np.reshape(values.pop(name), (2, 3)).mean(axis=0)
+        values |= {f"{name}, {segment}": value for segment, value in zip(SEGMENTS, pairs, strict=True)}
+    return {name: float(values.get(name, np.nan)) for name in UNITS}
+
+
+def _gait(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+    carries = strides.ground[..., 2] > 0
+    ahead, duty = _ahead(strides), carries[:, carries.any(axis=0)].mean()
+    speed, period = ahead.mean(), len(ahead) * strides.step / strides.count
+    begun = [np.append(strides.lifted(leg), np.nan)[0] for leg in range(6)]
+    lags = [(begun[k] - begun[j]) * strides.step / period % 1.0 for j, k in PAIRS.values()]
+    return {
+        "speed": speed,
+        "ripple: least over mean speed": _seen(ahead, FRAME / strides.step).min() / speed,
+        "period": period,
+        "duty factor": duty,
+        "way of a standing foot": speed * period * duty,
+        "phase, ipsilateral": circular_mean(lags[IPSILATERAL]),
+        "phase, contralateral": circular_mean(lags[CONTRALATERAL]),
+    }
+
+
+def _forces(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+    """Return the forces of the ground on the feet, along the body's heading."""
+    share = strides.ground / compiled.weight
+    level = turned(share[..., :2], -heading(strides.qpos[:: strides.every, 3:7]))
+    ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
+    peaks = np.array([_seen(leg, PLATE / strides.step / strides.every).max() for leg in up.T])
+    peaks = np.where((up > 0).any(axis=0), peaks, np.nan)
+    pairs = peaks.reshape(2, 3).mean(axis=0)
+    impulses = {"vertical": up, "fore-aft": ahead, "inward": inward}
+    return {f"{name} impulse": 200.0 * force.mean(axis=0) for name, force in impulses.items()} | {
+        "vertical peak of a leg": peaks,
+        "vertical peaks: greatest over least": pairs.max() / pairs.min(),
+    }
+
+
+def _torques(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+    """Return the torques of the servos while their leg stands, and the work that they do then."""
+    torque = strides.torques.reshape(len(strides.torques), 6, -1)
+    power = (strides.torques * strides.turning).reshape(torque.shape)
+    if torque.shape[2] != len(JOINTS):
+        return {}
+    stands = strides.standing[..., None]
+    with np.errstate(invalid="ignore"):  # of a leg that never stands
+        mean = np.abs(torque).sum(axis=0, where=stands) / stands.sum(axis=0)
+    against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()
+    work = (np.maximum(power, 0.0) * stands).sum(axis=(0, 1))
+    course = [_course(torque[:, leg, 1], strides, leg) for leg in range(6)]
+    past = [np.flatnonzero(torques > 0.5 * torques.max()) for torques in course]
+    return {
+        **{f"{joint} torque": TO_MN_MM * legs for joint, legs in zip(JOINTS, mean.T, strict=True)},
+        **{f"{joint} torque against its movement": 100.0 * x for joint, x in zip(JOINTS, against, strict=True)},
+        "work of standing legs at the coxa-trochanter": 100.0 * work[1] / work.sum(),
+        "coxa-trochanter torque past half its peak, from": [rows[0] if len(rows) else np.nan for rows in past],
+        "coxa-trochanter torque past half its peak, until": [rows[-1] if len(rows) else np.nan for rows in past],
+    }
+
+
+def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
+    """Return a leg's torque, (row,), at each percent of its stance, (101,), averaged over stances; NaN without a stance.
+
+    The torque is positive where it carries the body.
+    """
+    around = np.pad(torque, n := round(PLATE / strides.step), mode="wrap")
+    seen = np.convolve(around, np.ones(n) / n, "same")[n:-n]
+    percent, stances = np.linspace(0.0, 1.0, 101), [seen[rows] for rows in strides.stances(leg)]
+    courses = [np.interp(percent, np.linspace(0.0, 1.0, len(stance)), stance) for stance in stances]
+    mean = np.mean(courses, axis=0) if courses else np.full(101, np.nan)
+    return mean * np.sign(mean.mean())
+
+
+def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+    """Return heights of the coxae over the ground, and the pitch of the line from hind to front coxae."""
+    from hexmj.bodies.grounds import ground_level
+
+    coxae = _coxae(compiled)
+    places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
+    below = [ground_level(compiled.conditions, places[:, leg, :2]) for leg in range(6)]
+    height = places[..., 2] - compiled.foot_radius
+    rise = height.reshape(-1, 2, 3).mean(axis=1)[:, [0, 2]] @ [1.0, -1.0]
+    pitch = np.degrees(np.arcsin(rise / np.linalg.norm((coxae[0] - coxae[2])[[0, 2]])))
+    return {
+        "height of the coxae": (height - np.maximum(np.stack(below, axis=1), 0.0)).mean(axis=0),
+        "pitch of the thorax": pitch.mean(),
+        "pitch, range over the strides": np.ptp(_seen(pitch, FRAME / strides.step)),
+        "height of the centre of mass, range over the strides": np.ptp(
+            _seen(strides.centre[:, 2], FRAME / strides.step)
+        ),
+    }
+
+
+def _work(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+    """Return work over the insect's own weight and way; negative work of a joint is lost, and costs nothing or as much
+    as positive work."""
+    power, gravity = strides.torques * strides.turning, compiled.weight / compiled.body.mass
+    rate = compiled.weight * _ahead(strides).mean()
+    positive = np.maximum(power, 0.0).sum(axis=1).mean() / rate
+    centre = np.stack([_seen(axis, FRAME / strides.step) for axis in strides.centre.T], axis=1)
+    speed = np.linalg.norm(np.diff(centre, axis=0), axis=1) / strides.step
+    gained = np.maximum(np.diff(0.5 * speed**2 + gravity * centre[1:, 2]), 0.0).sum()
+    gained *= 1.0 + compiled.conditions.load  # the load moves with the body
+    return {
+        "cost of transport, positive work": positive,
+        "cost of transport, all work": np.abs(power).sum(axis=1).mean() / rate,
+        "positive work of the joints": TO_J_PER_KG_M * gravity * positive,
+        "work on the centre of mass": TO_J_PER_KG_M * gained / np.linalg.norm(centre[-1, :2] - centre[0, :2]),
+    }
+
+
+def _ahead(strides: Strides) -> np.ndarray:
+    """Return the speed of the root along its heading, (row,) [mm/s]."""
+    return turned(strides.velocity[:, None, :2], -heading(strides.qpos[:, 3:7]))[:, 0, 0]
+
+
+def _coxae(compiled: "CompiledBody") -> np.ndarray:
+    """Return the positions of the legs' first joints in the root frame, (leg, 3) [mm]."""
+    from hexmj.bodies.reading import joint_numbers, posed
+
+    first = joint_numbers(compiled.model, compiled.body)[:, 0]
+    return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]
+
+
+def _seen(values: np.ndarray, rows: float) -> np.ndarray:
+    """Return moving means of values, (row,), over a number of rows."""
+    width = max(1, round(rows))
+    return np.convolve(values, np.ones(width) / width, "valid")

@@ -1,0 +1,355 @@
+"""Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts in every cell."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.protocol import Controller, FeedbackPlan
+from hexmj.errors import InputError, OutOfReach, SimulationError
+from hexmj.measures.cells import UNITS, WalkSettings
+from hexmj.measures.compare import BESIDE, MEASURES
+from hexmj.measures.figures import caption
+from hexmj.measures.tables import differences, frequency, happened, over_start, velocity_axis
+from hexmj.plotting import head, picture
+from hexmj.starts import draw_starts
+from hexmj.studies.base import Study
+from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
+from hexmj.sweep import Cell, over_axes
+from hexmj.timing import Acceleration, Stride
+from hexmj.validate import choice, distinct
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hexmj.measures.physical import PhysicalWalk
+
+Over = Literal["vp", "step_height", "standing_height", "friction", "load", "centre_of_mass"]
+"""Conditions that a map can vary."""
+
+
+class Axis(NamedTuple):
+    """A condition that a map can vary."""
+
+    values: tuple[float, ...]
+    unit: str
+    name: str
+
+
+CONDITIONS: dict[Over, Axis] = {
+    "vp": Axis((20.0, 40.0, 80.0, 160.0, 320.0), "mm/s", "swing velocity V_p"),
+    "step_height": Axis((4.0, 6.0, 8.0, 10.0, 12.0), "mm", "step height"),
+    "standing_height": Axis((6.0, 8.0, 10.0, 12.0, 14.0), "mm", "standing height"),
+    "friction": Axis((0.05, 0.2, 0.5, 1.0, 2.0), "1", "friction"),
+    "load": Axis((0.0, 0.5, 1.0, 1.5, 2.0), "own weight", "load"),
+    "centre_of_mass": Axis((-9.4, -5.0, 0.0, 5.0, 10.0), "mm", "centre of mass ahead of O"),
+}
+"""Condition -> its default values, unit and name; the animal's own centre of mass lies at -9.4 mm."""
+
+FLSS = MEASURES | BESIDE | {"static": "static_loss"}
+"""Measure -> the outcome whose frequency it is. `static` is the planned polygon around the body's own centre of mass;
+`kinematic` is the same around O, which depends on no condition."""
+
+BLOCK = 100
+"""Starts walked at a time: their walks are kept whole, 0.5 GB at V = 0.1."""
+
+COLOURS = {
+    "never_lost": "#e4e4e4",
+    "still_standing": "#cde8c9",
+    "too_short": "#8fce8a",
+    "landed_in_time": "#46a35e",
+    "caught": "#14663a",
+    "tipped_behind": "#f5a25d",
+    "tipped_ahead": "#f6d55c",
+    "thrown": "#b3261e",
+    "unplanned": "#6a4c93",
+    "narrow": "#b79bd6",
+}
+"""Mechanism -> colour: grey for no event, green for saved starts, warm for falls after a planned loss, violet for
+other falls."""
+
+HATCHES = {"tipped_behind": "//", "tipped_ahead": "\\\\", "thrown": "xx", "unplanned": "..", "narrow": "--"}
+"""Mechanism of a fall -> hatch, for readers without colours."""
+
+MARKS: Mapping[str, Mapping[str, Any]] = {
+    "physical": {"color": "0.1", "markersize": 22, "markeredgewidth": 1.8},
+    "toppled": {"color": "white", "markersize": 14, "markeredgewidth": 1.8},
+}
+"""Measure -> style of the mark above which its starts lie."""
+
+
+@dataclass(frozen=True)
+class StabilityMap(Study):
+    """The same starts at every value of one condition and every velocity.
+
+    The controller must not read the legs, since mechanisms are derived from the plan alone. Starts are left out of the
+    result if they cannot stand on six feet at every value, or do not reach nine of ten tips in every cell.
+    """
+
+    controller: Controller
+    """Controller that plans the walks; it must not read the legs."""
+    over: Over = "vp"
+    """The condition that is varied."""
+    values: Sequence[float] = ()
+    """Values of that condition in its unit; five usual ones by default."""
+    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    observation_time: str | float = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+
+    def __post_init__(self) -> None:
+        choice("over", self.over, CONDITIONS)
+        super().__post_init__()
+        distinct("values", self.chosen)
+        _ = self.varied
+        start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
+        if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), FeedbackPlan):
+            raise InputError(f"controller = {self.controller.name} reads the legs; a map needs one that does not")
+
+    @property
+    def set_by_study(self) -> tuple[str, ...]:
+        """The condition that is varied."""
+        return (self.over,)
+
+    @property
+    def chosen(self) -> list[float]:
+        """Values of the condition."""
+        return [float(value) for value in self.values or CONDITIONS[self.over].values]
+
+    @property
+    def varied(self) -> list[Conditions]:
+        """The conditions at each value."""
+        return [replace(self.conditions, **{self.over: value}) for value in self.chosen]
+
+    def cells(self) -> list[Cell]:
+        """Return a cell for each value and velocity."""
+
+        def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
+            name = f"{self.over}-{conditions.values()[self.over]:g}-V-{velocity:g}"
+            walks = self.walks(velocity, time, conditions)
+            return Cell(name, fates, {"walks": walks, "over": self.over}, time * conditions.substeps(self.stride))
+
+        self.check_walks(self.velocities, *self.varied)
+        return [cell(conditions, v, time) for conditions in self.varied for v, time in zip(*self.observed, strict=True)]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return outcomes, frequencies, and the differences that dynamics and the condition make.
+
+        Returns:
+            Over (value, velocity): the frequencies `FLSS`, and `saved`, the fraction of the starts with a static loss
+            that do not fall, with 95 % Wilson intervals; the paired differences `dynamics`, physical less static, and
+            `change`, physical less physical at the value `attrs["reference"]`, with 95 % intervals; the Froude number
+            `froude`. Over mechanism_name too: the number of starts, `count`. Over (value, velocity, start): every field
+            of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad]. Over value: the number
+            of starts that `stand` and reach nine of ten tips at every velocity.
+
+        Raises:
+            InputError: no start is left.
+        """
+        sizes, axis = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
+        table = over_axes(sizes, data, join="inner", combine_attrs="override")
+        if not table.sizes["start"]:
+            raise InputError(f"{self.over} = {self.chosen}; no start stands and reaches its tips at all of them")
+        left, columns = [set(cell.start.values.tolist()) for cell in data], sizes["velocity"]
+        stand = [len(set.intersection(*left[i : i + columns])) for i in range(0, len(left), columns)]
+        usual = Conditions().values()[self.over]
+        reference = usual if usual in self.chosen else self.chosen[0]
+        numbers = np.stack([froude(conditions, self.observed[0]) for conditions in self.varied])
+        table = table.assign_coords(
+            **velocity_axis(*self.observed),
+            value=("value", self.chosen, {"units": axis.unit, "long_name": axis.name}),
+            mechanism_name=("mechanism_name", list(MECHANISMS)),
+        ).assign(
+            stand=("value", stand, {"units": "1", "long_name": "starts that stand and reach nine of ten tips"}),
+            froude=(("value", "velocity"), numbers, {"units": "1"}),
+        )
+        return self.labelled(with_differences(table, reference), "map", over=self.over, reference=reference)
+
+
+def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
+    """Return what happens to every start in one cell.
+
+    Starts that cannot stand on six feet, or do not reach nine of ten tips, are left out.
+
+    Args:
+        walks: settings of the walks.
+        over: the condition that the map varies.
+        threads: by default one per core.
+
+    Returns:
+        Over start: every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad].
+
+    Raises:
+        InputError: no start is left.
+        SimulationError: a walk diverges.
+    """
+    stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
+    blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
+    parts = [part for block in blocks for part in _within_reach(walks, block, threads)]
+    if not parts:
+        value = walks.conditions.values()[over]
+        raise InputError(f"{over} = {value:g}; no start stands and reaches its tips at V = {walks.velocity:g}")
+    columns = {name: np.concatenate([part[name] for _, part in parts]) for name in parts[0][1]}
+    within = np.concatenate([which for which, _ in parts])
+    return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(
+        start=("start", within, {"units": "1"})
+    )
+
+
+@lru_cache(maxsize=1)
+def standing_starts(
+    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
+) -> np.ndarray:
+    """Return the indices of the seed's starts that come to rest on six feet; cached for the other velocities."""
+    return np.flatnonzero(_stands(draw_starts(n_starts, seed, stride), conditions, stride, threads))
+
+
+def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> np.ndarray:
+    """Find the starts that come to rest on six feet, (start,), by halving; one that diverges is an error."""
+    from hexmj.physics.settling import settle
+
+    try:
+        settle(starts, conditions, stride, threads)
+    except (OutOfReach, SimulationError) as error:
+        if isinstance(error, SimulationError) and error.state:
+            raise
+        if len(starts) == 1:
+            return np.array([False])
+        halves = np.array_split(starts, 2)
+        return np.concatenate([_stands(half, conditions, stride, threads) for half in halves])
+    return np.ones(len(starts), dtype=bool)
+
+
+def _within_reach(
+    walks: WalkSettings, which: np.ndarray, threads: int | None
+) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """Yield parts of the starts, (n,), that reach nine of ten tips, with their fates."""
+    try:
+        yield which, _fates(walks.walk(walks.starts[which], threads), threads)
+    except OutOfReach:
+        if len(which) > 1:
+            for half in np.array_split(which, 2):
+                yield from _within_reach(walks, half, threads)
+
+
+def _fates(walk: "PhysicalWalk", threads: int | None) -> dict[str, np.ndarray]:
+    from hexmj.stability import loss_time
+
+    static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
+    return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
+
+
+def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
+    """Add the frequencies, differences and counts of `StabilityMap.result` to outcomes over (value, velocity, start)."""
+    cells = ("value", "velocity")
+    events = {name: happened(data[outcome]).transpose(*cells, "start").values for name, outcome in FLSS.items()}
+    new: dict[str, Any] = {}
+    for measure, lost in events.items():
+        new |= frequency(measure, lost, cells)
+    fell, static = events["physical"], events["static"]
+    new |= frequency("saved", np.where(static == 1.0, 1.0 - fell, np.nan), cells)
+    row = data.value.values.tolist().index(reference)
+    new |= differences("dynamics", fell, static, cells) | differences("change", fell, fell[row], cells)
+    names = data.mechanism.transpose(*cells, "start").values
+    count = np.stack([(names == number).sum(axis=-1) for number in range(len(MECHANISMS))], axis=-1)
+    new["count"] = ((*cells, "mechanism_name"), count, {"units": "1", "long_name": "number of starts"})
+    return data.assign(new)
+
+
+def froude(conditions: Conditions, velocity: np.ndarray) -> np.ndarray:
+    """Return the Froude number (V V_p)^2 / (g h) at each V_r, (velocity,); h is the standing height."""
+    from hexmj.bodies.loading import gravity
+
+    return (velocity * conditions.vp) ** 2 / (gravity(conditions.body) * conditions.standing_height)
+
+
+def map_figure(result: "xr.Dataset") -> "Figure":
+    """Draw two heat maps: physical FLSS above the kinematic one, and the static losses that dynamics saves."""
+    result = result.transpose("value", "velocity", "start", ...)
+    rows, columns = result.sizes["value"], result.sizes["velocity"]
+    figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
+    physical, saved = figure.subplots(1, 2, sharey=True)
+    numbers = np.concatenate([result.kinematic.values[:1], result.physical.values])
+    words = [[f"{number:.2f}" for number in row] for row in numbers]
+    if result.attrs["over"] == "vp":
+        for (row, column), number in np.ndenumerate(result.froude.values):
+            words[1 + row][column] += f"\nFr {number:.2g}"
+    _heat(physical, numbers, words, "YlOrRd")
+    lost = np.isfinite(result.static_loss.values).sum(axis=-1)
+    counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
+    pairs = zip(counts, lost, strict=True)
+    words = [[f"{a} of {b}" if b else "none lost" for a, b in zip(*row, strict=True)] for row in pairs]
+    planned = np.isfinite(result.planned_loss.isel(value=0).values).sum(axis=-1)
+    words = [[f"{n} lost" for n in planned], *words]
+    _heat(saved, np.concatenate([np.full((1, columns), np.nan), result.saved.values]), words, "YlGn")
+    physical.set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
+    physical.set_ylabel(_label(result))
+    for axes, title in {physical: "physical FLSS", saved: "saved by dynamics, of the static losses"}.items():
+        axes.axhline(0.5, color="white", linewidth=9.0)
+        axes.set_title(title, fontsize=11)
+        axes.set_xticks(range(columns), [f"{v:g}" for v in result.velocity.values])
+        axes.set_xlabel("velocity $V_r / V_p$")
+    head(figure, "Falls in physics, and starts that dynamics saves", _caption(result))
+    return figure
+
+
+def mechanisms_figure(result: "xr.Dataset") -> "Figure":
+    """Draw what happened to every start as stacked bars, a panel for each velocity."""
+    result = result.transpose("value", "velocity", "start", ...)
+    columns, total = result.sizes["velocity"], result.sizes["start"]
+    figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
+    panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
+    values = range(result.sizes["value"])
+    for panel, v in zip(panels, result.velocity.values, strict=True):
+        bottom = np.zeros(len(values))
+        for name, colour in COLOURS.items():
+            share = result["count"].sel(velocity=v, mechanism_name=name).values / total
+            style = {"color": colour, "hatch": HATCHES.get(name), "edgecolor": "0.25", "linewidth": 0.0}
+            panel.bar(values, share, 0.82, bottom, label=name.replace("_", " "), **style)
+            bottom = bottom + share
+        for measure, style in MARKS.items():
+            above = 1.0 - result[measure].sel(velocity=v).values
+            panel.plot(values, above, marker="_", linestyle="none", **style)
+        panel.set_title(f"V = {v:g}", fontsize=11)
+        panel.set_xticks(values, [f"{value:g}" for value in result.value.values])
+        panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
+        panel.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
+    head(figure, "What happened to every start", _caption(result))
+    return figure
+
+
+def _caption(result: "xr.Dataset") -> str:
+    count = result.sizes["start"]
+    left = (
+        f"; {count} of them stand and reach nine of ten tips at every value" if count < result.attrs["starts"] else ""
+    )
+    return caption(result) + left
+
+
+def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:
+    """Draw fractions as colours with words in every cell, the first row at the bottom."""
+    axes.imshow(numbers, cmap=colours, vmin=0.0, vmax=1.0, origin="lower", aspect="auto")
+    for row, column in np.ndindex(numbers.shape):
+        colour = "white" if numbers[row, column] > 0.6 else "0.1"
+        axes.text(column, row, words[row][column], ha="center", va="center", color=colour, fontsize=10, linespacing=1.1)
+    axes.set_xticks(np.arange(numbers.shape[1] - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(numbers.shape[0] - 1) + 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=2.0)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+
+
+def _label(result: "xr.Dataset") -> str:
+    name, unit = result.value.attrs["long_name"], result.value.attrs["units"]
+    return name.replace("V_p", "$V_p$") + (f" [{unit}]" if unit != "1" else "")

@@ -1,0 +1,318 @@
+"""Standings of the league: frequencies with their intervals, differences, ranks, and the tables of all that."""
+
+from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hexmj.io import markdown_table, settings
+from hexmj.measures.figures import network_rules, starts_in_words
+from hexmj.measures.tables import VELOCITY, differences, frequencies, happened, padded
+from hexmj.phases import circular_mean
+from hexmj.stats import paired_difference
+from hexmj.studies.entrants import Entrant
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LEGS_LOST = {f"lost {leg + 1}": leg for leg in (0, 1, 2)}
+"""Trial -> index of the leg that is lost: front, middle, hind."""
+
+READING: tuple[str, ...] = ("reads", "noise", "late")
+"""Trials with sensory feedback: exact, inexact, late."""
+
+TRIALS = ("halt", "leg", "push", "step", "rough", "load", *LEGS_LOST, *READING)
+"""Names of all trials."""
+
+ABOUT_TRIALS = (
+    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks whose plan was stable"
+    " until then; step and rough ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg, from"
+    " the front; reads: sensory feedback; noise, late: with errors of 10 % of the step range, 20 ms late, in whole steps;"
+    " -: the plan cannot be steered or has no feedback, the walk is too short, or no walk is left"
+)
+"""Explanation of the trials."""
+
+Data = Mapping[tuple[str, str], "xr.Dataset"]
+"""Result of every cell by entrant and question."""
+
+Rows = Sequence[Sequence["xr.Dataset | None"]]
+"""Results by (row, column); None for a missing cell."""
+
+OVER_VELOCITY = ("entrant", "velocity")
+
+UNITS = {"slip": "mm/s", "reached": "time unit"}
+"""Units of variables that are no frequency, rank, phase or ratio."""
+
+REFERENCE = "ldvs"
+"""Entrant that others are compared with; if it does not take part, the first one from random starts."""
+
+
+def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Data) -> "xr.Dataset":
+    """Return the results of all cells of entrants at velocities V_r, (velocity,), as one dataset.
+
+    Returns:
+        Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
+        how far they are above those of the `reference` on the same starts, `_above`, with its interval; of walks
+        without a fall the `speed` over that commanded, `slip` [mm/s], `cost` of transport, and the greatest `torque`
+        of a joint over its limit; the number of `missing` walks, which failed; of steady-state gaits the share
+        that is `periodic` and `stable`, the median `reached` [time units], `duty_factor` and the phases `ipsilateral`
+        and `contralateral`.
+        Over entrant: `range`, J_N, and `accelerated`, with intervals; over (entrant, measure) the `best` and `worst`
+        rank, by the mean over velocities.  Over (entrant, trial): `fell`, and kinematic `lost`, with intervals.
+        All frequencies have the number of their `_starts`.
+    """
+    import xarray as xr
+
+    names, v = list(entrants), velocities.tolist()
+    planned, walked, regimes = (
+        [[data.get((name, f"{kind} {one}")) for one in v] for name in names]
+        for kind in ("kinematic", "physics", "regime")
+    )
+    events = {
+        "kinematic": _each(planned, LOST),
+        "measured": _each(walked, lambda cell: happened(cell.measured_loss)),
+        "physical": _each(walked, lambda cell: happened(cell.fall)),
+    }
+    random = [name for name, entrant in entrants.items() if not entrant.ideal]
+    reference = REFERENCE if REFERENCE in random else next(iter(random), "")
+    ideal = np.array([entrant.ideal for entrant in entrants.values()])[:, None, None]
+    same = {measure: np.where(ideal, np.nan, values) for measure, values in events.items()}  # the same random starts
+    table: dict[str, Any] = {}
+    for measure, values in same.items():
+        table |= frequencies(measure, events[measure], OVER_VELOCITY)
+        table |= differences(f"{measure}_above", values, values[names.index(reference or names[0])], OVER_VELOCITY)
+    for asked in ("range", "accelerated"):
+        table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], LOST)[0], OVER_VELOCITY[:1])
+    over_trials = "entrant", "trial"
+    tried, lamed = (
+        [[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "kinematic, ")
+    )
+    table |= frequencies("fell", _each(tried, _fell), over_trials)
+    table |= frequencies("lost", _each(lamed, LOST), over_trials)
+    best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
+    table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
+    table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
+    table["missing"] = _over(walked, lambda cell: cell.fall.isnull().sum())
+    table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
+    velocity = ("velocity", velocities, VELOCITY)
+    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(events)}
+    result = xr.Dataset(table, axes, {"reference": reference})
+    for name, values in result.items():
+        values.attrs["units"] = UNITS.get(str(name), "1")
+    return result
+
+
+def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best and the worst rank that each may have, (entrant,), from 1 on.
+
+    Args:
+        values: of the same starts, (entrant, start), less is better; the rank of an entrant that is NaN is 0.
+
+    Returns:
+        1 plus the number that is significantly better; the number ranked less the number that is significantly worse.
+    """
+    ranked = np.isfinite(values).any(axis=1)
+    best, worst = np.zeros(len(values), dtype=int), np.zeros(len(values), dtype=int)
+    for i in np.flatnonzero(ranked):
+        _, low, high = paired_difference(values[i], values[ranked])  # its own interval contains 0
+        best[i], worst[i] = 1 + (low > 0).sum(), ranked.sum() - (high < 0).sum()
+    return best, worst
+
+
+LOST = attrgetter("lost")
+
+
+def _fell(one: "xr.Dataset") -> "xr.DataArray":
+    """Return whether starts fell, from a disturbance or walks from the start on."""
+    return one.fell if "fell" in one else happened(one.fall)
+
+
+def _upright(one: "xr.Dataset") -> "xr.Dataset":
+    """Return the walks without a fall."""
+    return one.isel(start=np.isinf(one.fall.values))
+
+
+OF_WALKS = {
+    "speed": lambda cell: _upright(cell).speed.mean(),
+    "slip": lambda cell: _upright(cell).slip.mean(),
+    "cost": lambda cell: _upright(cell).work.sum() / _upright(cell).way.sum(),
+    "torque": lambda cell: _upright(cell).torque.max() if _upright(cell).start.size else np.nan,
+}
+"""Numbers of the walks at one velocity that do not fall; NaN if all fall."""
+
+OF_REGIMES = {
+    "periodic": lambda cell: np.isfinite(cell.reached).mean(),
+    "stable": lambda cell: cell.stable.mean(),
+    "reached": lambda cell: cell.reached.median(),
+    "duty_factor": lambda cell: cell.duty_factor.mean(),
+    "ipsilateral": lambda cell: _phase(cell.ipsilateral),
+    "contralateral": lambda cell: _phase(cell.contralateral),
+}
+"""Numbers of the steady-state gaits at one velocity; duty factor and phases are NaN if none was reached."""
+
+
+def _phase(values: "xr.DataArray") -> float:
+    """Return the circular mean of known phases."""
+    known = values.values[np.isfinite(values.values)]
+    return float(circular_mean(known)) if len(known) else np.nan
+
+
+def _over(rows: Rows, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Return one number of each cell, (entrant, velocity); NaN for a missing cell."""
+    return OVER_VELOCITY, np.array([[np.nan if cell is None else float(find(cell)) for cell in row] for row in rows])
+
+
+def _each(rows: Rows, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
+    """Return the events of each start of each cell, (row, column, start); NaN for a missing cell."""
+    return padded([[[] if cell is None else find(cell) for cell in row] for row in rows])
+
+
+LESS, MORE = "-", "+"
+"""Beside a frequency that is significantly below, or above, that of the reference."""
+
+WEDGED = 5.0
+"""Torque about the coxa-femur joint of a cockroach's hind leg that wedges into a crevice, over weight times length of
+the leg: its muscles pull with over 50 times the weight at a tenth of the leg's arm (Full & Ahn 1995, J. exp. Biol. 198,
+1285, abstract). No figure for a stick insect was found."""
+
+MEASURES = {"kinematic": "Kinematic FLSS", "measured": "Measured FLSS", "physical": "Physical FLSS"}
+
+
+class Table(NamedTuple):
+    """One table."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def tables(result: "xr.Dataset") -> list[Table]:
+    """Return all tables of a league."""
+    shown = by_rank(result)
+    over_velocity = [_over_velocity(shown, measure, title) for measure, title in MEASURES.items()]
+    at = shown.sel(velocity=shown.attrs["trial_velocity"], method="nearest")
+    return [_ranks(shown), *over_velocity, _regimes(at), _trials(shown), _costs(at)]
+
+
+def league_markdown(result: "xr.Dataset") -> str:
+    """Return all tables as Markdown."""
+    parts = [f"### {one.title}\n\n" + "\n".join(markdown_table(one.head, one.rows)) for one in tables(result)]
+    return "\n\n".join(parts) + "\n"
+
+
+def by_rank(result: "xr.Dataset") -> "xr.Dataset":
+    """Sort entrants from best to worst, by physical, then by kinematic FLSS; those from ideal starts come last."""
+    falls, losses = (result[measure].mean("velocity").values for measure in ("physical", "kinematic"))
+    unranked = result.best.sel(measure="physical").values == 0
+    return result.isel(entrant=np.lexsort((losses, falls, unranked))).transpose("entrant", ...)
+
+
+def from_one(result: "xr.Dataset") -> str:
+    """Return which entrants walk from their ideal start alone, as a text; empty if all or none do."""
+    alone = (result.kinematic_starts == 1).all("velocity").values
+    return f"{', '.join(result.entrant.values[alone])} from one start" if alone.any() and not alone.all() else ""
+
+
+def frequency(one: "xr.Dataset", name: str) -> str:
+    """Return a frequency with its interval; "-" if it is unknown."""
+    middle, low, high = (one[name + end].item() for end in ("", "_low", "_high"))
+    return "-" if np.isnan(middle) else f"{_short(middle)} ({_short(low)}-{_short(high)})"
+
+
+def _entrants(shown: "xr.Dataset") -> "list[tuple[str, xr.Dataset]]":
+    return [(name, shown.sel(entrant=name)) for name in shown.entrant.values]
+
+
+def _ranks(shown: "xr.Dataset") -> Table:
+    rows, controllers = [], settings(shown)["controllers"]
+    for name, one in _entrants(shown):
+        note = f" ({words})" if (words := network_rules(controllers[name])) else ""
+        note += f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
+        places = [_mean(one[measure]) + place(one.sel(measure=measure)) for measure in MEASURES]
+        rows.append((name + note, *places, frequency(one, "range"), frequency(one, "accelerated")))
+    title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
+    return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
+
+
+def _mean(over_velocities: "xr.DataArray") -> str:
+    """Return the mean of frequencies over velocities; "-" if one is unknown."""
+    return _known(f"{over_velocities.mean(skipna=False).item():.3f}")
+
+
+def _left(one: "xr.Dataset", measure: str) -> str:
+    """Return the number of walks if some are missing."""
+    return f" of {one[f'{measure}_starts'].item()}" if measure != "kinematic" and one.missing.item() else ""
+
+
+def place(one: "xr.Dataset") -> str:
+    """Return a rank in brackets: '(2)', '(=3-6)'; empty without a rank."""
+    best, worst = one.best.item(), one.worst.item()
+    return "" if best == 0 else f" ({best})" if best == worst else f" (={best}-{worst})"
+
+
+def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
+    rows = []
+    for name, one in _entrants(shown):
+        cells = (one.isel(velocity=i) for i in range(shown.sizes["velocity"]))
+        rows.append((name, *(frequency(one, measure) + _left(one, measure) + _against(one, measure) for one in cells)))
+    reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
+    told = f"{title} of {starts_in_words(starts)}"
+    told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
+    told += f"; {alone}" if (alone := from_one(shown)) else ""
+    return Table(title, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
+
+
+def _against(one: "xr.Dataset", measure: str) -> str:
+    low, high = one[f"{measure}_above_low"].item(), one[f"{measure}_above_high"].item()
+    return f" {LESS}" if high < 0 else f" {MORE}" if low > 0 else ""
+
+
+def _regimes(at: "xr.Dataset") -> Table:
+    rows = []
+    for name, one in _entrants(at):
+        shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
+        phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
+        regime = *shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"
+        rows.append((name, *map(_known, regime)))
+    head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
+    return Table(
+        f"Steady-state gaits at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows
+    )
+
+
+def _trials(shown: "xr.Dataset") -> Table:
+    rows, most = [], shown.fell_starts.max().item()
+    for name, one in _entrants(shown):
+        falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
+        rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
+    v = shown.attrs["trial_velocity"]
+    title = f"Falls at V = {v:g} in {starts_in_words(most)}; kinematic: losses, mean of three lost legs. {ABOUT_TRIALS}"
+    return Table(title, ("controller", *shown.trial.values, "kinematic"), rows)
+
+
+def _costs(at: "xr.Dataset") -> Table:
+    rows = []
+    for name, one in _entrants(at):
+        cells = [f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque")]
+        cells.append(f"{one.torque.item() / WEDGED:.2f}")
+        missing = f" (walks missing: {one.missing.item():g})" if one.missing else ""
+        rows.append((name + missing, *map(_known, cells)))
+    head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
+    return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
+
+
+def _short(value: float) -> str:
+    """Return two digits after the point, three below 0.1, without a leading zero."""
+    text = f"{value:.2f}" if value >= 0.1 else f"{value:.3f}".rstrip("0").rstrip(".")
+    return text.replace("0.", ".", 1)
+
+
+def _share(value: float, starts: int, most: int) -> str:
+    """Return a share, with the number of starts if it is not that of all."""
+    return _known(f"{value:.2f}") + (f" of {starts}" if 0 < starts < most else "")
+
+
+def _known(text: str) -> str:
+    """Return the text of a number, "-" for NaN."""
+    return {"nan": "-", "inf": "never"}.get(text, text)

@@ -1,0 +1,275 @@
+"""The static limit: as V_p goes to zero, does the walking insect tend to the plan and to the paper's static criterion?
+
+The same starts walk at smaller and smaller V_p, with the insect's own legs and with legs of next to no mass, as the
+paper has them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.measures.cells import WalkSettings
+from hexmj.measures.compare import with_flss
+from hexmj.measures.figures import caption
+from hexmj.plotting import MEASURE_STYLES, frequency_curve, head, picture, tidy
+from hexmj.stability import loss_time, walk_margin
+from hexmj.studies.base import Study
+from hexmj.sweep import Cell, over_axes
+from hexmj.timing import Acceleration
+from hexmj.validate import distinct
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hexmj.measures.physical import PhysicalWalk
+
+LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
+"""Measure of FLSS -> the outcome whose frequency it is: `compare.MEASURES`, and `grounded`, the measured one with all
+feet at the ground, see `measures.support`."""
+
+DISTANCES = {
+    "margin": ("mm", "mean distance between measured and planned stability margin"),
+    "margin_grounded": ("mm", "the same with all feet at the ground"),
+    "margin_pressure": ("mm", "the same for the margin of the centre of pressure"),
+    "margin_same_feet": ("mm", "the same for the measured margin while the planned feet stand"),
+    "same_feet": ("1", "fraction of steps in which the planned feet stand"),
+    "same_feet_grounded": ("1", "the same with all feet at the ground"),
+    "drift": ("mm", "mean distance of the centre of mass from O"),
+}
+"""Distance of a measured walk from its plan, until the plan loses stability or the insect falls -> unit, long name."""
+
+REPORTED = {"slip": "mm/s", "tracking": "mm"}
+"""Other outcomes in the result, and their units."""
+
+FINE = Conditions(longest_substep=0.5)
+"""Light legs need physics steps of 0.5 ms or less."""
+
+LINES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
+"""Lines for the masses of the legs in turn."""
+
+BESIDE = 1.03
+"""Factor of V_p by which the points of several masses stand beside each other."""
+
+GREEN = "#46a35e"
+STYLES: dict[str, dict[str, Any]] = {
+    "measured": {"color": MEASURE_STYLES["measured"]["color"], "marker": "s"},
+    "grounded": {"color": GREEN, "marker": "D"},
+    "physical": {"color": MEASURE_STYLES["physical"]["color"], "marker": "^"},
+    "centre of pressure": {"color": "0.6", "marker": "v"},
+    "measured, same feet stand": {"color": "#6a4c93", "marker": "o"},
+    "": {"color": "#1b6ca8", "marker": "o"},
+}
+"""Name in a legend -> style."""
+
+PANELS = {
+    "agreement": (
+        "starts with the kinematic answer",
+        {"agreement_measured": "measured", "agreement_grounded": "grounded", "agreement": "physical"},
+    ),
+    "margin": (
+        "distance from the planned margin [mm]",
+        {
+            "margin_pressure": "centre of pressure",
+            "margin": "measured",
+            "margin_grounded": "grounded",
+            "margin_same_feet": "measured, same feet stand",
+        },
+    ),
+    "drift": ("centre of mass from O [mm]", {"drift": ""}),
+}
+"""Panel -> label of its axis, and its variables with their names in the legend."""
+
+LEGEND: dict[str, Any] = {
+    "loc": "lower left",
+    "bbox_to_anchor": (0.0, 1.0),
+    "frameon": False,
+    "fontsize": 8,
+    "handlelength": 1.6,
+    "handletextpad": 0.5,
+    "columnspacing": 1.2,
+    "ncols": 2,
+}
+"""Places a legend above its panel."""
+
+
+@dataclass(frozen=True)
+class StaticLimit(Study):
+    """The same starts at every V_p, with every mass of the legs."""
+
+    controller: Controller
+    """Controller that plans the walks."""
+    velocity: float = 0.5
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1; when accelerating, the final one."""
+    vps: Sequence[float] = (400.0, 200.0, 100.0, 50.0, 25.0)
+    """Velocities V_p of a protracting tip [mm/s]."""
+    leg_masses: Sequence[float] = (1.0, 0.01)
+    """Masses of the legs as fractions of the insect's own; the paper's legs have none."""
+    observation_time: str | float = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    acceleration: Acceleration | None = None
+    """The accelerating procedure of Eq. 11."""
+    n_starts: int = field(default=200, kw_only=True)
+    """Number of random starts, the same for every V_p and mass."""
+    conditions: Conditions = field(default=FINE, kw_only=True)
+
+    hidden: ClassVar[tuple[str, ...]] = ("vp", "leg_mass")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        distinct("vps", self.vps)
+        distinct("leg_masses", self.leg_masses)
+        _ = self.varied
+
+    @property
+    def varied(self) -> list[Conditions]:
+        """The conditions at each mass of the legs and V_p."""
+        return [replace(self.conditions, leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
+
+    @property
+    def duration(self) -> float:
+        """Observation time [time units]."""
+        return self.observed[1].item()
+
+    def cells(self) -> list[Cell]:
+        """Return a cell for each mass of the legs and V_p."""
+
+        def cell(conditions: Conditions) -> Cell:
+            name = f"leg-mass-{conditions.leg_mass:g}-vp-{conditions.vp:g}"
+            walks = self.walks(self.velocity, self.duration, conditions)
+            return Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride))
+
+        self.check_walks([self.velocity], *self.varied)
+        return [cell(conditions) for conditions in self.varied]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return FLSS, agreement and distances from the plan.
+
+        Returns:
+            Over (leg_mass, vp): the FLSS of `LOSSES` with 95 % Wilson intervals; `agreement`, the fraction of starts
+            for which the kinematic and the physical answer are the same, `agreement_measured` and
+            `agreement_grounded`, the same for those answers. Over (leg_mass, vp, start): the outcomes behind them,
+            `DISTANCES` and `REPORTED`.
+        """
+        mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
+        table = over_axes({"leg_mass": len(self.leg_masses), "vp": len(self.vps)}, data).assign_coords(
+            vp=("vp", list(self.vps), {"units": "mm/s", "long_name": "velocity V_p of a protracting tip"}),
+            leg_mass=("leg_mass", list(self.leg_masses), mass),
+        )
+        lost = table.planned_loss < np.inf
+        for measure in ("measured", "grounded"):
+            same = (table[LOSSES[measure]] < np.inf) == lost
+            attrs = {"units": "1", "long_name": f"kinematic and {measure} answer agree"}
+            table[f"agreement_{measure}"] = same.mean("start").assign_attrs(attrs)
+        return self.labelled(with_flss(table, LOSSES), "converge", velocity=self.velocity, duration=self.duration)
+
+
+def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
+    """Return the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start: a cell of the study."""
+    import xarray as xr
+
+    from hexmj.measures.support import grounded
+
+    walk = walks.walk(walks.starts, threads)
+    outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
+    lost = {name: ("start", outcomes[name], {"units": "time unit"}) for name in LOSSES.values()}
+    away = {}
+    for name, values in distances(walk).items():
+        units, long_name = DISTANCES[name]
+        away[name] = ("start", values, {"units": units, "long_name": long_name})
+    reported = {name: ("start", outcomes[name], {"units": unit}) for name, unit in REPORTED.items()}
+    return xr.Dataset(lost | away | reported)
+
+
+def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
+    """Return `DISTANCES` of every start, (start,); NaN where the plan is lost at once.
+
+    If the controller reads the legs, the distance is that from the plan that it commands.
+    """
+    from hexmj.measures.support import grounded, pressure_margin
+
+    plan, measured, near = walk.ordered, walk.measured, grounded(walk)
+    compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
+    wanted, pressure = walk_margin(plan), pressure_margin(walk)
+    with np.errstate(invalid="ignore"):  # steps without a standing foot, which do not count
+        off, off_grounded = (np.abs(walk_margin(feet) - wanted) for feet in (measured, near))
+    same, same_near = ((feet.stance == plan.stance).all(axis=-1) for feet in (measured, near))
+    drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
+    touching = compared & measured.stance.any(axis=-1)  # there is no margin without a foot
+    return {
+        "margin": _mean(off, touching),
+        "margin_grounded": _mean(off_grounded, touching),
+        "margin_pressure": _mean(np.abs(pressure - wanted), compared & np.isfinite(pressure)),
+        "margin_same_feet": _mean(off, touching & same),
+        "same_feet": _mean(same, compared),
+        "same_feet_grounded": _mean(same_near, compared),
+        "drift": _mean(drift, compared),
+    }
+
+
+def _mean(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return the mean over the steps that count, (start,), from two arrays (step, start)."""
+    with np.errstate(invalid="ignore"):
+        return np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
+
+
+def static_limit_figure(result: "xr.Dataset") -> "Figure":
+    """Draw four panels against V_p, with a kind of line for each mass of the legs."""
+    from matplotlib.lines import Line2D
+
+    figure = picture(9.6, 7.6)
+    axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
+    masses = result.leg_mass.values
+    lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
+    shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else [1.0]
+    for (mass, line), shift in zip(lines.items(), shifts, strict=True):
+        data, first = result.sel(leg_mass=mass).sortby("vp"), mass == masses[0]
+        _frequencies(axes["flss"], data, line, shift, first)
+        for panel, (_, curves) in PANELS.items():
+            for name, label in curves.items():
+                values = data[name] if panel == "agreement" else data[name].mean("start")
+                style = {"markersize": 4.5, "linewidth": 1.6, "label": label if first and label else None}
+                axes[panel].plot(data.vp, values, linestyle=line, **style, **STYLES[label])
+    axes["flss"].set(ylabel="FLSS")
+    for panel, (label, _) in PANELS.items():
+        axes[panel].set(ylabel=label)
+    for panel, ax in axes.items():
+        if panel in ("flss", "agreement"):
+            ax.set(ylim=(-0.02, 1.02))
+        else:
+            ax.update_datalim([(0.0, 0.0)], updatex=False)
+            ax.autoscale_view(scalex=False)
+            ax.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
+        _vp_axis(ax, result.vp.values)
+    handles = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
+    axes["drift"].legend(handles=handles, **LEGEND)
+    head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
+    return figure
+
+
+def _frequencies(axes: "Axes", data: "xr.Dataset", line: Any, shift: float, first: bool) -> None:
+    """Draw the FLSS at one mass of the legs; the kinematic one, a band, depends on neither mass nor V_p."""
+    if first:
+        low, middle, high = (data[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
+        colour = MEASURE_STYLES["kinematic"]["color"]
+        axes.axhspan(low, high, color=colour, alpha=0.15, linewidth=0)
+        axes.axhline(middle, color=colour, linewidth=1.6, label="kinematic")
+    for measure in ("measured", "grounded", "physical"):
+        label = measure if first else None
+        frequency_curve(axes, data.vp * shift, data, measure, label=label, linestyle=line, **STYLES[measure])
+
+
+def _vp_axis(axes: "Axes", vps: np.ndarray) -> None:
+    axes.set_xscale("log")
+    axes.set_xticks(vps, [f"{vp:g}" for vp in vps])
+    axes.minorticks_off()
+    axes.set_xlim(0.85 * vps.min(), vps.max() / 0.85)
+    tidy(axes)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(**LEGEND)

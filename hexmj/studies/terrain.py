@@ -1,0 +1,231 @@
+"""Obstacles in physics: how often the insect falls once it has reached a step, gap, hurdle or rough ground.
+
+The same starts walk on flat ground and towards every obstacle, and do the same until a foot reaches it. The commanded
+distance takes the hindmost foot one stride beyond the longest obstacle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError
+from hexmj.measures.cells import outcome_table
+from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.tables import VELOCITY, reach
+from hexmj.plotting import frequency_curve, head, picture, tidy
+from hexmj.starts import checked_list
+from hexmj.stats import wilson_intervals
+from hexmj.studies.base import Study
+from hexmj.sweep import Cell, over_axes
+from hexmj.timing import Stride, steps_within
+from hexmj.validate import distinct
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
+"""Kinds of ground that are not flat, see `Conditions.ground`."""
+
+OUTCOMES = {  # units, long_name
+    "fall": ("time unit", "first contact of the trunk with the ground, or inf"),
+    "fall_part": ("1", "index of the part that touched first, -1 for none"),
+    "tilt": ("rad", "greatest tilt of the trunk"),
+    "speed": ("1", "distance walked ahead over distance commanded, until the fall"),
+}
+"""Fields of `physics.outcomes.Outcomes` in the result."""
+
+FARTHER = Conditions(ground_at=80.0)
+"""Default conditions: walks have found their gait before they reach an obstacle."""
+
+SIZES = {
+    "step": "height of the step [mm]",
+    "gap": "length of the gap [mm]",
+    "hurdle": "height of the hurdle [mm]",
+    "rough": "highest bump [mm]",
+}
+"""Kind of ground -> label of its axis."""
+
+FLAT = "flat"
+"""Ground that stands in every column of the figure."""
+
+STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
+    {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
+    {"color": "#e08e1b", "marker": "^", "linestyle": "-."},
+    {"color": "#b3261e", "marker": "D", "linestyle": ":"},
+    {"color": "#6a4c93", "marker": "v", "linestyle": "-"},
+)
+"""Styles of the velocities in turn."""
+
+
+@dataclass(frozen=True)
+class Terrain(Study):
+    """The same starts on flat ground and towards every obstacle, with and without adhesion, at every velocity."""
+
+    controller: Controller
+    """Controller that plans the walks."""
+    velocities: Sequence[float] = (0.2, 0.4, 0.6)
+    """Velocities V_r as fractions of V_p, 0 < V < 1; the commanded distance is the same for all."""
+    grounds: Sequence[ObstacleKind] = ("step", "gap", "hurdle", "rough")
+    """Kinds of obstacles, beside flat ground."""
+    heights: Sequence[float] = (2.0, 4.0, 6.0)
+    """Heights of steps, hurdles and rough ground [mm]."""
+    lengths: Sequence[float] = (2.5, 5.0, 10.0)
+    """Lengths of gaps [mm]."""
+    grasps: Sequence[float] = (0.0, 1.0)
+    """Adhesion of a standing foot, in multiples of the insect's weight."""
+    n_starts: int = field(default=30, kw_only=True)
+    """Number of random starts, the same for every obstacle."""
+    conditions: Conditions = field(default=FARTHER, kw_only=True)
+
+    hidden: ClassVar[tuple[str, ...]] = ("ground", "ground_height", "grasp")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.observed[0] > 0).all():
+            raise InputError(f"velocities = {self.velocities}; expected V > 0, or no obstacle is ever reached")
+        for name in ("grounds", "heights", "lengths", "grasps"):
+            distinct(name, getattr(self, name))
+        for grasp in self.grasps:
+            replace(self.conditions, grasp=grasp)
+        _ = self.obstacles
+
+    @property
+    def obstacles(self) -> dict[str, Conditions]:
+        """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'."""
+        named = {"flat": self.conditions}
+        for ground in self.grounds:
+            name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
+            for size in sizes:
+                obstacle = f"{ground} {float(size)}".removesuffix(".0")
+                named[f"{obstacle} mm"] = replace(self.conditions, ground=ground, **{name: size})
+        return named
+
+    @property
+    def distance(self) -> float:
+        """Commanded distance [mm]."""
+        _, behind = reach(self.stride)
+        return max(map(_end, self.obstacles.values())) + behind + self.stride.aep0 - self.stride.pep0
+
+    def cells(self) -> list[Cell]:
+        """Return a cell for each obstacle, grasp and velocity."""
+        before = self.obstacles
+
+        def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
+            name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", replace(before[obstacle], grasp=grasp)
+            walks = self.walks(velocity, self.distance / velocity, conditions)
+            return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
+
+        self.check_walks(self.velocities, *(replace(self.conditions, grasp=grasp) for grasp in self.grasps))
+        v = checked_list(self.velocities)
+        return [cell(name, grasp, velocity) for name in before for grasp in self.grasps for velocity in v]
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return what happened to the starts.
+
+        Returns:
+            Over (obstacle, grasp, velocity), the obstacle 'flat' first: `reached`, the number of starts that did not
+            fall until a front foot could reach the obstacle, `flss`, the fraction of these that fell, with its 95 %
+            Wilson interval `flss_low`, `flss_high`, and `crossed`, the number that never fell and whose hind feet are
+            beyond the obstacle. Over start too: `OUTCOMES`, the `distance` walked [mm], and `after`, whether the start
+            fell after it had reached the obstacle.
+        """
+        (ahead, behind), at = reach(self.stride), self.conditions.ground_at
+        table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
+        return self.labelled(table, "terrain", observation_time=f"{self.distance:g} / V", distance=self.distance)
+
+    def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return the outcomes over (obstacle, grasp, velocity, start)."""
+        before = self.obstacles
+        sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
+        end = [_end(conditions) for conditions in before.values()]
+        grasp = {"units": "1", "long_name": "adhesion of a foot over the insect's weight"}
+        table = over_axes(sizes, [cell[list(OUTCOMES)] for cell in data]).assign_coords(
+            obstacle=list(before),
+            ground=("obstacle", [conditions.ground for conditions in before.values()]),
+            size=("obstacle", [_size(conditions) for conditions in before.values()], {"units": "mm"}),
+            end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
+            grasp=("grasp", list(self.grasps), grasp),
+            velocity=("velocity", checked_list(self.velocities), VELOCITY),
+        )
+        for name, (units, long_name) in OUTCOMES.items():
+            table[name].attrs = {"units": units, "long_name": long_name}
+        return table
+
+
+def _end(conditions: Conditions) -> float:
+    """Return where an obstacle ends, or a step has been climbed, ahead of O at the start [mm]."""
+    return conditions.ground_at + (conditions.ground_length if conditions.ground in ("gap", "hurdle") else 0.0)
+
+
+def _size(conditions: Conditions) -> float:
+    """Return the length of a gap or the height of another obstacle [mm]; 0 for flat ground."""
+    return {"flat": 0.0, "gap": conditions.ground_length}.get(conditions.ground, conditions.ground_height)
+
+
+def with_crossings(data: "xr.Dataset", distance: float, stride: Stride, begin: float, behind: float) -> "xr.Dataset":
+    """Add the FLSS of the starts that reach an obstacle, and the other variables of `Terrain.result`.
+
+    Args:
+        data: over (obstacle, grasp, velocity, start).
+        distance: commanded, in whole steps [mm].
+        stride: of these steps.
+        begin: commanded distance at which a front foot may reach the obstacle [mm].
+        behind: how far behind O a hind foot may stand [mm].
+    """
+    import xarray as xr
+
+    time = steps_within(distance / data.velocity.values, stride) * stride.dt
+    commanded = np.minimum(data.fall, data.velocity.copy(data=time)) * data.velocity
+    walked = (data.speed * commanded).assign_attrs(units="mm", long_name="distance walked by O")
+    upright, reaching = np.isinf(data.fall), commanded > begin
+    after = reaching & ~upright
+    reached, fell = reaching.sum("start"), after.sum("start")
+    low, high = wilson_intervals(fell.values, reached.values)
+    crossed = (upright & (walked > data.end + behind)).sum("start")
+    unit = {"units": "1"}
+    return data.assign(
+        distance=walked,
+        after=after.assign_attrs(unit, long_name="fell after it had reached the obstacle"),
+        reached=reached.assign_attrs(unit, long_name="starts that reached the obstacle"),
+        crossed=crossed.assign_attrs(unit, long_name="starts that crossed it without a fall"),
+        flss=(fell / xr.where(reached > 0, reached, np.nan)).assign_attrs(unit, long_name="FLSS from there on"),
+        flss_low=(fell.dims, low, unit),
+        flss_high=(fell.dims, high, unit),
+    )
+
+
+def terrain_figure(result: "xr.Dataset") -> "Figure":
+    """Draw a column for each kind of ground and a row for each grasp; flat ground is at 0 mm."""
+    kinds, grasps = list(dict.fromkeys(result.ground.values[result.ground.values != FLAT])), result.grasp.values
+    figure = picture(max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
+    panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
+    for row, grasp in zip(panels, grasps, strict=True):
+        for axes, kind in zip(row, kinds, strict=True):
+            chosen = np.isin(result.ground.values, (FLAT, kind))
+            _curves(axes, result.sel(grasp=grasp).isel(obstacle=np.flatnonzero(chosen)).sortby("size"))
+        row[0].set_ylabel(f"FLSS, grasp {grasp:g}")
+    for axes, kind in zip(panels[-1], kinds, strict=True):
+        axes.set_xlabel(SIZES[kind])
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=min(5, len(labels)))
+    title = "Falls once the obstacle has been reached, with 95 % intervals"
+    head(figure, title, caption_of_at_least(int(result.reached.min()), result))
+    return figure
+
+
+def _curves(axes: "Axes", data: "xr.Dataset") -> None:
+    """Draw FLSS against size, (obstacle, velocity), with its intervals side by side."""
+    sizes, count = data["size"].values, data.sizes["velocity"]
+    shifts = (np.arange(count) - (count - 1) / 2) * 0.02 * sizes.max()
+    for v, style, shift in zip(data.velocity.values, STYLES * count, shifts, strict=False):
+        frequency_curve(axes, sizes + shift, data.sel(velocity=v), "flss", label=f"V = {v:g}", **style)
+    axes.set(ylim=(-0.02, 1.02))
+    axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    tidy(axes)

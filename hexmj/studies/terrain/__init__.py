@@ -1,1 +1,0 @@
-"""Real obstacles: steps, gaps, hurdles and rough ground."""

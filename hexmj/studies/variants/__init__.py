@@ -1,1 +1,0 @@
-"""Sets of weights under every variant of what the paper leaves open."""
