@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.checks import typed
 from hexmj.controllers.checked_plans import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.diagrams import footfall_html
@@ -17,7 +16,8 @@ from hexmj.phases import PAIRS, circular_mean
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
-from hexmj.walks import Walk, check_time_grows, checked_walk, part_of
+from hexmj.validate import number, whole
+from hexmj.walks import Walk, part_of
 
 TOLERANCE = 0.002
 """A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
@@ -79,7 +79,7 @@ class Gait:
 
 
 TOLD = ("1-2", "2-3", "1-4")
-"""Pairs whose phases are told in a line."""
+"""Pairs whose phases `repr` shows."""
 
 
 def gait(walk: Walk) -> Gait:
@@ -88,13 +88,12 @@ def gait(walk: Walk) -> Gait:
     A leg that is raised in the walk's first step has no onset there: what stood before is not known.
 
     Raises:
-        InputError: a walk of fewer than two steps, of no starts, or whose time does not grow.
+        InputError: a walk of fewer than two steps, or of no starts.
     """
-    if len(checked_walk(walk).time) < 2:
+    if len(walk.time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     if not walk.stance.shape[1]:
         raise InputError("a walk of 0 starts; expected at least 1")
-    check_time_grows(walk)
     regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
     longest = int(_steps(regimes["looked_at"], walk.time).max())
     return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
@@ -125,11 +124,9 @@ def limit_gait(
         periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
         threads: one per core unless given; the result does not depend on it.
     """
-    velocity, periods = typed("velocity", velocity, float), typed("periods", periods, int)
-    if not 0 < velocity < 1:
-        raise InputError(f"velocity = {velocity}; expected 0 < V < 1, since V = 0 has no period")
-    if not periods >= CYCLES + 2:
-        raise InputError(f"periods = {periods}; expected at least {CYCLES + 2}, the last of them incomplete")
+    if not 0 < number("velocity", velocity) < 1:
+        raise InputError(f"velocity = {velocity}; expected 0 < V < 1")
+    whole("periods", periods, CYCLES + 2)
     plan = begin(controller, draw_starts(n_starts, seed, stride), velocity, stride, acceleration, threads)
     longest = (stride.aep0 - stride.pep_min) * (1.0 + 1.0 / velocity)  # from AEP_0 to PEP_min and back
     speeding = acceleration.duration(velocity) if acceleration else 0.0

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import numbers, short, typed
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2
+from hexmj.validate import numbers, short
 
 PAIRS: dict[str, tuple[int, int]] = {
     f"{j + 1}-{k + 1}": (j, k)
@@ -38,13 +38,11 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
     0.5, and have none.
 
     Raises:
-        InputError: no numbers, none at all, or no such axis.
+        InputError: there are no phases.
     """
-    angle, axis = 2.0 * np.pi * numbers("phase", phase), typed("axis", axis, int | None)
-    if axis is not None and not -angle.ndim <= axis < angle.ndim:
-        raise InputError(f"axis = {axis}; expected one of the {angle.ndim} of phase")
-    if not (angle.size if axis is None else angle.shape[axis]):
-        raise InputError(f"phase = {short(phase)}; expected at least one")
+    angle = 2.0 * np.pi * numbers("phase", phase)
+    if not angle.size:
+        raise InputError("phase has no values")
     across, along = np.sin(angle).mean(axis), np.cos(angle).mean(axis)
     mean = np.arctan2(across, along) / (2.0 * np.pi)
     balance = np.hypot(across, along) < ROUNDING
@@ -99,12 +97,8 @@ def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName
     Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'.  'tripod': so do those
     along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
     'negative metachrony': both between 0 and 0.5, front, middle, hind.
-
-    Raises:
-        InputError: phases that are no numbers.
     """
-    along = typed("phase_12", phase_12, float), typed("phase_23", phase_23, float)
-    typed("contralateral", contralateral, float)
+    along = phase_12, phase_23
     if not abs(contralateral - 0.5) <= NEAR:
         return "other"
     if all(abs(phase - 0.5) <= NEAR for phase in along):

@@ -29,10 +29,8 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
     """Show the progress of a block, which calls the function that this yields."""
-    if sys.stderr.isatty():
-        bar = _in_terminal
-    else:
-        bar = _in_notebook if "ipykernel" in sys.modules else _in_lines
+    elsewhere = _in_notebook if "ipykernel" in sys.modules else _in_lines
+    bar = _in_terminal if sys.stderr.isatty() else elsewhere
     with bar(label) as advance:
         yield advance
 

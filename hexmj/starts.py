@@ -1,20 +1,20 @@
-"""Random starts of walks, all standing (paper, Section 3), and what is checked of starts and velocities."""
+"""Random initial leg configurations (starts), all legs standing (paper, Section 3); checks of starts and velocities."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import given, numbers, short, typed, whole
 from hexmj.errors import InputError
-from hexmj.legs import in_order
+from hexmj.legs import leg_last
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import distinct, numbers, short, whole
 
 SAMPLE = 1000
 """Starts of one sample of the paper's protocol; it takes seven of them."""
 
 SLAB = 64 * SAMPLE
-"""Starts that are drawn and held in memory at a time where only counts are kept of them."""
+"""Starts that are drawn and held in memory at a time where only their losses are counted."""
 
 MOST_STARTS = 10**10
 """Most starts of one FLSS; on two cores they take hours to days."""
@@ -34,8 +34,8 @@ def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.nd
     """
     n_starts, seed = check_draw(n_starts, seed)
     if n_starts > MOST_DRAWN:
-        raise InputError(f"starts = {n_starts}; expected at most {MOST_DRAWN} in one array")
-    return np.concatenate(list(draw_slabs(n_starts, seed, given("stride", stride, Stride))))
+        raise InputError(f"n_starts = {n_starts}; expected at most {MOST_DRAWN} in one array")
+    return np.concatenate(list(draw_slabs(n_starts, seed, stride or Stride())))
 
 
 def draw_start(start: int, seed: int, stride: Stride) -> np.ndarray:
@@ -57,41 +57,35 @@ def draw_slabs(n_starts: int, seed: int, stride: Stride, first: int = 0) -> Iter
         yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - begin), 6))
 
 
-def check_draw(n_starts: int, seed: int, name: str = "starts", seed_name: str = "seed") -> tuple[int, int]:
-    """A number of starts and a seed, unless they make no sense."""
+def check_draw(n_starts: int, seed: int, name: str = "n_starts", seed_name: str = "seed") -> tuple[int, int]:
+    """Return a number of starts and a seed if both are valid."""
     return whole(name, n_starts, 1, MOST_STARTS), whole(seed_name, seed, 0)
 
 
 def checked_starts(starts: ArrayLike, stride: Stride) -> np.ndarray:
-    """A copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0; labelled legs may come in
-    any order."""
-    x = numbers("starts", in_order(starts))
+    """Return a copy of the starts, (start, leg) [mm], if every tip stands between PEP_min and AEP_0."""
+    x = numbers("starts", leg_last(starts))
     if x.ndim != 2 or x.shape[1] != 6 or len(x) == 0:
         raise InputError(f"starts have the shape {x.shape}; expected (start, leg) with at least one start and 6 legs")
     if not ((x >= stride.pep_min) & (x <= stride.aep0)).all():
-        raise InputError(f"a start lies outside the step range, {stride.pep_min} to {stride.aep0} mm")
+        raise InputError(f"starts: a tip stands outside the step range, {stride.pep_min} to {stride.aep0} mm")
     return x
 
 
 def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceleration | None) -> np.ndarray:
-    """A copy of V_r for each start, (start,), if it lies in [0, 1[ and an acceleration can reach it."""
+    """Return V_r for each start, (start,), if it lies in [0, 1) and an acceleration can reach it."""
     v = numbers("velocity", velocity)
     if not ((v >= 0) & (v < 1)).all():
-        raise InputError(
-            f"velocity = {short(v.tolist())}; expected 0 <= V < 1, a fraction of the protraction velocity V_p"
-        )
-    typed("acceleration", acceleration, Acceleration | None)
+        raise InputError(f"velocity = {short(v.tolist())}; expected 0 <= V < 1, a fraction of V_p")
     if acceleration and not (v >= acceleration.start).all():
         raise InputError(f"velocity = {velocity}; expected at least V_r(0) = {acceleration.start} when accelerating")
     if v.shape not in ((), (n_starts,)):
-        raise InputError(f"velocities have the shape {v.shape}; expected one number or ({n_starts},), one a start")
+        raise InputError(f"velocity has the shape {v.shape}; expected one number or one for each of {n_starts} starts")
     return np.broadcast_to(v, n_starts).copy()
 
 
 def checked_list(velocities: Sequence[float], acceleration: Acceleration | None = None) -> np.ndarray:
-    """The velocities of a table, (velocity,), if there is at least one and none comes twice."""
-    v = numbers("velocities", velocities)
-    if v.ndim != 1 or len(v) == 0 or len(np.unique(v)) != len(v):
-        given = " ".join(f"{velocities}".split())
-        raise InputError(f"velocities = {given:.80}; expected a list of numbers, at least one, and none of them twice")
+    """Return the velocities of a table, (velocity,), if there is at least one and all are distinct."""
+    v = np.atleast_1d(numbers("velocities", velocities))
+    distinct("velocities", v.tolist())
     return checked_velocities(v, len(v), acceleration)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.checks import check_types, numbers, typed
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
+from hexmj.validate import number, numbers
 
 OBSERVATION_TIMES = ("walk", "start")
 """Named observation times, see `observation_duration`."""
@@ -46,9 +46,8 @@ class Stride:
     """Lines of the tips: fig1, as in Fig. 1 (`FIG1`), or centred (`CENTRED`), with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
-        check_types(self)
-        if not all(abs(v) <= FAR for v in (self.aep0, self.pep0, self.pep_min)):
-            raise InputError(f"{self}; expected aep0, pep0 and pep_min between -{FAR:g} and {FAR:g} mm")
+        for name in ("aep0", "pep0", "pep_min", "dt"):
+            object.__setattr__(self, name, number(name, getattr(self, name), -FAR, FAR))
         if not self.pep_min <= self.pep0 < self.aep0:
             raise InputError(
                 f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"
@@ -71,11 +70,10 @@ class Acceleration:
     """V_r(0), as a fraction of V_p; inferred."""
 
     def __post_init__(self) -> None:
-        check_types(self)
-        if not (math.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"acceleration = {self.rate}; expected a finite number above 0 per time unit")
+        if not (math.isfinite(number("rate", self.rate)) and self.rate > 0):
+            raise InputError(f"rate = {self.rate}; expected a finite acceleration above 0 per time unit")
         if not 0 <= self.start < 1:
-            raise InputError(f"velocity at the start = {self.start}; expected 0 <= V_r(0) < 1")
+            raise InputError(f"start = {self.start}; expected 0 <= V_r(0) < 1")
 
     def duration(self, velocity: Any) -> Any:
         """Time until V_r is reached [time units]."""
@@ -109,8 +107,8 @@ def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acce
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
         raise InputError(
-            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, the observation time ends at {end:g}; expected a"
-            " longer one, or walk or start, which are counted from then"
+            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, after the observation time of {end:g};"
+            " expected a longer one, or 'walk' or 'start', which begin when V is reached"
         )
 
 
@@ -127,11 +125,11 @@ def observation_duration(
         InputError: no such observation time, or V = 0 with the observation time 'walk'.
     """
     v = numbers("velocity", velocity)
-    if not isinstance(typed("observation_time", observation_time, str | float), str):
-        return np.full(v.shape, float(observation_time))
+    if not isinstance(observation_time, str):
+        return np.full(v.shape, number("observation_time", observation_time))
     if observation_time not in OBSERVATION_TIMES:
         raise InputError(
-            f"observation time = {observation_time!r}; valid names: {', '.join(OBSERVATION_TIMES)}, or a number of time units"
+            f"observation_time = {observation_time!r}; expected {', '.join(OBSERVATION_TIMES)} or a number of time units"
         )
     if observation_time == "walk" and (odd := v[~(v > 0)]).size:
         raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the observation time 'walk'")

@@ -7,15 +7,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hexmj.checks import typed
 from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, Geometry
+from hexmj.validate import whole
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Walk:
-    """Where the tips are, seen from the centre of mass, and which of them stand.
+    """Positions of the tips relative to the centre of mass, and which of them stand.
 
     A planned walk has the paper's centre of mass (fixed at O) and the tips as planned; a measured
     walk has the body's own centre of mass, the physical tips and the feet that touch the ground.
@@ -35,22 +35,12 @@ class Walk:
     """Origins of the legs' axes."""
 
     def __post_init__(self) -> None:
-        typed("geometry", self.geometry, Geometry)
-        shape = typed("a walk's stance", self.stance, np.ndarray).shape
-        if len(shape) != 3:
-            raise InputError(f"a walk's stance is of the shape {shape}; expected (step, start, leg)")
-        if shape[2] != len(LEGS):
-            raise InputError(f"a walk's stance is of {shape[2]} legs; expected {len(LEGS)}")
-        expected_of = {"time": shape[:1], "velocity": shape[:2]}
-        for name in _arrays(type(self)):
-            values, kind = getattr(self, name), bool if name == "stance" else float
-            expected = expected_of.get(name, shape)
-            odd = type(values) is not np.ndarray and np.ma.is_masked(typed(f"a walk's {name}", values, np.ndarray))
-            if values.shape != expected or values.dtype != kind or odd:
-                raise InputError(
-                    f"a walk's {name} is {values.dtype} of the shape {values.shape}; expected {np.dtype(kind)} of the"
-                    f" shape {expected}: its steps, starts and legs"
-                )
+        shape = np.shape(self.stance)
+        if len(shape) != 3 or shape[2] != len(LEGS):
+            raise InputError(f"stance has the shape {shape}; expected (step, start, leg) with 6 legs")
+        for name, expected in {"time": shape[:1], "velocity": shape[:2], "x": shape, "y": shape}.items():
+            if (found := np.shape(getattr(self, name))) != expected:
+                raise InputError(f"{name} has the shape {found}; expected {expected}")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({extent(self)})"
@@ -77,27 +67,6 @@ class PlannedWalk(Walk):
     the foot in time; NaN where nothing tells: then it is lowered once the leg stands."""
     height: np.ndarray = field(kw_only=True)
     """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
-
-
-def checked_walk(walk: Walk) -> Walk:
-    """What shall be a walk.
-
-    Raises:
-        InputError: it is none; of a physical walk it names those that this has.
-    """
-    if isinstance(getattr(walk, "measured", None), Walk):
-        raise InputError(f"walk is a {type(walk).__name__}; expected a Walk: its `planned`, `ordered` or `measured`")
-    return typed("walk", walk, Walk)
-
-
-def check_time_grows(walk: Walk) -> None:
-    """Refuse a walk that is none, as of several that were joined.
-
-    Raises:
-        InputError: its time is not finite, or does not grow with each step.
-    """
-    if not (np.isfinite(walk.time).all() and (np.diff(walk.time) > 0).all()):
-        raise InputError("a walk whose time does not grow with each step; expected that of one walk")
 
 
 def extent(walk: Walk) -> str:
@@ -131,8 +100,7 @@ def one_start(walk: AnyWalk, start: int) -> AnyWalk:
         InputError: there is no such start.
     """
     count = walk.stance.shape[1]
-    if not 0 <= typed("start", start, int) < count:
-        raise InputError(f"start = {start}; expected 0 to {count - 1}")
+    whole("start", start, 0, count - 1)
     return of_starts(walk, slice(start, start + 1))
 
 

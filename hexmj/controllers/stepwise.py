@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hexmj.checks import NO_ARRAY, whole
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
-from hexmj.legs import in_order
+from hexmj.legs import leg_last
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride, commanded_velocities
 from hexmj.walks import PLANNED, PlannedWalk
@@ -108,7 +108,7 @@ def stepwise(
 
 def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """A value of one step that can be written into (start, leg); labelled legs may come in any order."""
-    value = value if type(value) is np.ndarray else in_order(value, f"{name} of a step")
+    value = value if type(value) is np.ndarray else leg_last(value)
     try:
         values = np.asarray(value)
     except NO_ARRAY:

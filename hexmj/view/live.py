@@ -14,7 +14,7 @@ from hexmj.conditions import Bound, Conditions, check_ground
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.legs import in_order
+from hexmj.legs import leg_last
 from hexmj.physics.chunks import Chunk, Insects
 from hexmj.physics.measured import measured_walk
 from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
@@ -93,7 +93,7 @@ class LiveWalk:
             InputError: a value that makes no sense.
         """
         self.controller, self.velocity = controller, typed("velocity", velocity, float)
-        self.start = numbers("start", in_order(start))
+        self.start = numbers("start", leg_last(start))
         self.conditions = given("conditions", conditions, Conditions)
         self.stride = given("stride", stride, Stride)
         self.begin()
@@ -104,7 +104,7 @@ class LiveWalk:
         Raises:
             InputError: the insect cannot walk so; the walk goes on as it was.
         """
-        start = self.start if start is None else numbers("start", in_order(start))
+        start = self.start if start is None else numbers("start", leg_last(start))
         wanted: Conditions = typed("conditions", self.conditions if conditions is None else conditions, Conditions)
         check_ground(wanted)
         settled = settle(start[np.newaxis], wanted, self.stride, threads=1)

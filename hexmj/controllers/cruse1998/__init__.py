@@ -8,12 +8,12 @@ from hexmj.controllers.cruse1998.weights import Symmetric, Weights
 __all__ = [
     "HWS",
     "LDVS",
-    "PRESETS",
     "MODEL_VARIANTS",
+    "PRESETS",
     "UNCOORDINATED",
     "Cruse1998",
-    "Order",
     "ModelVariant",
+    "Order",
     "Symmetric",
     "Weights",
 ]

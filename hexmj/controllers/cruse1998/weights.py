@@ -14,8 +14,7 @@ import numpy as np
 
 from hexmj.checks import check_types, numbers, short, typed, whole
 from hexmj.errors import InputError
-from hexmj.labels import check_labels
-from hexmj.legs import LEGS, N1, N2, N3, N4, check_order
+from hexmj.legs import LEGS, N1, N2, N3, N4
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
@@ -66,7 +65,6 @@ class Weights:
 
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
-            check_order(getattr(self, kind), kind)
             matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6):
                 raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
@@ -109,7 +107,6 @@ class Weights:
         numbered = numbers("weights", vector)
         if (size := numbered.size) not in (48, 58):
             raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
-        check_labels(vector, names_of(_in_vector(size)), "weights")
         return cls.of(dict(zip(_in_vector(size), numbered.ravel(), strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
@@ -171,7 +168,6 @@ class Symmetric:
             names.remove("p34_i")
         elif len(values) != 10:
             raise InputError(f"{len(values)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
-        check_labels(vector, names, "weights")
         return cls(**dict(zip(names, values, strict=True)))
 
     def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
