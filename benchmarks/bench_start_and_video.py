@@ -9,7 +9,7 @@ import mujoco
 import pytest
 
 from hexmj import LDVS, Film, draw_starts, physical_walk, record, render
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.rendering import gl
 from hexmj.replay.take import Take
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.table import print_table
 from hexmj import LDVS, Conditions, SimulationError, Stride, draw_starts
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.files import write_text
 from hexmj.io import json_text
 from hexmj.measures.physical import physical_outcomes

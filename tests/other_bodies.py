@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.compiled import kinematics
+from hexmj.bodies.kinematics import kinematics
 from hexmj.body import STICK_INSECT, Body, Leg
 from hexmj.legs import LEGS, SIDE
 

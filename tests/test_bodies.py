@@ -13,10 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from compiled_bodies import at_home, changed_body, conditions, differences
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.gains import gains, longest_lever
-from hexmj.bodies.grounds import depth_in_ground, ground_level
-from hexmj.bodies.hinges import ThreeHinges
-from hexmj.bodies.loading import compile_body, plain_model
+from hexmj.bodies.ground import depth_in_ground, ground_level
+from hexmj.bodies.kinematics import ThreeHinges
+from hexmj.bodies.mjcf import compile_body, gains, longest_lever, plain_model
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Servo
 from hexmj.errors import InputError
 from hexmj.legs import FIG1

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drawing import drawing
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 from hexmj.environments.frames import Frames
 from hexmj.errors import RenderingError

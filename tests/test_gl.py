@@ -17,7 +17,7 @@ FRAME = """
 import os
 import mujoco
 before = dict(os.environ)
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 import hexmj.measures.compare, hexmj.replay.recording, hexmj.replay.film.video
 from hexmj.rendering import gl

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import JOINTS, PARTS, ROOT_QPOS, STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.legs import FIG1, LEGS, MIRROR

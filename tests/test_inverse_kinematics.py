@@ -8,10 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
-from hexmj.bodies.compiled import kinematics
-from hexmj.bodies.hinges import ThreeHinges, three_hinges
-from hexmj.bodies.loading import plain_model
-from hexmj.bodies.numeric import HingeChains, hinge_chains
+from hexmj.bodies.kinematics import HingeChains, ThreeHinges, hinge_chains, kinematics, three_hinges
+from hexmj.bodies.mjcf import plain_model
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.legs import FIG1, LEGS, MIRROR
 from other_bodies import any_hexapod

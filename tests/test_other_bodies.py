@@ -13,10 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from compiled_bodies import at_home, conditions, differences
 from film_reader import read_film
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.gains import gains, longest_lever
-from hexmj.bodies.hinges import ThreeHinges
-from hexmj.bodies.loading import compile_body, plain_model
-from hexmj.bodies.numeric import HingeChains
+from hexmj.bodies.kinematics import HingeChains, ThreeHinges
+from hexmj.bodies.mjcf import compile_body, gains, longest_lever, plain_model
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions, Ground
 from hexmj.controllers.cruse1998 import LDVS

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 from chromium import Tab, tab
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import UNCOORDINATED

@@ -8,7 +8,7 @@ import pytest
 from mujoco.batch import Batch
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin

@@ -11,7 +11,7 @@ from hexmj.storage import netcdf
 from hexmj.storage.files import sealed
 from numpy.testing import assert_allclose
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED

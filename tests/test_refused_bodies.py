@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compiled_bodies import at_home, changed_body, conditions, differences
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Leg
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError

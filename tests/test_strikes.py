@@ -9,14 +9,14 @@ import pytest
 from dm_control.rl.control import PhysicsError
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj.bodies.grounds import depth_in_ground
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.ground import depth_in_ground
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller
 from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.protocol import Controller
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
 from hexmj.environments.single_body import Alone

@@ -26,8 +26,8 @@ from hexmj import (
     physical_walk,
     render,
 )
-from hexmj.bodies.grounds import beyond_the_ground, ground_level
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.ground import beyond_the_ground, ground_level
+from hexmj.bodies.mjcf import compile_body
 from hexmj.io import settings
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.measures.tables import reach

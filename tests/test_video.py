@@ -15,7 +15,7 @@ from PIL import Image, ImageSequence
 from compiled_bodies import changed_body
 from drawing import drawing
 from film_reader import read_film
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError, RenderingError

@@ -1,1 +1,1 @@
-"""Bodies: what a six-legged body is, its kinematics and gains, and how it is compiled on its ground."""
+"""Bodies: MJCF, validation, kinematics, ground and the compiled model."""

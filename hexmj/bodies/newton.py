@@ -1,9 +1,8 @@
-"""Newton's method for a chain of hinges whose foot shall reach a tip.
+"""Newton's method for a chain of hinges: joint angles that put the foot at a tip.
 
-The solution is sought from posture home, with damping where a whole step does not bring the foot closer, and with
-joints held at their limits while the step would take them beyond; where that ends elsewhere it begins again from a few
-other postures.  With more than three hinges the foot is then held at the tip while the angles slide toward home, until
-none near by is nearer [rad, Euclidean].
+It starts from posture home, adds damping if a whole step does not bring the foot closer, and holds joints at their
+limits while the step would take them beyond. If it fails it starts again from a few other postures. With more than
+three hinges the angles then slide toward home with the foot at the tip, to the nearest posture [rad, Euclidean].
 """
 
 import math
@@ -20,25 +19,25 @@ FARTHEST = 0.5
 """Greatest change of an angle in one step [rad]."""
 
 ATTEMPTS = 24
-"""Postures to begin from before a tip counts as out of reach."""
+"""Initial postures before a tip counts as out of reach."""
 
 PRIMES = (2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0)
-"""Their roots are the irrational numbers with which these postures are spread."""
+"""The multiples of their roots distribute these postures."""
 
 STEPS, MOST_DAMPING = 60, 1e6
-"""Steps from one posture, accepted or not, and damping, after which a tip counts as out of reach from there."""
+"""Greatest number of steps from one posture, accepted or not, and greatest damping."""
 
 SLIDES, STILL = 200, 1e-10
-"""Steps along the postures that reach a tip, and how small they are where the nearest to home is found [rad]."""
+"""Greatest number of steps toward home, and the size of the last one [rad]."""
 
 NOTHING = (0.0, 0.0, 0.0)
 
 
 @jitted
 def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
-    """Angles that put tips, (n, leg, axis), where they are wanted, (n, leg, joint), and whether any do, (n, leg).
+    """Angles that reach tips, (n, leg, axis): (n, leg, joint), and whether there are any, (n, leg).
 
-    `chains` are `numeric.HingeChains`.
+    `chains` are `kinematics.HingeChains`.
     """
     legs, hinges = chains.zero.shape
     joints, reachable = np.empty((len(tips), legs, hinges)), np.zeros((len(tips), legs), dtype=np.bool_)
@@ -47,7 +46,7 @@ def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
         for leg in range(legs):
             tip = tips[n, leg]
             off = _plus(tip, -1.0, chains.anchor[leg, 0])
-            if math.sqrt(_dot(off, off)) <= chains.length[leg] + CLOSE:  # not so where it is not finite
+            if math.sqrt(_dot(off, off)) <= chains.length[leg] + CLOSE:  # False for NaN
                 reachable[n, leg] = _reached(joints[n, leg], tip, leg, chains, lever)
             if not reachable[n, leg]:
                 joints[n, leg] = math.nan
@@ -56,9 +55,9 @@ def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
 
 @part
 def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
-    """Whether a posture is found that reaches a tip; it is written to `angles`.
+    """Whether a posture reaches a tip; it is written to `angles`.
 
-    It is sought from home, then from postures that fill the ranges evenly, as multiples of irrational numbers do.
+    The search starts from home, then from postures that fill the ranges evenly, as multiples of irrational numbers do.
     """
     low, high = chains.low[leg], chains.high[leg]
     for attempt in range(ATTEMPTS):
@@ -74,7 +73,7 @@ def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
 
 @part
 def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
-    """Bring the foot to a tip as near as Newton's method can; its distance [mm]."""
+    """Bring the foot as near to a tip as Newton's method can; return its distance [mm]."""
     low, high = chains.low[leg], chains.high[leg]
     damping, step, trial = 0.0, np.empty_like(angles), np.empty_like(angles)
     distance = _look(angles, tip, leg, chains, lever)
@@ -96,7 +95,7 @@ def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
 
 @part
 def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> None:
-    """Among the postures that reach a tip go down the distance from home as far as it goes."""
+    """Reduce the distance from home among the postures that reach a tip."""
     low, high, home = chains.low[leg], chains.high[leg], chains.home[leg]
     share, step = 1.0, np.empty_like(angles)
     for _ in range(SLIDES):
@@ -113,11 +112,10 @@ def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> Non
 
 @part
 def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, damping: float) -> float:
-    """Of the steps that bring the foot to the tip, to first order, the nearest to the way toward other angles.
+    """Step that brings the foot to the tip, to first order, and is nearest to the step d toward other angles.
 
-    It is d + J^T (J J^T + damping)^-1 (error - J d), where d is that way.  Joints at a limit that it would take beyond
-    are held, one after the other, and the others take over.  Damping is a share of the trace of J J^T.  Returned is the
-    greatest change of an angle.
+    It is d + J^T (J J^T + damping)^-1 (error - J d). Joints that it would take beyond a limit are held, one after the
+    other. Damping is a share of the trace of J J^T. Returns the greatest change of an angle.
     """
     hinges, held, again, largest = len(angles), 0, True, 0.0
     while again:
@@ -142,7 +140,7 @@ def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, 
 
 @part
 def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, float, float]:
-    """Cramer's rule for a symmetric matrix of these rows, damped; 0 where it is singular."""
+    """Solve by Cramer's rule for a symmetric matrix of these rows, with damping; 0 if it is singular."""
     trace = x[0] + y[1] + z[2]
     extra = damping * trace
     x, y, z = (x[0] + extra, x[1], x[2]), (y[0], y[1] + extra, y[2]), (z[0], z[1], z[2] + extra)
@@ -155,8 +153,8 @@ def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, 
 
 @part
 def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
-    """Turn the hinges, the outermost first: the columns of J, (joint, axis), and last the error from the foot to the
-    tip are written to `lever`; the error's length [mm]."""
+    """Turn the hinges from the foot to the body; write the columns of J, (joint, axis), and the error of the foot to
+    `lever`, and return the error's length [mm]."""
     hinges = len(angles)
     foot = _plus(NOTHING, 1.0, chains.foot[leg])
     for j in range(hinges - 1, -1, -1):
@@ -174,7 +172,7 @@ def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
 
 @part
 def _turned(vector: Any, axis: Any, cosine: float, sine: float) -> tuple[float, float, float]:
-    """A vector turned about an axis."""
+    """Turn a vector about an axis."""
     x, y, z = _cross(axis, vector)
     along = (1.0 - cosine) * _dot(axis, vector)
     return (

@@ -21,7 +21,7 @@ there is no such file, and no quota."""
 
 RENDERING = """
 import mujoco
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 from hexmj.rendering import gl
 model = compile_body(Conditions()).model

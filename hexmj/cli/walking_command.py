@@ -96,7 +96,7 @@ class WalkingCommand:
 
     def _ahead(self, walked: float | None) -> str:
         """That no foot gets to what lies ahead, where even the farthest walk is too short, or some get past bumps."""
-        from hexmj.bodies.grounds import end_of_bumps
+        from hexmj.bodies.ground import end_of_bumps
         from hexmj.measures.tables import reach
 
         conditions = self.conditions

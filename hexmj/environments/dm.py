@@ -25,7 +25,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import check_home, compile_body
+from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS

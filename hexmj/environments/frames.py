@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, RenderingError
 from hexmj.rendering import gl

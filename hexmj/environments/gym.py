@@ -18,7 +18,7 @@ except ModuleNotFoundError:
     raise without_extra("gym", "gymnasium") from None
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.checks import typed
 from hexmj.environments.frames import Frames
 from hexmj.environments.single_body import Alone

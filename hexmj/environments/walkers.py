@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.grounds import WITH_ENDS, beyond_the_ground
+from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.grounds import WITH_ENDS, beyond_the_ground
+from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.physics.backend import Diverged, MujocoBatch

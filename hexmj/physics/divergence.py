@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import check_home, compile_body
+from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.body import ROOT_QPOS
 from hexmj.checks import given
 from hexmj.conditions import Conditions

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.grounds import BUMPS, ground_level
+from hexmj.bodies.ground import BUMPS, ground_level
 
 AROUND, RINGS = 14, 4
 """Corners around a round thing, and rings of each of its ends."""

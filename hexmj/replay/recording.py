@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.checks import typed
 from hexmj.conditions import Conditions

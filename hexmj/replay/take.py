@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.grounds import ground_level
+from hexmj.bodies.ground import ground_level
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.bodies.loading import gravity
+from hexmj.bodies.mjcf import gravity
 from hexmj.rotations import lean
 from hexmj.stability import walk_margin
 from hexmj.walks import Walk

@@ -305,7 +305,7 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
 
 def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     """Return heights of the coxae over the ground, and the pitch of the line from hind to front coxae."""
-    from hexmj.bodies.grounds import ground_level
+    from hexmj.bodies.ground import ground_level
 
     coxae = _coxae(compiled)
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
@@ -348,7 +348,7 @@ def _ahead(strides: Strides) -> np.ndarray:
 
 def _coxae(compiled: "CompiledBody") -> np.ndarray:
     """Return the positions of the legs' first joints in the root frame, (leg, 3) [mm]."""
-    from hexmj.bodies.reading import joint_numbers, posed
+    from hexmj.bodies.kinematics import joint_numbers, posed
 
     first = joint_numbers(compiled.model, compiled.body)[:, 0]
     return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]

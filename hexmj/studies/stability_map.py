@@ -266,7 +266,7 @@ def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
 
 def froude(conditions: Conditions, velocity: np.ndarray) -> np.ndarray:
     """Return the Froude number (V V_p)^2 / (g h) at each V_r, (velocity,); h is the standing height."""
-    from hexmj.bodies.loading import gravity
+    from hexmj.bodies.mjcf import gravity
 
     return (velocity * conditions.vp) ** 2 / (gravity(conditions.body) * conditions.standing_height)
 

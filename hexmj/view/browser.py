@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import without_extra
 from hexmj.legs import LEGS

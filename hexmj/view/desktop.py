@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support

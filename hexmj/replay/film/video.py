@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import xarray as xr
 
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Body
 from hexmj.checks import given, path_of, typed
 from hexmj.conditions import Conditions

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.loading import compile_body
+from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions, unusual
 from hexmj.legs import LEGS
 from hexmj.rendering.shapes import body_shape, ground_shape

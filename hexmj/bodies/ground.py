@@ -1,6 +1,6 @@
-"""The ground: a plane, or what lies ahead on it.  Only feet and trunk touch it, as listed pairs.
+"""The ground: a plane and obstacles on it. Only feet and trunk touch it, as contact pairs.
 
-`Conditions.ground` is its kind; `ground_height`, `ground_at`, `ground_length` and `ground_seed` are its measures.
+`Conditions.ground` is its kind; `ground_height`, `ground_at`, `ground_length` and `ground_seed` describe it.
 """
 
 import mujoco
@@ -9,42 +9,38 @@ import numpy as np
 from hexmj.conditions import Conditions
 
 BUMPS = (15, 9)
-"""Bumps along the way and across it, a field of 180 by 108 mm where they are 12 mm apart."""
+"""Bumps along the way and across it: a field of 180 by 108 mm if they are 12 mm apart."""
 
 WITH_ENDS = "step", "hurdle", "gap"
-"""Grounds whose pieces end where nobody can see it; bumps end on the plane."""
+"""Kinds of ground that end after some distance; bumps end on the plane."""
 
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
-"""Of everything that lies ahead: tinted to tell it from the plane, whose material it shares."""
+"""Settings of obstacles: a tint distinguishes them from the plane, whose material they share."""
 
 CONTACT = ("condim", "friction", "solref", "solimp")
-"""Of what touches the ground: it touches what lies ahead alike."""
+"""Settings of a contact pair with the plane that pairs with obstacles copy."""
 
 
 def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
-    """Add what lies ahead to a spec of a body on its plane."""
+    """Add the obstacles to a spec of a body on its plane."""
     body, lengths, kinds = conditions.body, conditions.body.lengths, mujoco.mjtGeom
-    near, length, height, far = (
-        conditions.ground_at,
-        conditions.ground_length,
-        conditions.ground_height,
-        lengths.ground_reach,
-    )
+    near, length, height = conditions.ground_at, conditions.ground_length, conditions.ground_height
+    far = lengths.ground_reach
     boxes = {
         "step": {"step": (near, near + far, height)},
         "hurdle": {"hurdle": (near, near + length, height)},
         "gap": {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)},
     }
-    pieces = {}  # what lies ahead, its size and place by its name
+    pieces = {}  # name -> geom type, size and position
     for name, (begin, end, top) in boxes.get(conditions.ground, {}).items():
         half = (top + lengths.shortest_leg) / 2
         size = (end - begin) / 2, lengths.ground_half_width, half
         pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
     if conditions.ground == "gap":
-        spec.geom(body.ground).pos[2] -= lengths.shortest_leg  # in its own frame, if it stands in one
+        spec.geom(body.ground).pos[2] -= lengths.shortest_leg
     if conditions.ground == "rough":
-        # However fast a foot lands, a sphere pushes it up and out again; the prisms of a height field push a foot that
-        # is deeper than its distance from their sides sideways into the next, and there it stays.
+        # A sphere pushes a fast foot up and out again. The prisms of a height field would push a foot that is deeper
+        # than its distance from their sides into the next prism, where it stays.
         for i, ((x, y), top, radius) in enumerate(zip(*_bumps(conditions), strict=True)):
             pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
     look = LOOK | {"material": spec.geom(body.ground).material}
@@ -58,7 +54,7 @@ def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
 
 
 def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
-    """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 where nothing lies ahead."""
+    """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 on the plane."""
     lengths = conditions.body.lengths
     x = places[..., 0]
     if conditions.ground == "rough":
@@ -72,9 +68,9 @@ def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
 
 
 def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
-    """Whether feet, spheres around (..., 3) in the world [mm], are beyond the ends of the pieces that were laid, (...).
+    """Whether feet, spheres around (..., 3) in the world [mm], are beyond the end of the ground, (...).
 
-    There the ground is another than it is told, of those `WITH_ENDS`.
+    Only the kinds of `WITH_ENDS` end.
     """
     lengths = conditions.body.lengths
     x, y, near, far = feet[..., 0], feet[..., 1], conditions.ground_at, lengths.ground_reach
@@ -87,9 +83,9 @@ def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
 
 
 def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
-    """How deep feet, spheres of a radius around (..., 3) in the world [mm], are in the ground, (...) [mm].
+    """Depth of feet, spheres of a radius around (..., 3) in the world [mm], in the ground, (...) [mm].
 
-    It is what MuJoCo measures along the normal; negative above the ground.
+    It is MuJoCo's depth along the normal; negative above the ground.
     """
     lengths = conditions.body.lengths
     z = feet[..., 2]
@@ -107,9 +103,9 @@ def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> 
 
 
 def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
-    """The same in the caps whose centres surround a foot, four at most: no other reaches it."""
+    """Depth in the four bumps around a foot; no other bump reaches it."""
     lengths = conditions.body.lengths
-    centres, heights, radii = (one.reshape(*BUMPS, -1) for one in _bumps(conditions))
+    centres, heights, radii = (values.reshape(*BUMPS, -1) for values in _bumps(conditions))
     corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
     depth = np.full(feet.shape[:-1], -np.inf)
     for along, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -121,7 +117,7 @@ def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> 
 
 
 def end_of_bumps(conditions: Conditions) -> float:
-    """Where rough ground ends, and the plane follows, ahead of O at the start [mm]."""
+    """Distance from O at the start to the end of rough ground [mm]."""
     lengths = conditions.body.lengths
     return conditions.ground_at + 2 * lengths.highest_bump + lengths.bump_spacing * (BUMPS[0] - 1)
 

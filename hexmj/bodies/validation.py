@@ -1,0 +1,224 @@
+"""Checks of a body's MJCF: that it is as described, and that the finished model has no forces that hexmj ignores."""
+
+from collections.abc import Iterator
+from math import inf
+from operator import attrgetter
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from hexmj.bodies.kinematics import segments
+from hexmj.body import ROOT_QPOS, ROOT_QVEL, Body
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError
+
+LEG_TOLERANCE = 1.5
+"""Factor by which the shortest leg may differ from `Lengths.shortest_leg`."""
+
+LEAST_GRAVITY = 100.0
+"""A sixteenth of the moon's [mm/s^2]; a smaller one is in metres."""
+
+MASS_TOLERANCE = 1e-3
+"""Share by which the model's mass may differ from the description's."""
+
+SOFTEST = 4.0
+"""Greatest time constant of a contact, in longest steps; MuJoCo takes at least two steps, and fine steps take two of
+their own."""
+
+
+class Rule(NamedTuple):
+    """A range of one field of the finished model."""
+
+    name: str
+    """Name in the MJCF."""
+    field: str
+    """Field of the model."""
+    least: float
+    most: float
+    expected: str
+    """The range in words."""
+    rows: slice | tuple[slice, slice] = slice(None)
+    """Elements of the field that are checked."""
+
+
+ROOT_DOFS, LEG_DOFS, ENDS = slice(ROOT_QVEL), slice(ROOT_QVEL, None), np.s_[:, :2]
+
+RULES = (
+    Rule("equality constraints", "neq", 0, 0, "none"),
+    Rule("tendons", "ntendon", 0, 0, "none"),
+    Rule("density", "opt.density", 0, 0, "0, as in a vacuum"),
+    Rule("viscosity", "opt.viscosity", 0, 0, "0, as in a vacuum"),
+    Rule("gravcomp of a body", "body_gravcomp", 0, 0, "0"),
+    Rule("damping of the root", "dof_damping", 0, 0, "0", ROOT_DOFS),
+    Rule("frictionloss of the root", "dof_frictionloss", 0, 0, "0", ROOT_DOFS),
+    Rule("armature of the root", "dof_armature", 0, 0, "0", ROOT_DOFS),
+    Rule("stiffness of the root", "jnt_stiffness", 0, 0, "0", slice(1)),
+    Rule("damping of a leg's joint", "dof_damping", 0, inf, "0 or more", LEG_DOFS),
+    Rule("margin of a joint", "jnt_margin", 0, 0, "0"),
+    Rule("actuatorfrclimited of a joint", "jnt_actfrclimited", 0, 0, "false: only the servo limits the torque"),
+    Rule("dyntype of an actuator", "actuator_dyntype", 0, 0, "none"),
+    Rule("condim of a contact pair", "pair_dim", 3, inf, "3 or more"),
+    Rule("solimp of a contact pair", "pair_solimp", 0.9, inf, "0.9 or more, MuJoCo's default", ENDS),
+    Rule("margin of a contact pair", "pair_margin", 0, 0, "0"),
+    Rule("gap of a contact pair", "pair_gap", 0, 0, "0"),
+    Rule("impratio", "opt.impratio", 1, inf, "1 or more, MuJoCo's default"),
+    Rule("iterations", "opt.iterations", 100, inf, "100 or more, MuJoCo's default"),
+    Rule("ls_iterations", "opt.ls_iterations", 50, inf, "50 or more, MuJoCo's default"),
+    Rule("tolerance", "opt.tolerance", 0, 1e-5, "at most 1e-05"),
+    Rule("ls_tolerance", "opt.ls_tolerance", 0, 0.01, "at most 0.01, MuJoCo's default"),
+)
+"""Ranges in which the results of hexmj were measured; outside of them a walk is another one, or depends on forces that
+no measure includes."""
+
+HARMLESS = ("equality", "filterparent", "midphase", "nativeccd", "multiccd", "island", "energy", "fwdinv", "eulerdamp")
+"""Flags that have no effect on the walk."""
+
+
+def check_described(model: mujoco.MjModel, body: Body) -> None:
+    """Check that an MJCF, compiled as it is, fits its description.
+
+    Raises:
+        InputError: the first difference.
+    """
+    for check in (_names, _joints, _legs, _lengths, _ground_and_pairs, _gravity_and_mass):
+        for fault in check(model, body):
+            raise InputError(f"body {body.name!r}: {fault}")
+
+
+def check_finished(model: mujoco.MjModel, conditions: Conditions) -> None:
+    """Check that the model that walks has no forces, joints or options that hexmj ignores.
+
+    Raises:
+        InputError: the first of them.
+    """
+    for fault in _finished(model, conditions):
+        raise InputError(f"body {conditions.body.name!r}: {fault}")
+
+
+def _names(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    parts = [part for leg in body.legs for part in leg.parts]
+    kinds = mujoco.mjtObj
+    for kind, count, names in (
+        (kinds.mjOBJ_BODY, model.nbody, [body.root, *body.trunk, *parts]),
+        (kinds.mjOBJ_GEOM, model.ngeom, [body.ground, *body.trunk, *body.feet]),
+        (kinds.mjOBJ_SITE, model.nsite, body.feet),
+        (kinds.mjOBJ_JOINT, model.njnt, body.joints),
+        (kinds.mjOBJ_KEY, model.nkey, [body.home]),
+        (kinds.mjOBJ_CAMERA, model.ncam, body.cameras),
+    ):
+        valid = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+        for name in names:
+            if name not in valid:
+                label = kind.name.removeprefix("mjOBJ_").lower()
+                yield f"the MJCF has no {label} {name!r}; valid names: {', '.join(filter(None, valid)) or 'none'}"
+
+
+def _joints(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    root = model.body(body.root)
+    if root.jntnum[0] != 1 or root.jntadr[0] != 0 or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
+        yield f"root {body.root!r} needs a free joint, which must be the first joint of the MJCF"
+    joints = np.array([model.joint(name).id for name in body.joints])
+    hinges = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited[joints] == 1)
+    if not hinges.all():
+        yield f"joint {body.joints[np.argmin(hinges)]!r} must be a hinge with a range"
+    columns = np.stack([model.jnt_qposadr[joints] - ROOT_QPOS, model.jnt_dofadr[joints] - ROOT_QVEL])
+    if (columns != np.arange(len(joints))).any() or model.njnt != len(joints) + 1:
+        found = ", ".join(model.joint(i).name or "(unnamed)" for i in range(1, model.njnt))
+        yield f"joints after the root's: {found}; expected, in this order: {', '.join(body.joints)}"
+    driven = model.actuator_trnid[:, 0].tolist() == joints.tolist()
+    if model.nu and not (driven and (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).all()):
+        yield f"{model.nu} actuators; expected one for each joint in the order of the joints, or none"
+
+
+def _legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    root, radii = model.body(body.root).id, set()
+    for leg in body.legs:
+        foot, site = model.geom(leg.foot), model.site(leg.foot)
+        around = foot.bodyid[0] == site.bodyid[0] and (foot.pos == site.pos).all()
+        if foot.type[0] != mujoco.mjtGeom.mjGEOM_SPHERE or not around:
+            yield f"geom {leg.foot!r} must be a sphere around the site {leg.foot!r}"
+        radii.add(float(foot.size[0]))
+        chain, part = [], model.body(foot.bodyid[0])
+        if part.name not in leg.parts:
+            yield f"foot {leg.foot!r} is on body {part.name!r}; expected one of {', '.join(leg.parts)}"
+        while part.id not in (0, root):
+            if model.body_mass[part.id] > 0 and part.name not in (*leg.parts, *body.trunk):
+                yield f"body {part.name!r} lies between the root and {leg.foot!r}; it must be one of the leg's parts"
+            chain = [model.joint(part.jntadr[0] + i).name for i in range(part.jntnum[0])] + chain
+            part = model.body(part.parentid[0])
+        if part.id != root or tuple(chain) != leg.joints:
+            found = ", ".join(chain) or "none"
+            yield f"joints from {body.root!r} to foot {leg.foot!r}: {found}; expected {', '.join(leg.joints)}"
+    if len(radii) > 1:
+        yield f"radii of the feet: {sorted(radii)} mm; expected the same for all"
+    for part in body.trunk:
+        if (owner := model.body(model.geom(part).bodyid[0])).name != part:
+            yield f"trunk geom {part!r} is on body {owner.name!r}; expected a body of the same name"
+    for part in (*body.trunk, *(part for leg in body.legs for part in leg.parts)):
+        if model.body(part).rootid[0] != root:
+            yield f"body {part!r} is not attached to the root {body.root!r}"
+
+
+def _lengths(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    described, found = body.lengths.shortest_leg, segments(model, body).sum(axis=1).min()
+    if not 1 / LEG_TOLERANCE <= described / found <= LEG_TOLERANCE:
+        factor = found / described
+        yield f"shortest_leg = {described:g} mm; the MJCF's is {found:.4g} mm, try lengths.scaled({factor:.3g})"
+
+
+def _ground_and_pairs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    ground = model.geom(body.ground)
+    level = not (ground.bodyid[0] or ground.pos[2] or ground.quat[1:3].any())
+    if ground.type[0] != mujoco.mjtGeom.mjGEOM_PLANE or not level:
+        yield f"geom {body.ground!r} must be a level plane at z = 0 in the worldbody"
+    expected = {frozenset((ground.id, model.geom(part).id)) for part in (*body.trunk, *body.feet)}
+    for pair in zip(model.pair_geom1, model.pair_geom2, strict=True):
+        if frozenset(pair) not in expected:
+            names = " and ".join(repr(model.geom(geom).name) for geom in pair)
+            yield f"contact pair {names}; expected each foot and part of the trunk with {body.ground!r}, each once"
+        expected -= {frozenset(pair)}
+    outside = model.body_rootid[model.geom_bodyid] != model.body(body.root).id
+    outside[ground.id] = False
+    for geom in np.flatnonzero(outside & (model.geom_contype | model.geom_conaffinity != 0)):
+        yield (
+            f"geom {model.geom(geom).name!r} is not part of the body and nothing touches it; expected contype ="
+            " conaffinity = 0, and obstacles by Conditions(ground=...)"
+        )
+
+
+def _gravity_and_mass(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    gravity = model.opt.gravity
+    if gravity[:2].any() or not -gravity[2] >= LEAST_GRAVITY:
+        yield f"gravity = {gravity.tolist()} mm/s^2; expected it to point down, as (0, 0, -9810)"
+    mass = model.body_subtreemass[model.body(body.root).id]
+    if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
+        yield f"mass = {body.mass:g} g; the MJCF's is {mass:.6g} g"
+
+
+def _finished(model: mujoco.MjModel, conditions: Conditions) -> Iterator[str]:
+    integrators, solvers, body = mujoco.mjtIntegrator, mujoco.mjtSolver, conditions.body
+    if model.opt.integrator not in (integrators.mjINT_IMPLICITFAST, integrators.mjINT_IMPLICIT):
+        yield f"integrator = {integrators(model.opt.integrator).name}; expected implicitfast or implicit"
+    if model.opt.solver not in (solvers.mjSOL_NEWTON, solvers.mjSOL_CG):
+        yield f"solver = {solvers(model.opt.solver).name}; expected Newton or CG"
+    for flags, kinds in (
+        (model.opt.disableflags, mujoco.mjtDisableBit),
+        (model.opt.enableflags, mujoco.mjtEnableBit),
+    ):
+        for name, kind in kinds.__members__.items():
+            flag = name.lower().partition("_")[2]  # empty for the number of flags
+            if flag and flag not in HARMLESS and flags & kind.value:
+                yield f"flag {flag!r} is not MuJoCo's default"
+    for rule in RULES:
+        values = np.atleast_1d(attrgetter(rule.field)(model))[rule.rows]
+        bad = values[~((rule.least <= values) & (values <= rule.most))]
+        if bad.size:
+            yield f"{rule.name} = {bad.flat[0]:g}; expected {rule.expected}"
+    most = SOFTEST * body.longest_step
+    for stiff, damped in model.pair_solref:
+        if not (0 < stiff <= most and damped > 0):
+            yield f"solref = {stiff:g}, {damped:g} of a contact pair; expected above 0 and at most {most:g} s, above 0"
+    mass, expected = model.body_subtreemass[model.body(body.root).id], body.mass * (1.0 + conditions.load)
+    if not abs(mass - expected) <= MASS_TOLERANCE * expected:
+        yield f"with load = {conditions.load:g} it has a mass of {mass:.6g} g; expected {expected:.6g} g"
