@@ -162,7 +162,7 @@ def finished_cells(
 def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
     """Return a cell's result, from its file if that is there."""
     if path and path.exists():
-        return read_netcdf(path)
+        return _cached(path)
     try:
         data = cell.compute(**execution)
     except Exception as error:
@@ -170,7 +170,14 @@ def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
         raise
     if path is None:
         return data
-    return read_netcdf(write_netcdf(data.assign_attrs(cell=cell.record()), path))
+    return _cached(write_netcdf(data.assign_attrs(cell=cell.record()), path))
+
+
+def _cached(path: Path) -> "xr.Dataset":
+    """Read a cell's result without the attribute that only its file has."""
+    data = read_netcdf(path)
+    data.attrs.pop("cell", None)
+    return data
 
 
 def _on_executor(

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, Conditions, InputError, SensoryFeedback, draw_starts, load_controller, physical_walk
+from hexmj import LDVS, Conditions, InputError, draw_starts, load_controller, physical_walk
 from hexmj.body import STICK_INSECT
-from hexmj.stability import walk_margin
-from hexmj.studies.static_limit import StaticLimit, distances, static_limit_figure
-from hexmj.sweep import Cell, run_study
+from hexmj.studies.static_limit import StaticLimit, distances
+from hexmj.sweep import run_study
 
 FEW: dict[str, Any] = {"n_starts": 12, "observation_time": "start"}
 
@@ -57,37 +56,11 @@ def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
 
 
 @pytest.mark.slow
-def test_points_of_one_mass_stand_at_their_velocity(slower):
-    """Of several they stand beside each other."""
-    _, two = slower
-    assert points(static_limit_figure(two.isel(leg_mass=[0]))) == {(400.0, 100.0, 25.0)}
-    fastest = sorted(found[0] for found in points(static_limit_figure(two)))
-    assert fastest == pytest.approx([400.0 / 1.03, 400.0 * 1.03])
-
-
-def points(figure: Any) -> set[tuple[float, ...]]:
-    """The V_p of the points of each curve of frequencies, from fast to slow."""
-    curves = (one.lines[0].get_xdata() for one in figure.axes[0].containers)
-    return {tuple(sorted(curve.tolist(), reverse=True)) for curve in curves}
-
-
-def test_steps_on_no_foot_at_all_count_nowhere_and_warn_of_nothing():
-    walk = physical_walk(draw_starts(25, 0)[24:], load_controller("uncoordinated"), 0.9, 21.0)
-    assert (np.isinf(walk_margin(walk.planned)) & np.isinf(walk_margin(walk.measured))).any()
-    assert np.isfinite(distances(walk)["margin"]).all()
-
-
-@pytest.mark.slow
 def test_light_legs_keep_the_centre_of_mass_at_o(slower):
     _, result = slower
     assert (result.drift.sel(leg_mass=0.01) < 0.02).all()
     assert (result.drift.sel(leg_mass=1.0) > 0.05).all()
     assert (result.kinematic == result.kinematic[0, 0]).all()
-
-
-@pytest.mark.slow
-def test_every_number_has_a_unit(slower):
-    assert all("units" in variable.attrs for variable in slower[1].data_vars.values())
 
 
 @pytest.mark.thorough
@@ -108,59 +81,25 @@ def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
 
 
 @pytest.mark.slow
-def test_finished_walks_are_not_walked_again(slower, monkeypatch):
-    folder, result = slower
-    monkeypatch.setattr(Cell, "compute", lambda *_, **__: pytest.fail("walked again"))
-    told: list[float] = []
-    part = StaticLimit(LDVS, vps=(100.0, 25.0), leg_masses=(0.01,), **FEW)
-    again = run_study(part, folder, progress=told.append)
-    assert again.equals(result.sel(leg_mass=[0.01], vp=[100.0, 25.0]))
-    assert sum(told) == pytest.approx(1.0)
-
-
-@pytest.mark.slow
-def test_who_reads_the_legs_is_measured_against_what_these_are_told():
+def test_with_feedback_the_distance_is_that_from_the_plan_as_commanded():
     walk = physical_walk(draw_starts(6, 0), load_controller("tegotae"), 0.5, 60.0, conditions=Conditions(vp=20.0))
-    on_paper = replace(walk, ordered=walk.planned)
-    told, planned = (distances(one)["same_feet"].mean() for one in (walk, on_paper))
-    assert told > 1.02 * planned
-
-
-@pytest.mark.thorough
-def test_a_controller_may_read_the_legs(slower):
-    few: dict[str, Any] = FEW | {"vps": (100.0,), "leg_masses": (1.0,)}
-    model_variant, alone = run_study(StaticLimit(SensoryFeedback(LDVS), **few)), slower[1].sel(vp=[100.0], leg_mass=[1.0])
-    assert np.array_equal(model_variant.planned_loss, alone.planned_loss)  # on paper nothing is read
-    assert not np.array_equal(model_variant.margin, alone.margin)
+    kinematic = replace(walk, ordered=walk.planned)
+    commanded, planned = (distances(way)["same_feet"].mean() for way in (walk, kinematic))
+    assert commanded > 1.02 * planned
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"vps": ()}, "vps = .*; expected at least one, and none of them twice"),
-        ({"vps": (80.0, 80.0)}, "vps = .*; expected at least one, and none of them twice"),
-        ({"leg_masses": ()}, "leg_masses = .*; expected at least one, and none of them twice"),
-        ({"vps": (0.0,)}, "vp = 0.0; expected above 0.1"),
-        ({"velocity": 1.0}, "0 <= V < 1"),
-        ({"observation_time": "long"}, "valid names: walk, start"),
-        (
-            {"conditions": Conditions(vp=20.0)},
-            "vp = 20.0; expected 80.0: vps has all that are tried",
-        ),
-        (
-            {"conditions": Conditions(leg_mass=0.5)},
-            "leg_mass = 0.5; expected .*: leg_masses has all that are tried",
-        ),
-    ],
+    ("name", "wrong"),
+    [("vps", {"vps": (80.0, 80.0)}), ("leg_masses", {"leg_masses": ()}), ("vp", {"conditions": Conditions(vp=20.0)})],
 )
-def test_what_makes_no_sense_is_refused(wrong, said):
-    with pytest.raises(InputError, match=said):
+def test_bad_input_is_refused(name, wrong):
+    with pytest.raises(InputError, match=name):
         StaticLimit(LDVS, **wrong)
 
 
 @pytest.mark.thorough
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
-    words = ("converge", "--vps", 100, 50, "--starts", 4, "--observation time", 10, "--out", tmp_path)
+    words = ("converge", "--vps", 100, 50, "--starts", 4, "--observation-time", 10, "--out", tmp_path)
     code, text, _ = run(*words, "--json")
     assert code == 0
     answer = json.loads(text)
@@ -173,11 +112,3 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     assert code == 0
     assert f"{answer['margin'][0][1]:.3f}" in text
     assert "vp 80" not in text
-
-
-@pytest.mark.parametrize("option", ["vp", "leg-mass"])
-def test_one_value_where_a_list_is_wanted_is_no_option(tmp_path, run, option):
-    code, _, error = run("converge", f"--{option}", 0.5, "--out", tmp_path / "out")
-    assert code == 2
-    assert "Unrecognized options" in error
-    assert not (tmp_path / "out").exists()

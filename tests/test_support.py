@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj import LDVS, STICK_INSECT, Conditions, draw_starts, loss_time, physical_walk, walk_margin
-from hexmj.errors import InputError
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.measures.support import GROUNDED, centre_of_pressure, grounded, pressure_margin
 from hexmj.physics.settling import settle
@@ -72,12 +71,6 @@ def test_feet_carry_the_weight_and_press_as_far_from_the_centre_of_mass_however_
         far.append(np.linalg.norm(centre_of_pressure(walk), axis=-1).mean())
         assert (pressure_margin(walk) >= 0).all()
     assert_allclose(far, far[0], rtol=0.1)
-
-
-@pytest.mark.parametrize("measure", [grounded, centre_of_pressure, pressure_margin])
-def test_a_planned_walk_is_pressed_by_no_ground(measure, walked):
-    with pytest.raises(InputError, match=r"^walk = PlannedWalk.*; expected a PhysicalWalk$"):
-        measure(walked.planned)
 
 
 def test_the_centre_of_pressure_lies_between_the_feet_that_carry(walked):
