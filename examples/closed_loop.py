@@ -1,16 +1,16 @@
-"""Open against closed loop on the same starts: unloaded, and with twice the insect's weight on its back."""
+"""Open against closed loop on the same starts: unloaded, and with a load of twice the insect's weight."""
 
 import numpy as np
 
 import hexmj
 
 for load in (0.0, 2.0):
-    by_itself, model_variant = (
+    open_loop, closed_loop = (
         hexmj.compare(controller, [0.5], n_starts=10, observation_time=100.0, conditions=hexmj.Conditions(load=load))
         for controller in (hexmj.LDVS, hexmj.SensoryFeedback(hexmj.LDVS))
     )
-    other = np.isfinite(by_itself.fall.values) != np.isfinite(model_variant.fall.values)
+    differ = np.isfinite(open_loop.fall.values) != np.isfinite(closed_loop.fall.values)
     print(
-        f"load {load:g}: physical FLSS {by_itself.physical.item():.2f} by itself, {model_variant.physical.item():.2f}"
-        f" reading the legs; another end for {other.sum()} of 10 starts"
+        f"load {load:g}: physical FLSS {open_loop.physical.item():.2f} in the open loop,"
+        f" {closed_loop.physical.item():.2f} with sensory feedback; {differ.sum()} of 10 starts end differently"
     )

@@ -1,4 +1,4 @@
-"""A controller that reads its feet: a swing ends where the foot meets the ground, and a foot that loses it searches."""
+"""A controller with sensory feedback: a swing ends on ground contact, and a foot that loses contact searches for it."""
 
 from dataclasses import dataclass
 
@@ -13,17 +13,17 @@ NEAR = 2.0  # a swing ends this far before AEP_0, where a tripod is stable alrea
 
 @dataclass(frozen=True)
 class Feeler:
-    """Two tripods in turn: one is lifted where it is at the rear and all six feet stand."""
+    """Two tripods in turn: a tripod is lifted when it is at the rear and all six feet stand."""
 
-    lift: float = 12.0  # height to which a foot is lifted [mm]
-    rise: float = 6.0  # of a foot that is lifted [mm in a time unit]
-    sink: float = 2.0  # of a foot that is lowered or looks for the ground [mm in a time unit]
-    level: float = 0.1  # of a standing foot towards height 0, so that the body follows the ground [mm in a time unit]
-    depth: float = 4.0  # a foot searches no deeper than this [mm]
+    lift: float = 12.0  # height of a swing [mm]
+    rise: float = 6.0  # speed of a foot that is lifted [mm per time unit]
+    sink: float = 2.0  # speed of a foot that is lowered or searches [mm per time unit]
+    level: float = 0.1  # speed of a standing foot towards height 0, so that the body follows the ground
+    depth: float = 4.0  # greatest depth of a search [mm]
     name: str = "feeler"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `hexmj.controllers.Controller`."""
+        """Begin a plan, see `hexmj.controllers.Controller`."""
         x, height, dt, front = starts, np.zeros(starts.shape), stride.dt, stride.aep0 - NEAR
         stands, contact, free = (np.full(starts.shape, value) for value in (True, True, False))
 
@@ -44,7 +44,7 @@ class Feeler:
             level = np.clip(height, -self.level * dt, self.level * dt)
             height = np.where(stands, height - np.where(contact, level, self.sink * dt), swung).clip(-self.depth)
             x = np.where(stands, np.maximum(x - v * dt, stride.pep_min), np.maximum(x, np.minimum(x + dt, front)))
-            contact = height <= 0  # on paper; a body tells before the next step
+            contact = height <= 0  # of a kinematic walk; in physics, `sense` sets it before the next step
             return Step(x, stands, height=height)
 
         return stepwise(step, starts, velocity, stride, acceleration, sense)

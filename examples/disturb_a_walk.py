@@ -1,4 +1,4 @@
-"""Halt an insect in mid-stride: it begins again from there, or puts its legs in order first."""
+"""Halt an insect in mid-stride: it continues from there, or reorganises its legs first."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ settled = settle(stable.starts)
 steps = int(halt.step.max()) + 1500
 for name, postures in {"as they stand": None, "reorganised": collect_postures(hexmj.LDVS, V, 0, stride)}.items():
     halted = Disturbed(hexmj.LDVS, halt, postures)
-    on_paper, in_physics = (halted.begin(stable.starts, np.full(STARTS, V), stride) for _ in range(2))
-    lost = planned_losses(on_paper, np.array(steps))
-    fell = outcomes_of_plan(settled, in_physics, steps * stride.dt, np.where(lost, lost * stride.dt, np.inf)).fall
-    rest = stride.dt * np.mean(on_paper.resumed - halt.step)
+    kinematic, physical = (halted.begin(stable.starts, np.full(STARTS, V), stride) for _ in range(2))
+    lost = planned_losses(kinematic, np.array(steps))
+    fell = outcomes_of_plan(settled, physical, steps * stride.dt, np.where(lost, lost * stride.dt, np.inf)).fall
+    rest = stride.dt * np.mean(kinematic.resumed - halt.step)
     lose, fall = np.count_nonzero(lost), np.count_nonzero(np.isfinite(fell))
-    print(f"legs {name}: rest {rest:.0f} time units, {lose} of {STARTS} lose stability on paper, {fall} fall")
+    print(f"legs {name}: rest {rest:.0f} time units, {lose} of {STARTS} lose static stability, {fall} fall")

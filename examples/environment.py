@@ -1,4 +1,4 @@
-"""The insect as a dm_env environment: one episode of the controller's own walk, without offsets to its tips."""
+"""The insect as a dm_env environment: one episode of the controller's walk, without offsets."""
 
 import numpy as np
 
@@ -6,6 +6,7 @@ from hexmj.environments import dm
 
 
 def main() -> None:
+    """Walk one episode and print its rewards."""
     walking = dm.load(velocity=0.3, actions="tips")
     spec = walking.action_spec()
     step = walking.reset()
@@ -14,7 +15,7 @@ def main() -> None:
         step = walking.step(np.zeros(spec.shape))
         rewards.append(step.reward)
         speeds.append(step.observation["velocity"][0])
-    end = "fell" if step.discount == 0 else "walked on"
+    end = "fell" if step.discount == 0 else "still walked"
     print(f"The insect {end} after {walking.physics.time():.2f} s, {len(rewards)} steps.")
     print(f"return {sum(rewards):.0f}, {np.mean(rewards):.2f} a step")
     print(f"speed {np.mean(speeds):.1f} mm/s, commanded {step.observation['command'].item():.1f} mm/s")

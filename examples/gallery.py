@@ -1,6 +1,6 @@
-"""The pictures of the documentation's gallery: short films of walks, as animated WebP, in `results/gallery`.
+"""The documentation's gallery: short films of walks, as animated WebP.
 
-`make gallery` puts them into `docs/gallery` instead.
+They are written into `results/gallery`, or by `make gallery` into `docs/gallery`.
 """
 
 import subprocess
@@ -22,33 +22,34 @@ GAITS = ("graham", "walknet-reacog", "own-0.5")
 
 
 def walked(name: str, velocity: float, duration: float, start: int = 0, **conditions: Any) -> Dataset:
-    """One start of seed 0 in physics, recorded."""
+    """Record a physical walk of one start of seed 0."""
     starts = hexmj.draw_starts(start + 1, seed=0)[start:]
-    how = hexmj.Conditions(**conditions)
-    walk = hexmj.physical_walk(starts, hexmj.load_controller(name), velocity, duration, conditions=how)
+    settings = hexmj.Conditions(**conditions)
+    walk = hexmj.physical_walk(starts, hexmj.load_controller(name), velocity, duration, conditions=settings)
     return hexmj.record(walk, title=name)
 
 
 def planned(name: str, velocity: float, duration: float) -> Dataset:
-    """The same start on paper."""
+    """Record a plan of the same start."""
     plan = hexmj.walk(hexmj.draw_starts(1, seed=0), hexmj.load_controller(name), velocity, duration)
     return hexmj.record_plan(plan, hexmj.Conditions(), hexmj.Stride(), title=f"{name}, planned")
 
 
-def film(recordings: list[Dataset], path: Path, how: hexmj.Film, body: hexmj.Body = hexmj.STICK_INSECT) -> None:
-    """Render the recordings side by side into an animated picture that begins anew when it ends."""
+def film(recordings: list[Dataset], path: Path, settings: hexmj.Film, body: hexmj.Body = hexmj.STICK_INSECT) -> None:
+    """Render the recordings side by side into an animated picture that loops."""
     with TemporaryDirectory() as folder:
         video = Path(folder) / "film.mp4"
-        frames = hexmj.render(recordings, video, how, body=body)
+        frames = hexmj.render(recordings, video, settings, body=body)
         convert = ["-i", video, "-loop", "0", "-quality", "50", "-compression_level", "4", path]
         subprocess.run([get_ffmpeg_exe(), "-loglevel", "error", "-y", *map(str, convert)], check=True)
     print(f"{path}: {frames} frames, {path.stat().st_size / 1000:.0f} kB")
 
 
 def main() -> None:
-    words = ArgumentParser(description=__doc__)
-    words.add_argument("out", nargs="?", type=Path, default="results/gallery", help="folder of the films")
-    out = words.parse_args().out
+    """Render all films."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default="results/gallery", help="folder of the films")
+    out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     film([planned("ldvs", 0.4, 140.0), walked("ldvs", 0.4, 140.0)], out / "walk.webp", FILM)
     film([walked("uncoordinated", 0.5, 60.0), walked("ldvs", 0.5, 60.0)], out / "fall.webp", FILM)

@@ -1,7 +1,7 @@
-"""A robot instead of the insect: a servo hexapod of a kilogram and a half, whose steps are four times as long.
+"""A robot instead of the insect: a servo hexapod of 1.5 kg, whose steps are four times as long.
 
-Lengths, masses and ranges are those of a public description of the PhantomX (HumaRobotics, BSD); the foot's radius,
-where the feet stand, servos and ground are ours.
+Lengths, masses and ranges come from a public description of the PhantomX (HumaRobotics, BSD). The foot's radius, the
+feet's positions, servos and ground are ours.
 """
 
 from dataclasses import dataclass, replace
@@ -15,15 +15,15 @@ import xarray as xr
 
 import hexmj
 from hexmj.body import Servo
-from hexmj.controllers import Controller, Plan, FeedbackPlan
+from hexmj.controllers import Controller, FeedbackPlan, Plan
 from hexmj.legs import LEGS, SIDE, Geometry
 
-HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # ahead of the middle, beside it [mm]
+HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # forward, sideways from the middle [mm]
 COXA, FEMUR, TIBIA, FOOT = 54.0, 66.1, 160.0, 8.0  # lengths, and the foot's radius [mm]
 TRUNK, LINK = 975.6, 24.36  # masses [g]; a leg has four links
-LINES = Geometry(origins=(190.0, 0.0, -190.0), lateral=(215.0, 265.0, 215.0))  # where the feet stand [mm]
-HIGH = 90.0  # of the hips above the feet [mm]
-LARGER = 4.0  # steps and swings, beside the insect's
+LINES = Geometry(origins=(190.0, 0.0, -190.0), lateral=(215.0, 265.0, 215.0))  # positions of the feet [mm]
+HIGH = 90.0  # height of the hips above the feet [mm]
+LARGER = 4.0  # length of steps and swings in those of the insect
 STRIDE = hexmj.Stride(aep0=10 * LARGER, pep0=-10 * LARGER, pep_min=-20 * LARGER, dt=0.1 * LARGER, geometry=LINES)
 
 WORLD = """
@@ -74,7 +74,7 @@ LEG = """
 
 
 def mjcf() -> str:
-    """The robot in MuJoCo's language; at home its feet stand on the origins of their lines."""
+    """Return the robot's MJCF; at home its feet stand on the origins of their lines."""
     legs, angles = "", []
     sizes = {"coxa": COXA, "femur": FEMUR, "tibia": TIBIA, "foot": FOOT, "link": LINK, "coxa_mass": 2 * LINK}
     for leg, side, ahead, beside in zip(LEGS, SIDE, LINES.origin, LINES.y, strict=True):
@@ -90,7 +90,7 @@ def mjcf() -> str:
 
 
 def robot(folder: Path) -> hexmj.Body:
-    """Its description, with its MJCF in a folder."""
+    """Write the MJCF into a folder and return the robot's description."""
     file = folder / "servo_hexapod.xml"
     file.write_text(mjcf(), encoding="utf-8")
     insect = hexmj.STICK_INSECT
@@ -113,34 +113,39 @@ def robot(folder: Path) -> hexmj.Body:
 
 
 def conditions(body: hexmj.Body, vp: float) -> hexmj.Conditions:
-    """How the robot lifts its feet, 40 mm high, and how fast it swings them [mm/s]."""
-    path = {"standing_height": HIGH, "step_height": 10 * LARGER, "lift_time": 40.0, "landing_time": 40.0}
+    """Return conditions: feet are lifted by 40 mm and swing with V_p [mm/s]."""
+    path: dict[str, Any] = {
+        "standing_height": HIGH,
+        "step_height": 10 * LARGER,
+        "lift_time": 40.0,
+        "landing_time": 40.0,
+    }
     return hexmj.Conditions(body=body, vp=vp, longest_substep=1.0, **path)
 
 
 @dataclass(frozen=True)
 class Larger:
-    """A controller in steps so many times as long as it plans them, whose weights are of the insect's millimetres."""
+    """A controller with weights in the insect's millimetres, whose steps are scaled."""
 
     of: Controller = hexmj.LDVS
     times: float = LARGER
     name: str = "ldvs, larger"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `hexmj.controllers.Controller`; nothing is handed on of what a plan would read."""
+        """Begin a plan, see `hexmj.controllers.Controller`; sensory feedback is not supported."""
         small = {name: getattr(stride, name) / self.times for name in ("aep0", "pep0", "pep_min", "dt")}
         lines = {name: tuple(np.divide(ends, self.times).tolist()) for name, ends in vars(stride.geometry).items()}
         small["geometry"] = Geometry(**lines)
         faster = acceleration and replace(acceleration, rate=acceleration.rate * self.times)
         plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), faster, threads)
         if isinstance(plan, FeedbackPlan):
-            raise hexmj.InputError(f"{self.of.name} reads the legs; expected a controller that goes on by itself")
+            raise hexmj.InputError(f"{self.of.name} has sensory feedback; expected a controller without it")
         return LargerPlan(plan, starts, stride, self.times)
 
 
 @dataclass
 class LargerPlan:
-    """What another plan says, in longer steps that take longer."""
+    """Another plan in longer steps that take longer."""
 
     plan: Plan
     starts: np.ndarray
@@ -153,27 +158,29 @@ class LargerPlan:
         return self.plan.done
 
     def advance(self, steps):
-        """The next steps."""
+        """Plan the next steps."""
         walk = self.plan.advance(steps)
         larger = {name: self.times * getattr(walk, name) for name in ("time", "x", "y", "aep", "height")}
         return replace(walk, geometry=self.stride.geometry, **larger)
 
 
 def fallen(walks: dict[float, dict[str, Any]], n_starts: int, velocity: float = 0.5) -> xr.Dataset:
-    """Three answers of the same starts at some swing velocities V_p [mm/s], by what `hexmj.compare` takes for each."""
-    found = [hexmj.compare(velocities=velocity, n_starts=n_starts, **how) for how in walks.values()]
-    return xr.concat([one.squeeze() for one in found], xr.Variable("vp", list(walks)), combine_attrs="drop_conflicts")
+    """Compare the same starts at some swing velocities V_p [mm/s] -> arguments of `hexmj.compare`."""
+    results = [hexmj.compare(velocities=velocity, n_starts=n_starts, **settings) for settings in walks.values()]
+    return xr.concat(
+        [result.squeeze() for result in results], xr.Variable("vp", list(walks)), combine_attrs="drop_conflicts"
+    )
 
 
 def tilting(body: hexmj.Body) -> xr.Dataset:
-    """A start whose plan lifts too many legs, recorded."""
+    """Record a start whose plan lifts too many legs."""
     start, slow = hexmj.draw_starts(6, seed=0, stride=STRIDE)[5:], conditions(body, 160.0)
     walked = hexmj.physical_walk(start, Larger(), 0.5, 300.0, conditions=slow, stride=STRIDE)
     return hexmj.record(walked, title="servo hexapod")
 
 
 def main(n_starts: int = 40) -> None:
-    """Walk insect and robot ever more slowly, draw what becomes of them, and film the robot."""
+    """Walk insect and robot at several swing velocities, draw the falls, and film the robot."""
     out = Path("results/examples")
     out.mkdir(parents=True, exist_ok=True)
     body = robot(out)
@@ -187,23 +194,23 @@ def main(n_starts: int = 40) -> None:
         },
     }
     figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
-    for axes, (name, at) in zip(panels, walks.items(), strict=True):
-        answers = fallen(at, n_starts)
-        for answer, look, says in (
-            ("kinematic", "k--", "lost stability on paper"),
+    for axes, (name, cells) in zip(panels, walks.items(), strict=True):
+        answers = fallen(cells, n_starts)
+        for measure, style, label in (
+            ("kinematic", "k--", "lost static stability"),
             ("toppled", "s-", "tilted by more than 0.1 rad"),
             ("physical", "o-", "trunk touched the ground"),
         ):
-            axes.plot(answers.vp, answers[answer], look, label=says)
-            print(f"{name}, {says}: {dict(zip(at, answers[answer].values.round(3).tolist(), strict=True))}")
+            axes.plot(answers.vp, answers[measure], style, label=label)
+            print(f"{name}, {label}: {dict(zip(cells, answers[measure].values.round(3).tolist(), strict=True))}")
         axes.set(title=f"{name}, V = 0.5", xscale="log", xlabel="swing velocity V_p [mm/s]", ylim=(-0.03, 1))
-        axes.set_xticks(list(at), [f"{vp:g}" for vp in at], minor=False)
+        axes.set_xticks(list(cells), [f"{vp:g}" for vp in cells], minor=False)
         axes.minorticks_off()
-    panels[0].set_ylabel(f"part of {n_starts} starts")
+    panels[0].set_ylabel(f"share of {n_starts} starts")
     panels[1].legend(frameon=False)
     figure.savefig(out / "servo_hexapod.png", dpi=150)
     hexmj.render([tilting(body)], out / "servo_hexapod.mp4", body=body)
-    print(f"{out}/servo_hexapod.png and .mp4, in which it tilts and goes on")
+    print(f"{out}/servo_hexapod.png and .mp4")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Reflexes learned by CMA-ES (`pip install ".[gym,search]"`): 15 numbers that keep LDVS from falling as it sets off.
+"""Reflexes learned by CMA-ES (`pip install ".[gym,search]"`): 15 weights that keep LDVS from falling at the beginning.
 
-Every generation all candidates walk the same fresh starts, each start in an insect of its own in one vector
-environment.  `python examples/train_cma.py` takes some minutes and writes what it found beside itself; `hexmj league
---controllers examples/train_cma.py:REFLEXES ldvs` sets it among the others.
+In every generation all candidates walk the same fresh starts in one vector environment. `python examples/train_cma.py`
+takes some minutes and writes the weights into `reflexes.toml`; `hexmj league --controller
+examples/train_cma.py:REFLEXES ldvs` compares the result with other controllers.
 """
 
 import time
@@ -17,9 +17,10 @@ import hexmj
 from hexmj.environments.learned import STANCE, TILT, TURNING, WithOffsets, felt_in
 
 FOUND = Path(__file__).with_name("reflexes.toml")
-VELOCITY, WINDOW = 0.6, 40.0  # V_r, and the observation time `start` [time units]
-MOST_LOST = 0.07
+VELOCITY, DURATION = 0.6, 40.0  # V_r, and the observation time `start` [time units]
+MOST_LOST = 0.07  # greatest share of tips out of reach
 POPULATION, STARTS, GENERATIONS = 12, 32, 25
+FRESH = 200  # starts of the final comparison
 
 LEFT = np.array([1, 1, 1, -1, -1, -1])  # +1 on the left
 AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
@@ -27,35 +28,35 @@ AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
 
 @dataclass(frozen=True)
 class Reflexes:
-    """The same in every leg: what it does as it stands and swings, and as the body leans and turns towards it."""
+    """Reflexes that are the same in every leg: constant, in swing, and as the body leans and tips towards the leg."""
 
     weights: tuple[tuple[float, ...], ...] = 3 * (5 * (0.0,),)
-    """Of forward, outward and up: always, in swing, by lean aside and ahead, by tipping ahead; each towards the leg."""
+    """Weights for forward, outward and up: constant, in swing, lean aside, lean ahead, tipping ahead."""
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Offsets of the tips, (n, leg * axis)."""
+        """Return the offsets of the tips, (n, leg * axis)."""
         return offsets(np.array(self.weights)[None], felt)
 
 
 def offsets(weights: np.ndarray, felt: np.ndarray) -> np.ndarray:
-    """Offsets, (n, leg * axis), by weights, (n or 1, axis, reason)."""
-    tilt, turning, one = felt[:, TILT], felt[:, TURNING], np.ones((len(felt), 6))
-    reasons = [one, 1 - felt[:, STANCE], tilt[:, 1:] * LEFT, tilt[:, :1] * AHEAD]
-    reasons.append(turning[:, 1:2] * AHEAD)
-    moved = np.einsum("nar,rnl->nla", np.broadcast_to(weights, (len(felt), 3, 5)), reasons)
+    """Return offsets, (n, leg * axis), for weights, (n or 1, axis, cause)."""
+    tilt, turning, constant = felt[:, TILT], felt[:, TURNING], np.ones((len(felt), 6))
+    causes = [constant, 1 - felt[:, STANCE], tilt[:, 1:] * LEFT, tilt[:, :1] * AHEAD]
+    causes.append(turning[:, 1:2] * AHEAD)
+    moved = np.einsum("nar,rnl->nla", np.broadcast_to(weights, (len(felt), 3, 5)), causes)
     moved[:, :, 1] *= LEFT
     return np.clip(moved, -1, 1).reshape(-1, 18)
 
 
 def costs(candidates: np.ndarray, seed: int) -> np.ndarray:
-    """Share of falls of every candidate, (candidate, 15), on the same starts; of two alike the one that is faster.
+    """Return the cost of every candidate, (candidate, 15): its falls on the same starts, less a little for speed.
 
-    An insect of whose tips more than `MOST_LOST` are out of reach counts as fallen; a tenth would be no walk.
+    An insect with more than `MOST_LOST` of its tips out of reach counts as fallen.
     """
-    from hexmj.environments.vector import StickInsects  # what was learned walks without Gymnasium
+    from hexmj.environments.vector import StickInsects  # the learned controller walks without Gymnasium
 
     count = len(candidates) * STARTS
-    walking = StickInsects(count, actions="tips", velocity=VELOCITY, duration=WINDOW, autoreset_mode="Disabled")
+    walking = StickInsects(count, actions="tips", velocity=VELOCITY, duration=DURATION, autoreset_mode="Disabled")
     seen, _ = walking.reset(seed=[seed + i for i in range(STARTS)] * len(candidates))
     weights = candidates.reshape(-1, 3, 5).repeat(STARTS, axis=0)
     gained, walked, lost = np.zeros((3, count))
@@ -65,11 +66,12 @@ def costs(candidates: np.ndarray, seed: int) -> np.ndarray:
         walks = ~(fell | over)
         walked, lost = walked + walks, lost + walks * seen["out_of_reach"].mean(axis=1) / walking.task.substeps
         gained, fell, over = gained + reward, fell | falls, over | ends
-    share, speed = lost / walked, gained * hexmj.Stride().dt / WINDOW
+    share, speed = lost / walked, gained * hexmj.Stride().dt / DURATION
     return ((fell | (share > MOST_LOST)) + 2 * share - 0.1 * speed).reshape(-1, STARTS).mean(axis=1)
 
 
 def main() -> None:
+    """Search the weights, write them, and compare them with LDVS."""
     began, search = time.monotonic(), CMA(mean=np.zeros(15), sigma=0.1, population_size=POPULATION, seed=1)
     for generation in range(GENERATIONS):
         candidates = np.array([search.ask() for _ in range(POPULATION)])
@@ -79,15 +81,14 @@ def main() -> None:
     rows = [", ".join(f"{number:.3f}" for number in row) for row in search.mean.reshape(3, 5)]
     FOUND.write_text("weights = [\n" + "".join(f"    [{row}],\n" for row in rows) + "]\n", encoding="utf-8")
     print(f"{FOUND} after {time.monotonic() - began:.0f} s")
-    result = hexmj.compare(
-        {"ldvs": hexmj.LDVS, "reflexes": found()}, [VELOCITY], n_starts=200, observation_time="start", seed=77
-    )
-    for name, falls in zip(("ldvs", "reflexes"), result.physical.values[:, 0], strict=True):
-        print(f"{name}: physical FLSS of the start at V = {VELOCITY:g} is {falls:.2f} of 200 fresh starts")
+    both = {"ldvs": hexmj.LDVS, "reflexes": found()}
+    result = hexmj.compare(both, [VELOCITY], n_starts=FRESH, observation_time="start", seed=77)
+    for name, falls in zip(both, result.physical.values[:, 0], strict=True):
+        print(f"{name}: physical FLSS {falls:.2f} at V = {VELOCITY:g}, {FRESH} fresh starts")
 
 
 def found() -> WithOffsets:
-    """LDVS with the reflexes that were found."""
+    """Return LDVS with the reflexes from the file."""
     weights = tomllib.loads(FOUND.read_text(encoding="utf-8"))["weights"]
     return WithOffsets(Reflexes(tuple(map(tuple, weights))), name="reflexes")
 

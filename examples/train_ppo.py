@@ -1,8 +1,8 @@
 """Reflexes that keep LDVS upright, learned by PPO of stable-baselines3 (`pip install ".[rl]"`).
 
-An action is four gains, the same in every leg, which are held while the insect walks for 10 time units; the reflexes
-answer at every step.  `python examples/train_ppo.py` writes the gains that PPO found beside itself; they walk without
-stable-baselines3: `hexmj league --controllers examples/train_ppo.py:RIGHTING ldvs`.
+An action is four gains, the same in every leg, held for 10 time units; the reflexes act at every step. `python
+examples/train_ppo.py` writes the gains into `righting.json`. The controller walks without stable-baselines3: `hexmj
+league --controller examples/train_ppo.py:RIGHTING ldvs`.
 """
 
 import json
@@ -16,16 +16,12 @@ import hexmj
 from hexmj.environments.learned import TILT, TURNING, WithOffsets
 
 FOUND = Path(__file__).with_name("righting.json")
-VELOCITY, WINDOW, STARTS = (
-    0.6,
-    40.0,
-    200,
-)  # V_r, the observation time `start` [time units], and fresh starts to judge by
+VELOCITY, DURATION, STARTS = 0.6, 40.0, 200  # V_r, the observation time `start` [time units], starts to compare
 STRIDE, HELD = hexmj.Stride(dt=0.2), 50  # time step while learning [time units], and steps that an action lasts
-INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # so many actions of each insect between two updates
-SPREAD = 0.2  # of the gains that are tried; it stays
-FALL, TIPPING = 200.0, 0.25  # cost of a fall, and of the square of tipping ahead; a step is worth 1 at most
-LEAN = 0.5  # at which a gain of 1 lifts by all, as usual tipping does [usual tilt]
+INSECTS, ACTIONS, ROLLOUTS = 128, 2, 32  # actions of each insect between two updates
+SPREAD = 0.2  # standard deviation of the gains, constant
+FALL, TIPPING = 200.0, 0.25  # costs of a fall and of tipping ahead squared; a step earns at most 1
+LEAN = 0.5  # lean at which a gain of 1 gives the largest offset [usual tilt]
 
 LEFT = np.array([1, 1, 1, -1, -1, -1])  # +1 on the left
 AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
@@ -33,21 +29,21 @@ AHEAD = np.array([1, 0, -1, 1, 0, -1])  # +1 in front
 
 @dataclass(frozen=True)
 class Righting:
-    """Where the tips stand, and how they answer as the body leans and tips ahead or back; -1 to 1."""
+    """Constant offsets of the tips, and reflexes against leaning and tipping ahead; all from -1 to 1."""
 
     forward: float = 0.0
     outward: float = 0.0
     up_as_it_leans: float = 0.0
-    """Up in front as it leans ahead; less than 0 presses down where it leans to."""
+    """Up in front as the body leans ahead; a negative gain presses the front feet down."""
     up_as_it_tips: float = 0.0
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Offsets of the tips, (n, leg * axis)."""
+        """Return the offsets of the tips, (n, leg * axis)."""
         return offsets(np.array([astuple(self)]), felt)
 
 
 def offsets(gains: np.ndarray, felt: np.ndarray) -> np.ndarray:
-    """Offsets, (n, leg * axis), by gains, (n or 1, gain)."""
+    """Return offsets, (n, leg * axis), for gains, (n or 1, gain)."""
     forward, outward, leans, tips = np.broadcast_to(gains, (len(felt), 4)).T[..., None]
     leaning, tipping = felt[:, TILT][:, :1] / LEAN, felt[:, TURNING][:, 1:2]
     up = (leans * leaning + tips * tipping) * AHEAD
@@ -55,19 +51,20 @@ def offsets(gains: np.ndarray, felt: np.ndarray) -> np.ndarray:
 
 
 def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray:
-    """The environment's for walking upright at the velocity, less what a fall and tipping ahead or back cost."""
+    """Return the environment's reward, less the costs of a fall and of tipping ahead or back."""
     return walked - TIPPING * np.minimum(felt[:, TURNING][:, 1] ** 2, 9.0) - FALL * fell
 
 
 def main() -> None:
+    """Learn the gains, write them, and compare them with LDVS."""
     import torch  # pyright: ignore[reportMissingImports]
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
     from hexmj.environments.stable_baselines import FeltInsects, HeldInsects
 
-    torch.set_num_threads(1)  # on more it adds in another order, and finds other gains
+    torch.set_num_threads(1)  # more threads add in another order and find other gains
     began, cpu = time.monotonic(), time.process_time()
-    insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=WINDOW, stride=STRIDE)
+    insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=DURATION, stride=STRIDE)
     size, net = INSECTS * ACTIONS, {"net_arch": [], "log_std_init": float(np.log(SPREAD))}
     agent = PPO(
         "MlpPolicy", HeldInsects(insects, 4, HELD, offsets, reward), policy_kwargs=net, n_steps=ACTIONS,
@@ -76,8 +73,8 @@ def main() -> None:
     agent.policy.log_std.requires_grad = False
     agent.learn(ROLLOUTS * size)
     gains = agent.predict(np.ones(1, np.float32), deterministic=True)[0].astype(float).round(3)
-    kept = {"made by": "python examples/train_ppo.py", "gains": asdict(Righting(*gains.tolist()))}
-    FOUND.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+    result = {"made by": "python examples/train_ppo.py", "gains": asdict(Righting(*gains.tolist()))}
+    FOUND.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     spent = f"{time.monotonic() - began:.0f} s, {time.process_time() - cpu:.0f} s of processor time"
     print(f"{FOUND} after {agent.num_timesteps} actions in {spent}")
     both = {"ldvs": hexmj.LDVS, "righting": found()}
@@ -88,7 +85,7 @@ def main() -> None:
 
 
 def found() -> WithOffsets:
-    """LDVS with the gains that were found."""
+    """Return LDVS with the gains from the file."""
     return WithOffsets(Righting(**json.loads(FOUND.read_text(encoding="utf-8"))["gains"]), name="righting")
 
 

@@ -1,4 +1,4 @@
-"""A controller of one's own: a tripod of six phase oscillators that pull each other into anti-phase."""
+"""Your own controller: a tripod of six phase oscillators that pull each other into antiphase."""
 
 from dataclasses import dataclass
 
@@ -7,28 +7,28 @@ import numpy as np
 import hexmj
 from hexmj.controllers import Step, stepwise
 
-SIGN = np.array([1, -1, 1, -1, 1, -1])  # of the tripod a leg belongs to: L1, L3 and R2, or L2, R1 and R3
+SIGN = np.array([1, -1, 1, -1, 1, -1])  # of a leg's tripod: L1, L3 and R2, or L2, R1 and R3
 
 
 @dataclass(frozen=True)
 class Tripod:
-    """Every leg is an oscillator; standing legs keep to V_r, and only the time at which they are lifted gives way."""
+    """Every leg is an oscillator. Standing legs move with V_r; the coupling only shifts the time of lift-off."""
 
     pull: float = 1.0
     name: str = "tripod"
     mirrored = True
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `hexmj.controllers.Controller`."""
+        """Begin a plan, see `hexmj.controllers.Controller`."""
         span, dt = stride.aep0 - stride.pep0, stride.dt
         x, stands, age = starts, np.ones(starts.shape, dtype=bool), (stride.aep0 - starts) / span
 
         def step(v):
-            nonlocal x, stands, age  # age: part of its stance that a standing leg has behind it
+            nonlocal x, stands, age  # age: elapsed part of the stance
             v = v[:, None]
-            part = 1 / (1 + v)  # of the period for which legs stand
+            part = 1 / (1 + v)  # duty factor
             phase = np.where(stands, age * part, 1 - (stride.aep0 - x) / span * (1 - part))
-            hand = SIGN * np.exp(2j * np.pi * phase)  # of the clock that each oscillator is
+            hand = SIGN * np.exp(2j * np.pi * phase)  # of each oscillator's clock
             mean = (hand[:, :3] + hand[:, 3:]).mean(axis=1, keepdims=True) / 2
             pulled = 1 + self.pull * (mean * hand.conj()).imag
             age = np.where(stands, np.minimum(age + pulled * v * dt / span, 1), 0)

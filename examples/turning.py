@@ -1,4 +1,4 @@
-"""A controller that turns: its standing tips move on circles, beside their lines, about a point beside the insect."""
+"""A controller that turns: its standing tips move on circles about a point beside the insect."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,18 +10,18 @@ from hexmj.controllers import Step, stepwise
 from hexmj.rotations import heading
 
 TRIPODS = np.array([0, 2, 4]), np.array([1, 3, 5])
-NEAR = 2.0  # tips keep this far from the ends of the stride, where legs cannot reach beside their lines [mm]
+NEAR = 2.0  # distance from the ends of the step range, where legs cannot reach sideways [mm]
 
 
 @dataclass(frozen=True)
 class Turning:
-    """Two tripods in turn walk on a circle: its curvature is positive to the left [1/mm]."""
+    """Two tripods in turn walk on a circle; a positive curvature turns to the left [1/mm]."""
 
     curvature: float = 0.008
     name: str = "turning"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `hexmj.controllers.Controller`."""
+        """Begin a plan, see `hexmj.controllers.Controller`."""
         origin, line, dt = np.array(stride.geometry.origin), np.array(stride.geometry.y), stride.dt
         front, rear = stride.aep0 - NEAR, stride.pep0 + NEAR
         lands_at = (
@@ -49,7 +49,7 @@ class Turning:
 
 
 def main() -> None:
-    """Walk to the left, straight on and to the right, and say how far the insect has turned."""
+    """Walk to the left, straight ahead and to the right, and print by how much the insect turned."""
     starts = hexmj.draw_starts(1, seed=0)
     out = Path("results/examples")
     out.mkdir(parents=True, exist_ok=True)
@@ -58,7 +58,7 @@ def main() -> None:
         recording = hexmj.record(walked, title=f"curvature {curvature:g} per mm")
         way = 0.5 * recording.time.values[-1]  # mm
         turned = np.unwrap(heading(recording.qpos.values[:, 3:7]))[-1]
-        print(f"curvature {curvature:g} per mm: turned {turned:.2f} rad in {way:g} mm, asked for {curvature * way:.2f}")
+        print(f"curvature {curvature:g} per mm: turned {turned:.2f} rad in {way:g} mm, planned {curvature * way:.2f}")
         hexmj.save_recording(recording, out / f"turning_{curvature:g}.nc")
 
 

@@ -1,4 +1,4 @@
-"""Walk over a step that the insect does not feel, and film it from the side."""
+"""Walk over a step without sensory feedback, and film the walk from the side."""
 
 from pathlib import Path
 

@@ -19,7 +19,7 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
-from hexmj.environments.single_body import Alone
+from hexmj.environments.walkers import Alone
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import fine_steps
 from hexmj.physics.backend import Diverged, Engine, Rolled

@@ -1,14 +1,15 @@
 """The insect as an environment for learning and control: `dm` for dm_env, `gym` and `vector` for Gymnasium.
 
-Where Gymnasium is installed, its ids are registered when this package is imported.
+If Gymnasium is installed, this import registers its ids. `gymnasium.make("hexmj.environments:hexmj/StickInsect-v0")`
+imports this package first.
 """
 
 IDS = {"hexmj/StickInsect-v0": "joints", "hexmj/StickInsectTips-v0": "tips"}
-"""What an action means, by Gymnasium's ids."""
+"""Gymnasium's id -> kind of actions."""
 
 try:
     from gymnasium import register
-except ImportError:  # it is not installed
+except ImportError:  # an optional dependency
     pass
 else:
     for _id, _actions in IDS.items():

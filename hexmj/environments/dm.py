@@ -1,55 +1,42 @@
-"""The insect as a dm_env environment on dm_control; what an episode is stands in `task`.
+"""The insect as a dm_env environment on dm_control; `task` describes episodes, observations and rewards.
 
-Actions have units here: targets [rad] within the joints' ranges, or offsets [mm]: forward, left, up.  A fall ends an
-episode with discount 0, its time or the end of the ground with discount 1.  A simulation that diverges raises
-dm_control's PhysicsError.  Contacts are those of the last substep, known once it is done.
+Actions have units here: targets [rad] within the joints' ranges, or offsets [mm]: forward, left, up. A fall ends an
+episode with discount 0; its time or the end of the ground ends it with discount 1. A simulation that diverges raises
+dm_control's PhysicsError. Without a display, set MUJOCO_GL=egl before the import.
 """
 
-import os
-import warnings
 from dataclasses import dataclass
-from typing import Any
 
-import glfw
 import numpy as np
-
-from hexmj.rendering.gl import import_what_clashes
-
-with warnings.catch_warnings():
-    if "MUJOCO_GL" not in os.environ:  # without a screen GLFW only warns, and dm_control would never come to EGL
-        warnings.simplefilter("error", glfw.GLFWError)
-    import_what_clashes()
-    from dm_control import mujoco
+from dm_control import mujoco
 from dm_control.mujoco import wrapper
 from dm_control.rl import control
 from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import check_home, compile_body
-from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
-from hexmj.environments.compiled_passes import beyond, worth
-from hexmj.environments.single_body import Alone
+from hexmj.environments.observing import beyond, worth
 from hexmj.environments.task import (
     Actions,
     Task,
     action_bounds,
     action_names,
     checked_actions,
-    drawn,
+    draw_start,
     observation_bounds,
 )
-from hexmj.environments.walkers import Acted, Walkers
+from hexmj.environments.walkers import Acted, Alone, Walkers
 from hexmj.errors import InputError
 from hexmj.physics.backend import Diverged
 from hexmj.physics.fine_steps import Shown
-from hexmj.starts import check_draw
 from hexmj.timing import Stride
+from hexmj.validate import whole
 
 ONLY = np.array([0])
-"""The index of the only insect."""
+"""Index of the only insect."""
 
 
 def load(
@@ -62,22 +49,22 @@ def load(
     duration: float = 200.0,
     seed: int = 0,
 ) -> control.Environment:
-    """The environment; it can be given to `dm_control.viewer.launch`.
+    """Return the environment, for example for `dm_control.viewer.launch`.
 
     Args:
         velocity: commanded V_r, 0 < V < 1, as a fraction of V_p.
         actions: 'joints', targets of all joints, (leg * joint,) [rad] within the joints' ranges; or 'tips',
             offsets to the planned tips, (leg * axis,) [mm]: forward, left, up.
-        controller: plans the walk.
-        conditions: of the walk.
-        stride: of the plan; its time step is that of the environment.
-        duration: of an episode [time units].
-        seed: of the starts; the episodes take those of `draw_starts` one after the other.
+        controller: controller that plans the walk.
+        conditions: conditions of the walk.
+        stride: stride of the plan; its time step is that of the environment.
+        duration: duration of an episode [time units].
+        seed: seed of the starts; the episodes take the starts of `draw_starts` in order.
 
     Raises:
-        InputError: a value that makes no sense; here, or for an action in `step`.
+        InputError: a value is out of its range; `step` raises it for an action.
     """
-    conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
+    conditions, stride = conditions or Conditions(), stride or Stride()
     task = Task(velocity, actions, controller, conditions, stride, duration)
     compiled = compile_body(conditions, conditions.timestep(stride))
     check_home(compiled)
@@ -87,12 +74,12 @@ def load(
 
 
 class InsectPhysics(mujoco.Physics):
-    """The insect in dm_control, and what is measured on it."""
+    """The insect in dm_control."""
 
     compiled: CompiledBody
-    """The insect and its conditions; set by `load`."""
+    """The compiled body; set by `load`."""
     shown: Shown
-    """What the last step has shown of it, the only one: sensors, torques and depth, each (1, substep, ...)."""
+    """Sensors, torques and depth of the last step, each (1, substep, ...)."""
 
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
@@ -101,7 +88,7 @@ class InsectPhysics(mujoco.Physics):
         self._alone: Alone | None = None
 
     def copy(self, share_model: bool = False) -> "InsectPhysics":
-        """As planners need it; goes on the same way."""
+        """Return a copy for planners, which continues in the same way."""
         copied = super().copy(share_model)
         copied.compiled = self.compiled
         return copied
@@ -114,16 +101,16 @@ class InsectPhysics(mujoco.Physics):
         self._reload_from_data(data)
 
     def after_reset(self) -> None:
-        """Make everything current; dm_control would leave out the actuators, which the first step then lacks."""
+        """Compute everything; dm_control leaves out the actuators, which the first step needs."""
         self.forward()
 
     def set_control(self, control: np.ndarray) -> None:
-        """Targets of the joints [rad]: (actuator,), or (substep, actuator), one row for each substep to come."""
+        """Set joint targets [rad]: (actuator,), or (substep, actuator), one row for each substep to come."""
         self._rows = np.array(control, ndmin=2)
         self._control[:] = self._rows[0]
 
     def step(self, nstep: int = 1) -> None:
-        """Advance by `nstep` substeps; finely if a foot strikes the ground in them, see `fine_steps`."""
+        """Advance by `nstep` substeps, which are divided if a foot strikes the ground, see `fine_steps`."""
         rows = self._rows
         rows[0] = self._control
         if len(rows) < nstep:
@@ -138,7 +125,7 @@ class InsectPhysics(mujoco.Physics):
 
     @property
     def alone(self) -> Alone:
-        """What takes its steps; another one where dm_control has given it other data."""
+        """The engine that takes the steps; a new one after dm_control has replaced the data."""
         if self._alone is None:
             self._alone = Alone(self.compiled, self.model.ptr, self.data.ptr)
         return self._alone
@@ -148,27 +135,19 @@ class InsectPhysics(mujoco.Physics):
 class Walking(control.Task):
     """Walk straight ahead.
 
-    Starts are drawn from `_random`, which may be replaced by any of NumPy's generators, as wrappers of dm_control do.
+    Starts are drawn from `_random`, which wrappers of dm_control may replace.
     """
 
     task: Task
     seed: int
 
     def __post_init__(self) -> None:
-        """Draw the starts of `draw_starts` by the seed."""
-        self._random = np.random.default_rng(check_draw(1, self.seed)[1])
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Refuse copies and pickles of an episode, whose insect MuJoCo steps in memory that they would not share."""
-        if hasattr(self, "_walkers"):
-            raise InputError(
-                "an environment that was reset can be neither copied nor pickled; expected its physics, or another one"
-            )
-        return self.__dict__
+        """Make the generator of the starts."""
+        self._random = np.random.default_rng(whole("seed", self.seed, 0))
 
     @property
     def random(self) -> np.random.Generator:
-        """What the starts are drawn from, as dm_control's suite shows it; its wrapper `action_noise` draws, too."""
+        """Generator of the starts; dm_control's wrapper `action_noise` uses it too."""
         return self._random
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
@@ -176,10 +155,10 @@ class Walking(control.Task):
         self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
         self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
         self._bounds = self._spec.minimum, self._spec.maximum
-        self._walkers.begin(ONLY, drawn(self._random, self.task))
+        self._walkers.begin(ONLY, draw_start(self._random, self.task))
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
-        """Advance the plan by one step and tell the joints where to go."""
+        """Advance the plan by one step and set the joint targets."""
         self._walkers.check_begun()
         spec, action = self._spec, checked_actions(action, self._spec.shape)
         if (i := beyond(action, *self._bounds)) >= 0:
@@ -188,38 +167,38 @@ class Walking(control.Task):
         if self._acted.terminated or self._acted.truncated:
             return
         self._look(physics)
-        self._walkers.begun = False  # until the step is done
+        self._walkers.begun = False  # until the step has succeeded
         physics.set_control(self._walkers.control(action[np.newaxis])[0])
 
     def after_step(self, physics: InsectPhysics) -> None:
-        """Judge the step."""
+        """Compute reward and end of the step."""
         self._acted = self._walkers.judge(physics.shown)
         self._walkers.begun = True
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
-        """Bounds of an action; the names of its numbers are joined by tabs."""
+        """Return the bounds of an action; tabs separate the names of its numbers."""
         low, _, high = action_bounds(physics.compiled, self.task)
         return specs.BoundedArray(
             low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task))
         )
 
     def observation_spec(self, physics: InsectPhysics) -> dict[str, specs.BoundedArray]:
-        """The specs of all observations by their names."""
+        """Return the specs of all observations by name."""
         bounds = observation_bounds(physics.compiled, self.task)
         return {name: specs.BoundedArray(low.shape, float, low, high, name) for name, (low, high) in bounds.items()}
 
     def get_observation(self, physics: InsectPhysics) -> dict[str, np.ndarray]:
-        """The observations, in the order of their specs."""
+        """Return the observations in the order of their specs."""
         self._look(physics)
         return self._walkers.observer.named(self._walkers.observations()[0])
 
     def get_reward(self, physics: InsectPhysics) -> float:
-        """See `task`."""
-        here = physics.alone
-        return 0.0 if self._acted.terminated else worth(here.qvel[0], here.rotation[0], self.task.command)
+        """Return the reward, see `task`."""
+        body = physics.alone
+        return 0.0 if self._acted.terminated else worth(body.qvel[0], body.rotation[0], self.task.command)
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
-        """Discount 0 on a fall, 1 when the time or the ground is over, nothing before."""
+        """Return discount 0 on a fall, 1 at the end of time or ground, and None before."""
         if self._acted.terminated:
             return 0.0
         return 1.0 if self._acted.truncated else None

@@ -1,20 +1,17 @@
-"""What was learned, as a controller: a policy adds offsets to the tips that another controller plans.
+"""A learned policy as a controller: it adds offsets to the tips that another controller plans.
 
-A policy sees what a robot feels (`felt`), in an environment from its observations, in a walk of the package from
-`Sensed`; and it answers with actions of the environment whose actions are offsets, each from -1 to 1.  So what was
-trained there walks wherever a controller does, in the league too.  On paper nobody feels anything: there the insect is
-upright, as fast as it is told and stands on the feet that it plans to stand on.
+A policy receives sensed numbers (`felt`), in an environment from its observations and in a walk of the package from
+`Sensed`. It answers with actions of the environment with offsets, each from -1 to 1. A policy that was trained in the
+environment therefore walks wherever a controller does, the league included. In a kinematic walk nothing is sensed:
+there the insect is upright, walks at the commanded velocity and stands on the feet that it plans to stand on.
 """
 
-from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hexmj.body import STICK_INSECT, Body
-from hexmj.checks import NO_ARRAY, numbers, short, typed
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, limits_within
@@ -27,86 +24,64 @@ from hexmj.walks import PlannedWalk, copied, joined
 
 TILT, VELOCITY, TURNING = slice(0, 2), slice(2, 5), slice(5, 8)
 CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
-"""Columns of what is felt; see `felt`."""
+"""Columns of the sensed numbers, see `felt`."""
 
 FELT = 38
-"""Numbers that are felt."""
+"""Number of sensed numbers."""
 
-SEEN = {
-    "orientation": (4,),
-    "velocity": (3,),
-    "angular_velocity": (3,),
-    "contact": (6,),
-    "planned_stance": (6,),
-    "planned_tips": (6, 3),
-}
-"""Observations of an environment, of which it is made, by their shapes for one insect."""
+OBSERVED = "orientation", "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
+"""Observations of an environment from which the sensed numbers are computed."""
 
 MOST = 10.0
-"""Greatest number that is felt, in usual sizes; beyond it nothing is told apart."""
+"""Bound of the sensed numbers, in units of their usual sizes."""
 
 
 class Policy(Protocol):
-    """A frozen dataclass of plain data that answers what is felt, (n, `FELT`), with actions, (n, leg * axis)."""
+    """A frozen dataclass of plain data that answers sensed numbers, (n, `FELT`), with actions, (n, leg * axis)."""
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`; cut off at -1 and 1.
+        """Return offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`, clipped to -1 and 1.
 
-        Walks cut off, too, what leads a tip ahead of AEP_0 or behind PEP_min where the plan does not go there itself:
-        plans keep to where legs step (`check-controller`).  The environment does not.
+        In a walk, tips are also clipped to the range between PEP_min and AEP_0, unless the plan itself goes beyond:
+        controllers keep their tips there (`check-controller`). The environment does not clip them.
         """
         ...
 
 
 def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
-    """What policies see, (n, `FELT`): tilt ahead and to the left, velocity, turning, contact, planned stance and tips.
+    """Return the numbers that policies receive, (n, `FELT`), clipped to `MOST`.
 
-    Each is (n, ...), and divided by its usual size: 0.1 rad, five standing heights of the body a second, 2 rad/s, and a
-    standing height, so that it is of the size of 1; it ends at `MOST`.
+    Args:
+        body: its standing height scales lengths and velocities.
+        parts: tilt ahead and to the left, velocity, turning, contact, planned stance and planned tips, each (n, ...).
+            They are divided by their usual sizes: 0.1 rad, five standing heights a second, 2 rad/s, 1, 1, and a
+            standing height.
     """
     count, high = len(parts[0]), body.standing_height
     usual = 0.1, 5.0 * high, 2.0, 1.0, 1.0, high
-    columns = [one.reshape(count, -1) / size for one, size in zip(parts, usual, strict=True)]
+    columns = [part.reshape(count, -1) / size for part, size in zip(parts, usual, strict=True)]
     return np.concatenate(columns, axis=1).clip(-MOST, MOST)
 
 
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
-    """The same from the observations of a vector environment of this body; (`FELT`,) from those of a single one.
-
-    Raises:
-        InputError: other observations than its dictionary, or of other shapes.
-    """
-    if missing := [name for name in SEEN if name not in typed("observations", observations, Mapping)]:
-        raise InputError(f"observations of {', '.join(map(str, observations)):.200}; expected {missing[0]}, too")
-    told = {name: _observed(name, observations[name]) for name in SEEN}
-    several = told["orientation"].shape[:-1][:1]
-    for name, shape in SEEN.items():
-        if told[name].shape != several + shape:
-            raise InputError(f"{name} of the shape {told[name].shape}; expected {several + shape}")
-    orientation, *others = told.values() if several else (values[None] for values in told.values())
-    seen = felt(typed("body", body, Body), np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
-    return seen if several else seen[0]
-
-
-def _observed(name: str, values: Any) -> np.ndarray:
-    with suppress(*NO_ARRAY):
-        array = np.asarray(values)
-        if array.dtype.kind in "biuf":
-            return array
-    raise InputError(f"{name} = {short(values)}; expected numbers")
+    """Return the sensed numbers, (n, `FELT`), of a vector environment's observations; of a single one (`FELT`,)."""
+    orientation, *others = (np.asarray(observations[name]) for name in OBSERVED)
+    if orientation.ndim == 1:
+        return felt_in({name: np.asarray(observations[name])[None] for name in OBSERVED}, body)[0]
+    return felt(body, np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
 
 
 @dataclass(frozen=True)
 class WithOffsets:
-    """A controller whose plan's tips are offset by a policy."""
+    """A controller whose planned tips are offset by a policy."""
 
     policy: Policy
-    """What was learned."""
+    """The learned policy."""
     controller: Controller = LDVS
-    """What plans."""
+    """The controller that plans."""
     conditions: Conditions = field(default_factory=Conditions)
-    """Under which it walks: of their V_p and path the feet are lifted and lowered, and offsets are those of their body.
-    A walk whose own are others is refused."""
+    """Conditions of the walk: their V_p and foot path lift and lower the feet, and their body scales the offsets.
+    Physical walks under other conditions are refused."""
     name: str = field(default="learned")
 
     check_velocity = property(limits_within)
@@ -119,10 +94,10 @@ class WithOffsets:
         acceleration: Acceleration | None = None,
         threads: int | None = None,
     ) -> "OffsetPlan":
-        """See `protocol.Controller.begin`.
+        """Begin a plan, see `protocol.Controller.begin`.
 
         Raises:
-            InputError: the controller was itself made for other conditions.
+            InputError: the inner controller was made for other conditions.
         """
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
         check_made_for(plan, self.conditions)
@@ -130,39 +105,38 @@ class WithOffsets:
 
 
 class OffsetPlan:
-    """A `protocol.FeedbackPlan`: another plan's tips with a policy's offsets, and the heights that a body gives them."""
+    """A `protocol.FeedbackPlan`: another plan's tips with a policy's offsets, and the heights of the foot path."""
 
     def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
-        """Around a plan at time 0."""
+        """Wrap a plan at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self._policy, self.made_for = plan, policy, conditions
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
         self._tips = standing_tips(plan.starts, conditions.standing_height, plan.stride)
         self._stance = np.ones(plan.starts.shape)
-        self._felt, self._told = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
+        self._felt, self._sensed = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
 
     def sense(self, sensed: Sensed) -> None:
-        """Take in what the policy sees, and what the plan reads if it reads the legs."""
+        """Store the sensed numbers for the policy, and pass them on to a plan with sensory feedback."""
         if isinstance(self._plan, FeedbackPlan):
             self._plan.sense(sensed)
-        self._told[sensed.ids] = True
+        self._sensed[sensed.ids] = True
         planned = self._stance[sensed.ids], self._tips[sensed.ids]
         self._felt[sensed.ids] = felt(
             self.made_for.body, sensed.tilt, sensed.velocity, sensed.turning, sensed.contact, *planned
         )
 
     def advance(self, steps: int) -> PlannedWalk:
-        """The next steps, each with the offsets that the policy gives for what is felt then."""
+        """Plan the next steps, each with the policy's offsets for what is sensed then."""
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
         step, count = copied(self._plan.advance(1)), len(self.starts)
-        seen = np.where(self._told, self._felt, self._upright(step.velocity[0]))
-        actions = numbers("answer of a policy", self._policy(seen))
+        seen = np.where(self._sensed, self._felt, self._upright(step.velocity[0]))
+        actions = np.asarray(self._policy(seen), dtype=float)
         if actions.shape != (count, 18) or np.isnan(actions).any():
             raise InputError(
-                f"a policy answers {short(actions)} of the shape {actions.shape}; expected numbers,"
-                f" (start, leg * axis), {(count, 18)}"
+                f"a policy returned NaN or the shape {actions.shape}; expected (start, leg * axis), {(count, 18)}"
             )
         offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)
         offset = self.made_for.body.lengths.largest_tip_offset * offset
@@ -170,12 +144,12 @@ class OffsetPlan:
         self.done = self._plan.done
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
         rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
-        x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)  # where legs step, or the plan itself goes
+        x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)
         height = up + self.made_for.standing_height
         return replace(step, x=x[None], y=y[None], height=height[None])
 
     def _upright(self, velocity: np.ndarray) -> np.ndarray:
-        """What is felt on paper."""
+        """Return the sensed numbers of a kinematic walk."""
         still = np.zeros((len(self.starts), 3))
         ahead = np.stack([velocity * self.made_for.vp, still[:, 0], still[:, 0]], axis=1)
         return felt(self.made_for.body, still[:, :2], ahead, still, self._stance, self._stance, self._tips)

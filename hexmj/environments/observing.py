@@ -1,16 +1,25 @@
-"""What insects observe, (insect, number) in one compiled pass, and the names and shapes of these numbers."""
+"""Observations and rewards of all insects at once, in compiled passes.
 
-from typing import NamedTuple
+For one insect a dozen calls of NumPy take as long as its physics. `tests/plain_observations.py` has the same formulas
+in plain NumPy, and a test compares the two.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.environments.compiled_passes import observe
+from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.environments.task import Task, observation_bounds
+from hexmj.jitted import jitted, part
+from hexmj.stability import margins
+
+ROUNDING = 1e-6
+"""Tolerance of an action's bounds: a bound that was rounded to single precision is allowed."""
 
 
 class Places(NamedTuple):
-    """Some insects as they are now."""
+    """The state of some insects now."""
 
     qpos: np.ndarray
     """(n, position)."""
@@ -19,25 +28,25 @@ class Places(NamedTuple):
     rotation: np.ndarray
     """From the root frames to the world, (n, axis, axis)."""
     sensors: np.ndarray
-    """(n, column), of which those that measure places are current."""
+    """(n, column); the columns that measure places are current."""
 
 
 class Planned(NamedTuple):
-    """What is planned for some insects now."""
+    """The plans of some insects now."""
 
     stance: np.ndarray
-    """Which legs may stand, (n, leg) of 0 and 1."""
+    """Legs that may stand, (n, leg) of 0 and 1."""
     tips: np.ndarray
-    """In the root frame, without offsets, (n, leg, axis) [mm]."""
+    """Tips in the root frame, without offsets, (n, leg, axis) [mm]."""
     missed: np.ndarray
     """Substeps of the last step in which a tip was out of reach, (n, leg)."""
 
 
 class Observer:
-    """Observes insects of a body in a task."""
+    """Observes insects of one body in one task."""
 
     def __init__(self, compiled: CompiledBody, task: Task) -> None:
-        """See `task` for what is observed."""
+        """Prepare the layout of the observations, which `task` describes."""
         bounds, columns = observation_bounds(compiled, task), compiled.columns
         self._bounds = np.array([np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1)])
         self._corners, no_foot = compiled.trunk_corners, compiled.body.lengths.no_foot_margin
@@ -51,18 +60,215 @@ class Observer:
     def observe(
         self, places: tuple[np.ndarray, ...], standing: np.ndarray, planned: tuple[np.ndarray, ...]
     ) -> np.ndarray:
-        """Everything observed of some insects, (n, number); `standing` says which feet do, (n, leg).
+        """Return all observations of some insects, (n, number).
 
-        `places` and `planned` are `Places` and `Planned` as plain tuples, which compiled code takes over faster.
+        Args:
+            places: `Places` as a plain tuple, which compiled code receives faster.
+            standing: feet that stand, (n, leg).
+            planned: `Planned` as a plain tuple.
         """
         flat = np.empty((len(standing), self._bounds.shape[1]))
         observe(places, self._corners, standing, planned, self._bounds, self._layout, flat)
         return flat
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
-        """What was observed, (..., number), by name and in its shape."""
+        """Return observations, (..., number), by name and in their shapes."""
         before = flat.shape[:-1]
         return {
             name: flat[columns].reshape(before + shape) if shape else flat[columns]
             for name, columns, shape in self._fields
         }
+
+
+@jitted
+def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
+    """Convert actions from -1 to 1 into joint angles [rad] or offsets [mm].
+
+    Args:
+        actions: of all insects, (insect, number).
+        ids: insects that walk, (n,).
+        usual: value for the action 0, (number,).
+        span: distance from there to the least and to the greatest value, (2, number).
+
+    Returns:
+        The values, (n, number), and whether all actions are within their bounds.
+    """
+    wanted, within = np.empty((len(ids), actions.shape[1])), True
+    for i, n in enumerate(ids):
+        for j in range(actions.shape[1]):
+            within &= abs(actions[n, j]) <= 1.0 + ROUNDING
+            wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0, j]
+    return wanted, within
+
+
+@jitted
+def beyond(action: Any, low: Any, high: Any) -> int:
+    """Return the index of the first number of an action, (number,), outside its bounds; -1 if all are within."""
+    for j in range(len(action)):
+        if not low[j] - ROUNDING <= action[j] <= high[j] + ROUNDING:
+            return j
+    return -1
+
+
+@jitted
+def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
+    """Return the tip targets of some insects for their next step, (n, substep, leg, axis) [mm].
+
+    Args:
+        wanted: values of their actions, (n, number).
+        ids: insects, (n,).
+        ahead: planned tips (insect, step, substep, leg, axis), stance (insect, step, leg), and the index of the next
+            step, (insect,), which is advanced.
+        planned: `Planned` of all insects; its stance and tips are updated.
+        offset: whether actions are offsets to the tips.
+    """
+    tips_ahead, stance_ahead, at = ahead
+    tips = np.empty((len(ids), tips_ahead.shape[2], 6, 3))
+    for i, n in enumerate(ids):
+        step = at[n]
+        for leg in range(6):
+            planned[0][n, leg] = stance_ahead[n, step, leg]
+            for axis in range(3):
+                beside = wanted[i, 3 * leg + axis] if offset else 0.0
+                for sub in range(tips.shape[1]):
+                    tips[i, sub, leg, axis] = tips_ahead[n, step, sub, leg, axis] + beside
+                planned[1][n, leg, axis] = tips_ahead[n, step, tips.shape[1] - 1, leg, axis]
+        at[n] = step + 1
+    return tips
+
+
+@jitted
+def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
+    """Let legs that cannot reach their tips keep their last angles.
+
+    Args:
+        joints: angles for the tips, (n, substep, leg, joint) [rad]; replaced where a tip is out of reach.
+        reachable: tips within reach, (n, substep, leg).
+        ids: insects, (n,).
+        last: last angles of all insects, (insect, leg, joint); updated.
+        missed: substeps in which a tip is out of reach, (insect, leg); updated.
+    """
+    for i, n in enumerate(ids):
+        for leg in range(6):
+            missed[n, leg] = 0.0
+            for sub in range(joints.shape[1]):
+                missed[n, leg] += not reachable[i, sub, leg]
+                for j in range(joints.shape[3]):
+                    if reachable[i, sub, leg]:
+                        last[n, leg, j] = joints[i, sub, leg, j]
+                    else:
+                        joints[i, sub, leg, j] = last[n, leg, j]
+
+
+@jitted
+def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
+    """Write all observations into `flat`, (n, number), clipped at their bounds.
+
+    Args:
+        places: `Places` of the insects.
+        corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
+        standing: feet that stand, (n, leg).
+        planned: stance (n, leg), tips (n, leg, axis), and substeps out of reach (n, leg).
+        bounds: least and greatest value of every number, (2, number).
+        layout: number of joints, first sensor columns of feet and centre of mass, the command, and the margin without
+            a foot in contact.
+    """
+    qpos, qvel, rotation, sensors = places
+    stance, tips, missed = planned
+    joints, foot, centre, command, no_foot = layout
+    feet, margin = np.empty((1, 6, 2)), np.empty(1)
+    for n in range(len(flat)):
+        seen, turn, q, s = flat[n], rotation[n], qpos[n], sensors[n]
+        at = _observe_root(q, qvel[n], turn, joints, seen)
+        seen[at] = _clearance(q, turn, corners)
+        at += 1
+        for leg in range(6):
+            tip = s[foot + 3 * leg : foot + 3 * leg + 3]
+            for k in range(3):
+                seen[at + k] = 0.0
+                for axis in range(3):
+                    seen[at + k] += (tip[axis] - q[axis]) * turn[axis, k]
+            at += 3
+            feet[0, leg, 0], feet[0, leg, 1] = tip[0] - s[centre], tip[1] - s[centre + 1]
+        for leg in range(6):
+            seen[at + leg] = standing[n, leg]
+        margins(feet, standing[n : n + 1], margin)
+        seen[at + 6] = max(margin[0], no_foot)
+        seen[at + 7] = command
+        at += 8
+        for leg in range(6):
+            seen[at + leg] = stance[n, leg]
+            for k in range(3):
+                seen[at + 6 + 3 * leg + k] = tips[n, leg, k]
+        at += 24
+        for i in range(at, len(seen)):
+            seen[i] = missed[n, i - at]
+        for i in range(len(seen)):
+            seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
+
+
+@part
+def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
+    """Write joints, orientation and velocities into the first numbers of `seen`, and return their count."""
+    for j in range(joints):
+        seen[j] = q[ROOT_QPOS + j]
+        seen[joints + j] = v[ROOT_QVEL + j]
+    at = 2 * joints
+    for k in range(4):
+        seen[at + k] = q[3 + k]
+    at += 4
+    angle = np.arctan2(turn[1, 0], turn[0, 0])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    seen[at] = cosine * v[0] + sine * v[1]
+    seen[at + 1] = cosine * v[1] - sine * v[0]
+    seen[at + 2] = v[2]
+    for k in range(3):
+        seen[at + 3 + k] = v[3 + k]
+    return at + 6
+
+
+@part
+def _clearance(q: Any, turn: Any, corners: Any) -> float:
+    """Return the height of the trunk's lowest corner [mm]."""
+    lowest = np.inf
+    for c in range(len(corners[0])):
+        corner = corners[0][c]
+        up = turn[2, 0] * corner[0] + turn[2, 1] * corner[1] + turn[2, 2] * corner[2]
+        lowest = min(lowest, q[2] + up - corners[1][c])
+    return lowest
+
+
+@jitted
+def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, result: Any) -> bool:
+    """Compute rewards and ends of the insects that took a step.
+
+    Args:
+        places: `Places` of all insects after the step.
+        ids: insects that took the step, (n,).
+        sensors: at the beginning of each substep, (n, substep, column).
+        trunk: first column of the contacts of the trunk's parts, and the one after the last.
+        command: commanded velocity [mm/s].
+        time: steps that all insects have taken, (insect,), which are advanced, and the steps of an episode.
+        result: rewards, falls and ends of time, each (insect,), filled with 0 before; updated.
+
+    Returns:
+        Whether any episode has ended.
+    """
+    (_, qvel, rotation, now), (done, steps), (reward, fell, over), any_over = places, time, result, False
+    for i, n in enumerate(ids):
+        done[n] += 1
+        for column in range(trunk[0], trunk[1]):
+            fell[n] |= now[n, column] > 0
+            for t in range(sensors.shape[1]):
+                fell[n] |= sensors[i, t, column] > 0
+        over[n] = done[n] == steps and not fell[n]
+        if not fell[n]:
+            reward[n] = worth(qvel[n], rotation[n], command)
+        any_over |= fell[n] or over[n]
+    return any_over
+
+
+@jitted
+def worth(qvel: Any, rotation: Any, command: float) -> float:
+    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect in its state now."""
+    return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)

@@ -1,7 +1,7 @@
-"""Many insects for stable-baselines3, whose vector environments are not Gymnasium's: a thin face of `vector`.
+"""Many insects for stable-baselines3, whose vector environments differ from Gymnasium's.
 
-It observes what the insects feel (`learned.felt_in`), in single precision as its networks do, so that what is learned
-walks as a controller by `learned.WithOffsets`.  `HeldInsects` are the same for actions that last.
+An agent observes the sensed numbers of `learned.felt_in` in single precision, so that its policy walks as a controller
+by `learned.WithOffsets`. `HeldInsects` are insects whose actions last for many steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,66 +17,49 @@ try:
 except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
-from hexmj import checks
-from hexmj.environments.compiled_passes import ROUNDING
 from hexmj.environments.learned import FELT, MOST, felt_in
+from hexmj.environments.observing import ROUNDING
 from hexmj.environments.task import checked_actions
 from hexmj.environments.vector import StickInsects
-
-MANY = 10**6
-"""Most numbers of an action, and most steps of one."""
+from hexmj.validate import whole
 
 Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Offsets of the tips, (n, leg * axis), of actions, (n, number), and what is felt, (n, `FELT`)."""
+"""Actions, (n, number), and sensed numbers, (n, `FELT`) -> offsets of the tips, (n, leg * axis)."""
 
 Reward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Of the environment's reward, what is felt as a step ends and who fell in it, each (n, ...): the reward to learn by,
-(n,)."""
+"""The environment's reward, the sensed numbers at the end of a step and the falls, each (n, ...) -> the reward for
+learning, (n,)."""
 
 
 class FeltInsects(VecEnv):
-    """Insects whose actions are offsets to the tips; episodes begin anew in the step in which they end."""
+    """Insects whose actions are offsets to the tips; an episode begins in the step in which the last one ends."""
 
     def __init__(self, num_envs: int, **task: Any) -> None:
-        """Its settings are those of `vector.StickInsects`, but for the actions and when episodes begin.
-
-        Raises:
-            InputError: a value that makes no sense.
-        """
-        if settled := sorted({"actions", "autoreset_mode"} & task.keys()):
-            raise InputError(f"{settled[0]} = {task[settled[0]]!r:.80}; expected none: it is settled here")
+        """Make the insects of `vector.StickInsects` with the actions 'tips' and the mode 'SameStep'."""
         self._insects = StickInsects(num_envs, actions="tips", autoreset_mode="SameStep", **task)
         felt = spaces.Box(-MOST, MOST, (FELT,), np.float32)
         super().__init__(num_envs, felt, self._insects.single_action_space)  # pyright: ignore[reportArgumentType]
         self._actions: Any = None
 
     def reset(self) -> np.ndarray:
-        """Begin all episodes, by the seeds of `seed` if there are some.
-
-        Raises:
-            InputError: options have been set.
-        """
-        options = self._options
-        self._reset_options()
-        if any(options):
-            raise InputError(f"options = {options!r:.80}; expected none")
+        """Begin all episodes, with the seeds of `seed` if it was called."""
         observed = self._insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
+        self._reset_options()
         return self._seen(observed)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take the actions that `step_wait` will carry out."""
+        """Store the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """One step of all insects, with the actions that were taken for it.
+        """Take one step of all insects with the stored actions.
 
         Raises:
-            InputError: none were, or some are out of bounds.
-            SimulationError: an insect that diverged.
+            InputError: an action is out of bounds.
+            SimulationError: the simulation of an insect diverged.
         """
-        actions, self._actions = self._actions, None
-        observed, reward, fell, over, last = self._insects.step(actions)
+        observed, reward, fell, over, last = self._insects.step(self._actions)
         done, infos = fell | over, [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(done).tolist():
             final = {name: values[np.newaxis] for name, values in last["final_obs"][i].items()}
@@ -84,76 +67,65 @@ class FeltInsects(VecEnv):
         return self._seen(observed), reward.astype(np.float32), done, infos
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """A frame of every insect, (height, width, 3), if they were asked for by `render_mode`."""
+        """Return a frame of every insect, (height, width, 3), with `render_mode`."""
         return self._insects.render() or [None] * self.num_envs
 
     def close(self) -> None:
-        """Free the GL, if one was chosen."""
+        """Free the renderer."""
         self._insects.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute that all insects share; spaces are those of one of them."""
-        of = self if attr_name in ("action_space", "observation_space") else self._insects
-        return [getattr(of, attr_name)] * len(self._some(indices))
+        """Return an attribute, which all insects share; spaces are those of one insect."""
+        owner = self if attr_name in ("action_space", "observation_space") else self._insects
+        return [getattr(owner, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: all that an insect is made with is settled.
+        """Refuse to change an attribute.
 
         Raises:
             InputError: always.
         """
-        raise InputError(f"{attr_name} = {value!r:.80} cannot be set; expected new insects that are made with it")
+        raise InputError(f"{attr_name} cannot be set; make other insects")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method, for all insects at once.
-
-        Raises:
-            InputError: for some of them.
-        """
-        return [getattr(self._insects, method_name)(*args, **kwargs)] * self._all(indices)
+        """Call a method of all insects together."""
+        if len(set(self._get_indices(indices))) < self.num_envs:
+            raise InputError(f"indices = {indices!r:.80}; expected all insects, which are one environment")
+        return [getattr(self._insects, method_name)(*args, **kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """No insect is wrapped by itself."""
-        return [False] * len(self._some(indices))
+        """Return False: no single insect is wrapped."""
+        return [False] * len(list(self._get_indices(indices)))
 
     def _seen(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         return felt_in(observations, self._insects.task.conditions.body).astype(np.float32)
 
-    def _some(self, indices: Any) -> list[int]:
-        n = self.num_envs
-        some = [indices] if np.isscalar(indices) else self._get_indices(indices)
-        return [checks.whole("index", one, -n, n - 1) % n for one in some]
-
-    def _all(self, indices: Any) -> int:
-        if {*self._some(indices)} != {*range(self.num_envs)}:
-            raise InputError(
-                f"indices = {indices!r:.80}; expected all {self.num_envs} insects, which are one environment"
-            )
-        return self.num_envs
-
 
 class HeldInsects(VecEnvWrapper):
-    """Insects whose actions are few numbers for reflexes, held for many steps while the reflexes go on at each.
+    """Insects whose actions are a few parameters of reflexes, held for many steps; the reflexes act at each step.
 
-    Nothing is observed but a constant: what is learned are the numbers themselves.  The reward is the mean of the
-    steps'; an insect whose episode ends goes on with a fresh one, unrewarded until the next action.
+    The observation is constant, because the parameters themselves are learned. The reward is the mean reward of the
+    steps. An insect whose episode ends continues with a fresh episode, without rewards until the next action.
     """
 
     def __init__(self, insects: FeltInsects, numbers: int, steps: int, moves: Moves, reward: Reward) -> None:
-        """Actions of so many numbers, -1 to 1, each held for so many steps.
+        """Wrap insects.
+
+        Args:
+            insects: the insects.
+            numbers: parameters of an action, each from -1 to 1.
+            steps: steps for which an action is held.
+            moves: the reflexes.
+            reward: the reward of a step.
 
         Raises:
-            InputError: no numbers or steps, no insects of stable-baselines3's kind, or what is no function.
+            InputError: numbers or steps are not positive.
         """
-        checks.typed("insects", insects, VecEnv)
-        for name, function in {"moves": moves, "reward": reward}.items():
-            checks.typed(name, function, Callable)
-        self._shape = (checks.whole("numbers", numbers, 1, MANY),)
+        self._shape = (whole("numbers", numbers, 1),)
         nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
         super().__init__(insects, nothing, spaces.Box(-1.0, 1.0, self._shape, np.float32))
-        self._steps = checks.whole("steps", steps, 1, MANY)
+        self._steps = whole("steps", steps, 1)
         self._insects, self._moves, self._reward = insects, moves, reward
-        self._actions = self._felt = None
         self._constant = np.ones((self.num_envs, 1), np.float32)
 
     def reset(self) -> np.ndarray:
@@ -162,10 +134,10 @@ class HeldInsects(VecEnvWrapper):
         return self._constant
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take the actions that `step_wait` will carry out.
+        """Store the actions for `step_wait`.
 
         Raises:
-            InputError: something else, or numbers beyond -1 to 1.
+            InputError: the shape is another one, or a number is out of bounds.
         """
         actions = checked_actions(actions, (self.num_envs, *self._shape))
         if not (within := np.abs(actions) <= 1.0 + ROUNDING).all():
@@ -173,32 +145,22 @@ class HeldInsects(VecEnvWrapper):
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """All steps of one action.
+        """Take all steps of one action.
 
         Raises:
-            InputError: there is none, no episode has begun, or rewards that are no finite numbers.
-            SimulationError: an insect that diverged.
+            SimulationError: the simulation of an insect diverged.
         """
-        actions, self._actions = self._actions, None
-        if self._felt is None or actions is None:
-            raise InputError("a step before the first reset, or without an action; expected a reset, then an action")
         reward, done = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for _ in range(self._steps):
-            self._insects.step_async(self._moves(actions, self._felt))
-            self._felt, gained, ends, told = self._insects.step_wait()
-            fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in told])
+            self._insects.step_async(self._moves(self._actions, self._felt))
+            self._felt, gained, ends, step_infos = self._insects.step_wait()
+            fell = ends & ~np.array([info.get("TimeLimit.truncated", False) for info in step_infos])
             last = self._felt.copy()
             for i in np.flatnonzero(ends).tolist():
-                last[i] = told[i]["terminal_observation"]
-            reward += ~done * self._rewarded(gained, last, fell)
+                last[i] = step_infos[i]["terminal_observation"]
+            reward += ~done * self._reward(gained, last, fell)
             for i in np.flatnonzero(ends & ~done).tolist():
-                infos[i] = told[i] | {"terminal_observation": self._constant[i]}
+                infos[i] = step_infos[i] | {"terminal_observation": self._constant[i]}
             done |= ends
         return self._constant, (reward / self._steps).astype(np.float32), done, infos
-
-    def _rewarded(self, gained: np.ndarray, last: np.ndarray, fell: np.ndarray) -> np.ndarray:
-        reward = checks.numbers("reward", self._reward(gained, last, fell))
-        if reward.shape != (self.num_envs,) or not np.isfinite(reward).all():
-            raise InputError(f"reward = {checks.short(reward)}; expected {self.num_envs} finite numbers")
-        return reward

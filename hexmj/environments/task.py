@@ -1,91 +1,91 @@
-"""What an episode is, whoever asks for it: actions, observations, rewards and ends.
+"""The task: what an episode, an action, an observation and a reward are, for every interface the same.
 
-The insect shall walk straight ahead at a commanded velocity.  An episode begins at a random start in S, settled as for
-a physical walk.  One step of an environment is one step of the plan, with its substeps.  The controller runs along and
-its plan is observed whatever the actions are: targets of all joints, held for the step ('joints'), or offsets to the
-tips that the controller plans ('tips'), so that no offsets are its own walk, bit for bit that of
-`measures.physical.physical_walk`.
+The insect should walk straight ahead at a commanded velocity. An episode begins at a random start in S, settled as for
+a physical walk. One step of an environment is one step of the plan, with its substeps. The controller runs along, and
+its plan is observed whatever the actions are. Actions are targets of all joints, held for the step ('joints'), or
+offsets to the tips that the controller plans ('tips'). Without offsets, the insect walks as in
+`measures.physical.physical_walk`, bit for bit.
 
-Observations, all float64 and cut off at their bounds (`observation_bounds`):
+Observations are float64 and clipped at their bounds (`observation_bounds`):
 
 - joint_angles, joint_velocities: (leg * joint,) [rad], [rad/s], in the order of `ctrl`
-- orientation: unit quaternion of the root, (w, x, y, z); the walk should go along the world's x
-- velocity: of the root, ahead, to the left and up, seen from its heading [mm/s]
+- orientation: unit quaternion of the root, (w, x, y, z); the commanded direction is the world's x
+- velocity: of the root, ahead, to the left and up, relative to its heading [mm/s]
 - angular_velocity: of the root, in its own frame [rad/s]
 - clearance: height of the trunk's lowest point, (1,) [mm]
 - tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `Conditions.contact_gap`, as the last physics step
-  began
-- margin: measured stability margin, (1,) [mm], from the feet in contact and the insect's own centre of mass;
-  `Lengths.no_foot_margin`, out of any foot's reach, where no foot is in contact
-- command: velocity to walk at, (1,) [mm/s]
+- contact: (leg,) 1 where the ground carried the foot within the last `Conditions.contact_gap`, at the beginning of the
+  last physics step
+- margin: measured stability margin, (1,) [mm], of the feet in contact and the insect's own centre of mass;
+  `Lengths.no_foot_margin`, which is out of any foot's reach, where no foot is in contact
+- command: commanded velocity, (1,) [mm/s]
 - planned_stance: (leg,) 1 where the plan lets the leg stand
 - planned_tips: in the root frame, (leg, axis) [mm], without offsets
 - out_of_reach, with 'tips' only: (leg,) substeps of the last step in which the leg kept its last angles, because its
-  planned tip with the offset could not be reached
+  planned tip with the offset was out of reach
 
 The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the step, the
-command c and the upward component u of the body's vertical; it is 0 on a fall.  An episode ends on a fall, when the
-trunk touches the ground (terminated); or after its duration, or where a foot comes to the end of a step, gap or hurdle
-(truncated).
+command c and the upward component u of the body's vertical; it is 0 on a fall. An episode is terminated by a fall: the
+trunk touches the ground. It is truncated after its duration, or where a foot reaches the end of a step, gap or hurdle.
 
-`observing` and `compiled_passes` compute all this, for every face the same.
+`observing` computes all of this.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.checks import check_types, numbers
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.timing import Stride, steps_within
+from hexmj.validate import choice, number
 
 Actions = Literal["joints", "tips"]
 """Kinds of actions: targets of the joints, or offsets to the tips."""
 
 DOUBLE = np.dtype(np.float64)
-"""What actions are computed in; NumPy has one such object, and to ask whether it is that takes no time."""
+"""Type of actions. NumPy has one such object, so that `is` compares it in no time."""
 
 BEYOND_RANGE = 0.5
-"""How far joints may be observed beyond their ranges, which give way [rad]."""
+"""Angle by which observed joints may exceed their ranges, whose limits are soft [rad]."""
 
 FASTEST_TURN = 200.0
-"""Greatest velocity of a joint, and of the root about an axis, that is observed [rad/s]."""
+"""Greatest observed velocity of a joint, and of the root about an axis [rad/s]."""
 
 FASTEST = 20.0
-"""Greatest velocity of the root that is observed, in body heights fallen freely: sqrt(2 g h) at so many of them."""
+"""Greatest observed velocity of the root, as a height of free fall in standing heights h: sqrt(2 g h) for each."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """What an episode is."""
+    """The settings of an episode.
+
+    Raises:
+        InputError: a value is out of its range.
+    """
 
     velocity: float = 0.3
     """Commanded V_r, 0 < V < 1, as a fraction of V_p."""
     actions: Actions = "joints"
-    """What an action means."""
+    """Kind of actions."""
     controller: Controller = LDVS
-    """Plans the walk."""
+    """Controller that plans the walk."""
     conditions: Conditions = field(default_factory=Conditions)
-    """Of the walk."""
+    """Conditions of the walk."""
     stride: Stride = field(default_factory=Stride)
-    """Of the plan; its time step is that of the environment."""
+    """Stride of the plan; its time step is that of the environment."""
     duration: float = 200.0
-    """Of an episode [time units]."""
+    """Duration of an episode [time units]."""
 
     def __post_init__(self) -> None:
-        check_types(self)
-        if not 0 < self.velocity < 1:
-            raise InputError(
-                f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of the protraction velocity V_p"
-            )
+        choice("actions", self.actions, ("joints", "tips"))
+        if not 0 < number("velocity", self.velocity) < 1:
+            raise InputError(f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of V_p")
         check_controller_type(self.controller)
         check_ground(self.conditions)
         steps_within(self.duration, self.stride)
@@ -102,57 +102,45 @@ class Task:
 
     @property
     def command(self) -> float:
-        """Velocity to walk at [mm/s]."""
+        """Commanded velocity [mm/s]."""
         return self.velocity * self.conditions.vp
 
 
-def task_of(settings: Mapping[str, Any]) -> Task:
-    """A task by its settings' names.
-
-    Raises:
-        InputError: no such name, or a value that makes no sense.
-    """
-    valid = [one.name for one in fields(Task)]
-    if unknown := set(settings) - set(valid):
-        raise InputError(f"setting {min(unknown)!r:.80}; valid names: {', '.join(valid)}")
-    return Task(**settings)
-
-
 def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Least and greatest value of every observation, each in its shape, by the observations' names in their order."""
+    """Return the least and the greatest value of every observation, in its shape, by name and in order."""
     lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
     far, tall = -lengths.no_foot_margin, compiled.body.standing_height
     fastest = np.sqrt(2.0 * compiled.weight / compiled.body.mass * FASTEST * tall)
     size, legs = (compiled.joints,), (len(LEGS),)
     bounds = {
         "joint_angles": (ranges[:, 0] - BEYOND_RANGE, ranges[:, 1] + BEYOND_RANGE),
-        "joint_velocities": _alike(size, -FASTEST_TURN, FASTEST_TURN),
-        "orientation": _alike((4,), -1.0, 1.0),
-        "velocity": _alike((3,), -fastest, fastest),
-        "angular_velocity": _alike((3,), -FASTEST_TURN, FASTEST_TURN),
-        "clearance": _alike((1,), -lengths.shortest_leg, FASTEST * tall),
-        "tips": _alike((6, 3), -far, far),
-        "contact": _alike(legs, 0.0, 1.0),
-        "margin": _alike((1,), -far, far),
-        "command": _alike((1,), 0.0, lengths.fastest_swing),
-        "planned_stance": _alike(legs, 0.0, 1.0),
-        "planned_tips": _alike((6, 3), -far, far),
+        "joint_velocities": _uniform(size, -FASTEST_TURN, FASTEST_TURN),
+        "orientation": _uniform((4,), -1.0, 1.0),
+        "velocity": _uniform((3,), -fastest, fastest),
+        "angular_velocity": _uniform((3,), -FASTEST_TURN, FASTEST_TURN),
+        "clearance": _uniform((1,), -lengths.shortest_leg, FASTEST * tall),
+        "tips": _uniform((6, 3), -far, far),
+        "contact": _uniform(legs, 0.0, 1.0),
+        "margin": _uniform((1,), -far, far),
+        "command": _uniform((1,), 0.0, lengths.fastest_swing),
+        "planned_stance": _uniform(legs, 0.0, 1.0),
+        "planned_tips": _uniform((6, 3), -far, far),
     }
     if task.actions == "tips":
-        bounds["out_of_reach"] = _alike(legs, 0.0, float(task.substeps))
+        bounds["out_of_reach"] = _uniform(legs, 0.0, float(task.substeps))
     return bounds
 
 
 def action_names(compiled: CompiledBody, task: Task) -> tuple[str, ...]:
-    """What the numbers of an action are for."""
+    """Return the names of an action's numbers."""
     if task.actions == "joints":
         return compiled.body.joints
     return tuple(f"{leg}_{axis}" for leg in LEGS for axis in ("forward", "left", "up"))
 
 
 def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least, usual and greatest action, (number,): of the joints' targets [rad], where posture home is usual, or of the
-    tips' offsets [mm], where none are."""
+    """Return the least, the usual and the greatest action, (number,): joint targets [rad], of which the home posture is
+    usual, or offsets of the tips [mm], of which 0 is usual."""
     if task.actions == "joints":
         low, high = compiled.model.actuator_ctrlrange[compiled.columns.ctrl].T
         return low, compiled.home[compiled.columns.qpos], high
@@ -161,22 +149,22 @@ def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.nd
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Actions as numbers in their shape; whether they are within bounds is seen when they are carried out.
+    """Return actions as floats in their shape. Their bounds are checked when they are carried out.
 
     Raises:
-        InputError: something else.
+        InputError: the shape is another one.
     """
     if not (type(actions) is np.ndarray and actions.dtype is DOUBLE):
-        actions = numbers("action", actions)
+        actions = np.asarray(actions, dtype=float)
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
     return actions
 
 
-def drawn(rng: np.random.Generator, task: Task) -> np.ndarray:
-    """The next start of one insect, (1, leg) [mm]; those of `draw_starts` if the generator has the same seed."""
+def draw_start(rng: np.random.Generator, task: Task) -> np.ndarray:
+    """Draw the next start of one insect, (1, leg) [mm]; with the same seed as `draw_starts`, the same starts."""
     return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))
 
 
-def _alike(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+def _uniform(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
     return np.full(shape, low), np.full(shape, high)

@@ -1,52 +1,59 @@
-"""Insects that take actions, each in an episode of its own; the faces of this package only name what happens here.
+"""Insects that take actions, each in an episode of its own; every interface of this package is built on `Walkers`.
 
-Insects that begin together are one plan's starts.  A plan that reads nothing goes on by itself, so it is asked for many
-steps ahead; one that reads the legs is told of them before each step.  No insect knows of another, so what it does
-depends neither on how many there are nor on who began with it.
+Insects that begin together are the starts of one plan. A plan without sensory feedback is asked for many steps at once;
+a plan with sensory feedback receives the state of the legs before each step. An insect is independent of all others:
+its walk depends neither on their number nor on the insects that began with it.
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Union
 
+import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.compiled_passes import ROUNDING, judge, keep, order, scaled
-from hexmj.environments.observing import Observer, Places, Planned
-from hexmj.environments.single_body import Alone
+from hexmj.environments.observing import ROUNDING, Observer, Places, Planned, judge, keep, order, scaled
 from hexmj.environments.task import Task, action_bounds, action_names
 from hexmj.errors import InputError
-from hexmj.physics.backend import Diverged, MujocoBatch
+from hexmj.physics.backend import AFTER, STATE, Diverged, MujocoBatch, Rolled
+from hexmj.physics.callbacks import check_no_callbacks
 from hexmj.physics.divergence import walk_error
-from hexmj.physics.fine_steps import Shown
+from hexmj.physics.fine_steps import FineSteps, Shown, allowed_depth, strikes
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import check_made_for
 from hexmj.physics.sensing import Senses
 from hexmj.physics.settling import Settling
 
 AHEAD = 128
-"""Steps for which a plan that reads nothing is asked at once."""
+"""Steps planned at once without sensory feedback."""
 
 Take = Callable[[np.ndarray, np.ndarray], Shown]
-"""One step of some bodies, (n,), with these controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
+"""Takes one step of some bodies, (n,), with controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
 
-Bodies = Alone | MujocoBatch
-"""What insects are made of: they can be looked at, and put where they stand."""
+Bodies = Union["Alone", MujocoBatch]
+"""Engine of the insects, which shows their places and puts them into a state."""
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""The whole state before a step, with the time."""
+
+NEVER, ONCE = (np.full(mujoco.mjtWarning.mjNWARNING.value, count, np.int32).tobytes() for count in (0, 1))
+"""Counts of MuJoCo's warnings of each kind, as bytes, which are compared faster."""
 
 
 class Acted(NamedTuple):
-    """What a step has brought about, each (n,)."""
+    """The result of a step, each (n,)."""
 
     reward: np.ndarray
-    """0 for those that did not walk."""
+    """0 for insects that did not walk."""
     terminated: np.ndarray
-    """Whether it fell."""
+    """Whether the insect fell."""
     truncated: np.ndarray
-    """Whether its time or the ground is over."""
+    """Whether its time or the ground ended."""
 
 
 @dataclass(eq=False)
@@ -54,26 +61,26 @@ class Together:
     """Insects that began together, and their plan."""
 
     ids: np.ndarray
-    """(n,) those that still walk."""
+    """(n,) insects that still walk."""
     rows: np.ndarray
-    """(n,) which of the plan's starts they are."""
+    """(n,) their rows among the plan's starts."""
     plan: Plan
-    """Of all that began."""
+    """The plan of all that began."""
     targets: TipTargets
-    """Of all that began."""
-    model_variant: FeedbackPlan | None
-    """The same plan if it reads the legs."""
+    """The tip targets of all that began."""
+    feedback: FeedbackPlan | None
+    """The same plan if it has sensory feedback."""
     ahead: int = 0
-    """Steps that are planned and not yet walked."""
+    """Planned steps that are not walked yet."""
 
 
 class Walkers:
-    """Some insects, each in an episode of its own."""
+    """Insects, each in an episode of its own."""
 
     def __init__(
         self, task: Task, compiled: CompiledBody, bodies: Bodies, take: Take, count: int, threads: int | None
     ) -> None:
-        """As many insects as `count`, none of which has begun; `threads` settle them, one per core unless given."""
+        """Prepare `count` insects. `threads` settle them, by default one per core."""
         self._task, self._compiled, self._threads = task, compiled, threads
         self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
@@ -82,11 +89,11 @@ class Walkers:
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
-        """Whether steps may follow: all have begun, and no step or beginning has failed since."""
+        """Whether steps may follow: all have begun, and no step or reset has failed since."""
         self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
-        self._ahead = tips, stance, np.zeros(count, dtype=int)  # as planned, and the step of these that comes next
+        self._ahead = tips, stance, np.zeros(count, dtype=int)  # plans, and the index of the next step
         self._joints = np.empty((count, 6, compiled.joints // 6))
         self._planned = Planned(np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6)))
         low, self._usual, high = action_bounds(compiled, task)
@@ -96,17 +103,17 @@ class Walkers:
         self.look(bodies)
 
     def look(self, bodies: Bodies) -> None:
-        """See where the bodies are, in arrays that go on."""
+        """Refer to the arrays of these bodies, which change with each step."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
-        self._passed = tuple(self.places), tuple(self._planned)  # to compiled code, which takes these over faster
+        self._passed = tuple(self.places), tuple(self._planned)  # compiled code receives plain tuples faster
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
-        """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first time of all of them.
+        """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first call is for all insects.
 
         Raises:
-            SimulationError: a start that does not settle.
+            SimulationError: a start does not settle.
         """
-        task, self.begun = self._task, False  # until all is done
+        task, self.begun = self._task, False  # stays if a start does not settle
         settled = self._settling.at(starts, ids)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
         check_made_for(plan, task.conditions)
@@ -128,12 +135,14 @@ class Walkers:
         self._ids, self.begun = np.flatnonzero(self._walking), True
 
     def act(self, actions: np.ndarray) -> Acted:
-        """One step of all insects that walk, with an action of every insect, (insect, number): 0 is the usual action,
-        -1 the least and 1 the greatest.
+        """Take one step of all insects that walk.
+
+        Args:
+            actions: of every insect, (insect, number): 0 is the usual action, -1 the least and 1 the greatest.
 
         Raises:
-            InputError: actions out of bounds, no episode has begun, or a plan that makes no sense.
-            SimulationError: an insect that diverged.
+            InputError: an action is out of bounds, no episode has begun, or a plan is invalid.
+            SimulationError: the simulation of an insect diverged.
         """
         self.check_begun()
         ids = self._ids
@@ -144,21 +153,15 @@ class Walkers:
             raise self._beyond(actions, ids)
         try:
             return self.judge(self._carry_out(ids, self.control(wanted)))
-        except BaseException:  # how much of the step the others have done is not known
+        except BaseException:  # the other insects may have taken the step or not
             self._leave(ids)
             self.begun = False
             raise
 
     def check_begun(self) -> None:
-        """Refuse a step that nothing goes before.
-
-        Raises:
-            InputError: not all have begun, or the last step or beginning failed.
-        """
+        """Raise InputError unless all insects have begun and no step or reset has failed since."""
         if not self.begun:
-            raise InputError(
-                "a step before the first reset, or after a step or a reset that failed; expected a reset of all"
-            )
+            raise InputError("no episode has begun, or a step or a reset failed; reset all insects first")
 
     @property
     def over(self) -> bool:
@@ -166,8 +169,11 @@ class Walkers:
         return self.begun and len(self._ids) == 0
 
     def control(self, wanted: np.ndarray) -> np.ndarray:
-        """What those that walk, (n,), are told for a step, (n, substep, actuator), if their actions ask for this,
-        (n, number) [rad] or [mm]; a leg that cannot reach its tip keeps its angles."""
+        """Return the controls of the insects that walk for a step, (n, substep, actuator).
+
+        Args:
+            wanted: values of their actions, (n, number) [rad] or [mm].
+        """
         self._plan_ahead()
         ids, offset, substeps = self._ids, self._task.actions == "tips", self._substeps
         tips = order(wanted, ids, self._ahead, self._passed[1], offset)
@@ -183,11 +189,11 @@ class Walkers:
         return control
 
     def judge(self, shown: Shown) -> Acted:
-        """What a step has brought about that those that walk have shown, (n, substep, ...)."""
+        """Return the result of a step, from its sensors and forces, (n, substep, ...)."""
         ids, acted, sensors = self._ids, self._nothing(), shown["sensors"]
         self._senses.feel(ids, sensors, shown["force"])
-        time, said = (self._done, self._steps), tuple(acted)
-        any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, said)
+        time, result = (self._done, self._steps), tuple(acted)
+        any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, result)
         if self._ends:
             feet, conditions = self.places.sensors[ids, self._compiled.columns.foot], self._task.conditions
             beyond = beyond_the_ground(conditions, feet.reshape(-1, 6, 3)).any(axis=1)
@@ -198,12 +204,12 @@ class Walkers:
         return acted
 
     def observations(self) -> np.ndarray:
-        """Everything observed of all insects, (insect, number); `observer.named` says what it is."""
+        """Return the observations of all insects, (insect, number); `observer.named` names them."""
         places, planned = self._passed
         return self.observer.observe(places, self._senses.standing(), planned)
 
     def _leave(self, ids: np.ndarray) -> None:
-        """The episodes of some insects are over."""
+        """End the episodes of some insects."""
         if len(ids) == 0:
             return
         self._walking[ids] = False
@@ -215,7 +221,7 @@ class Walkers:
                 self._together.remove(group)
 
     def _plan_ahead(self) -> None:
-        """Plan the next steps of those that have none left."""
+        """Plan the next steps of the groups that have none left."""
         for group in self._together:
             if group.ahead == 0:
                 self._plan(group)
@@ -223,9 +229,9 @@ class Walkers:
 
     def _plan(self, group: Together) -> None:
         ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
-        if group.model_variant:
-            here = self.places.qpos[ids], self.places.qvel[ids]
-            tell(group.model_variant, replace(self._senses.sensed(ids, *here), ids=rows.copy()))
+        if group.feedback:
+            state = self.places.qpos[ids], self.places.qvel[ids]
+            tell(group.feedback, replace(self._senses.sensed(ids, *state), ids=rows.copy()))
             steps = 1
         walk = advanced(group.plan, steps)
         tips = group.targets.follow(walk, rows)
@@ -235,11 +241,11 @@ class Walkers:
         at[ids], group.ahead = 0, steps
 
     def _nothing(self) -> Acted:
-        """What a step has brought about before anybody is judged."""
+        """Return an empty result."""
         return Acted(np.zeros(self._count), *np.zeros((2, self._count), dtype=bool))
 
     def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """One step of some insects."""
+        """Take one step of some insects."""
         try:
             return self._take(ids, control)
         except Diverged as error:
@@ -247,7 +253,94 @@ class Walkers:
             raise walk_error(error, "acting", time, conditions) from None
 
     def _beyond(self, actions: np.ndarray, ids: np.ndarray) -> InputError:
-        """What is wrong with some insects' actions."""
+        """Return the error for an action out of bounds."""
         row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
         name = action_names(self._compiled, self._task)[i]
         return InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
+
+
+class Alone:
+    """An `Engine` of one body, bit for bit as `physics.backend.MujocoBatch`; every `ids` is [0].
+
+    Between two steps, the first half of the next step is done already, so that places are current.
+    """
+
+    def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Wrap a model and its data, which may be read and changed from outside."""
+        self.model, self.data, self._compiled, self._allowed = model, data, compiled, allowed_depth(compiled)
+        self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
+        self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
+        self.sensors = data.sensordata[np.newaxis]
+        self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
+        self._foot = compiled.columns.foot
+        self._warned, self._begun = data.warning.number, np.empty((1, mujoco.mj_stateSize(model, _STATE)))
+
+    def put(self, ids: np.ndarray, states: np.ndarray) -> None:
+        """Put the body into a state, see `backend.Engine.put`."""
+        mujoco.mj_setState(self.model, self.data, states[0], _STATE)
+        mujoco.mj_step1(self.model, self.data)
+
+    def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
+        """Put the body into a state at rest, (1, state), with its controls, (1, actuator)."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, states[0], AFTER)
+        self._control[:] = control[0]
+        mujoco.mj_step1(self.model, self.data)
+
+    def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
+        """Take one step of the plan; if a foot strikes the ground, by `fine_steps.FineSteps.take`."""
+        check_no_callbacks()
+        substeps = control.shape[1]
+        mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
+        feet, sensors, force = self._roll(control[0], self.model)
+        if np.count_nonzero(strikes(self._compiled.depth(feet), substeps, self._allowed)):
+            self.put(ids, self._begun)
+            return FineSteps.of(self, substeps, self._compiled).take(ids, control)
+        return {"sensors": sensors, "force": force}
+
+    def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
+        """Take substeps, see `backend.Engine.roll`; neither torques nor states are stored."""
+        before = np.empty_like(self._begun)
+        mujoco.mj_getState(self.model, self.data, before[0], _STATE)
+        if parts == 1:
+            seen = self._roll(control[0], self.model)
+        else:
+            fine = copy(self.model)  # another thread may step with the model
+            fine.opt.timestep = self.model.opt.timestep / parts
+            fine.pair_solref[:, 0] = 2 * fine.opt.timestep
+            mujoco.mj_step1(fine, self.data)
+            seen = self._roll(control[0], fine)
+            mujoco.mj_step1(self.model, self.data)
+        nothing = np.empty((1, control.shape[1], 0))
+        return Rolled(before, *seen, torque=nothing, after=nothing)
+
+    def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Take one step for each row of the controls, (step, actuator); return feet, sensors, force as in `Rolled`."""
+        count, data, now, pulled, warned = len(control), self.data, self._sensors, self._force, self._warned
+        sensors, force = np.empty((1, count + 1, len(now))), np.empty((1, count, len(pulled)))
+        try:
+            if warned.tobytes() == NEVER:
+                warned.fill(1)  # MuJoCo prints only the first warning of a kind
+            for k in range(count):
+                self._control[:] = control[k]
+                (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
+                sensors[0, k], force[0, k] = now, pulled  # places at the beginning of the step
+            mujoco.mj_step1(model, data)
+        finally:
+            if well := warned.tobytes() == ONCE:
+                warned.fill(0)
+            else:
+                warned -= warned.min()  # 0 where MuJoCo has reset a body that diverged
+        sensors[0, count] = now
+        if not well:  # the next step sees a state that is not finite
+            raise self._diverged(control, model)
+        return sensors[:, :, self._foot].reshape(1, count + 1, 6, 3), sensors[:, :count], force
+
+    def _diverged(self, control: np.ndarray, model: mujoco.MjModel) -> Diverged:
+        """Return the error, with the state before and the controls since, (step, actuator)."""
+        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
+        before = mujoco.MjData(model)
+        mujoco.mj_setState(model, before, self._begun[0], _STATE)
+        state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
+        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
+        return Diverged(0, ", ".join(kinds) or "a state that is not finite", state | now)
