@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from hexmj.replay.recording import record_plan as record_plan
     from hexmj.replay.recording import save_recording as save_recording
     from hexmj.search.forms import FieldsForm as FieldsForm
-    from hexmj.search.network_forms import NetworkForm as NetworkForm
+    from hexmj.search.forms import NetworkForm as NetworkForm
     from hexmj.search.problems import Problem as Problem
     from hexmj.search.stages import Effort as Effort
     from hexmj.stability import loss_time as loss_time
@@ -79,8 +79,7 @@ _MODULES = {
     "replay.film.video": ("render",),
     "replay.page.page": ("page",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
-    "search.forms": ("FieldsForm",),
-    "search.network_forms": ("NetworkForm",),
+    "search.forms": ("FieldsForm", "NetworkForm"),
     "search.problems": ("Problem",),
     "search.stages": ("Effort",),
     "stability": ("loss_time", "stability_margin", "support_polygon", "walk_margin"),

@@ -116,7 +116,7 @@ def converged(seed: int) -> Arrays:
 
 
 def searched(seed: int) -> Arrays:
-    from hexmj.search.network_forms import NetworkForm
+    from hexmj.search.forms import NetworkForm
     from hexmj.search.stages import search
 
     out: dict[str, Any] = {}

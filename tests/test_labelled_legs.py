@@ -15,8 +15,8 @@ from scipy import sparse
 import hexmj
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.legs import FIG1, LEGS, MIRROR
-from hexmj.search.network_forms import FORMS
-from hexmj.search.samples import Sample
+from hexmj.search.forms import FORMS
+from hexmj.search.problems import Sample
 from hexmj.walks import PlannedWalk
 
 FEET = np.column_stack([FIG1.origin, FIG1.y])

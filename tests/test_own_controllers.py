@@ -24,8 +24,13 @@ from hexmj.physics.drive import drive
 from hexmj.physics.settling import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
-from hexmj.search.samples import Sample
+<<<<<<< HEAD
+from hexmj.search.problems import Sample
 from hexmj.studies.entrants import entrants
+=======
+from hexmj.search.problems import Sample
+from hexmj.studies.league.entrants_by_name import entrants
+>>>>>>> a504e1a (Join the search into five modules; move its command's logic there)
 from hexmj.walks import PlannedWalk
 from tiers import few_of
 

@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 
 import hexmj
 from hexmj.errors import InputError
+<<<<<<< HEAD
 from hexmj.plotting import FIGURES
-from hexmj.search.history import history
+from hexmj.search.stages import history
 from hexmj.studies.ablation import Ablation
 from hexmj.studies.biology import Biology, biology_markdown
 from hexmj.studies.disturbance import DisturbedWalks
@@ -25,6 +26,22 @@ from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.standings import league_markdown
 from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain
+=======
+from hexmj.plots import FIGURES
+from hexmj.search.stages import history
+from hexmj.studies.ablation.study import Ablation
+from hexmj.studies.biology.study import Biology
+from hexmj.studies.biology.table import biology_markdown
+from hexmj.studies.disturbance.cases import NO_DISTURBANCE
+from hexmj.studies.disturbance.study import DisturbedWalks
+from hexmj.studies.league.entrants_by_name import entrants
+from hexmj.studies.league.study import League
+from hexmj.studies.league.table import league_markdown
+from hexmj.studies.stability_map.study import StabilityMap
+from hexmj.studies.static_limit.study import StaticLimit
+from hexmj.studies.terrain.study import Terrain
+from hexmj.studies.variants.study import Variants
+>>>>>>> a504e1a (Join the search into five modules; move its command's logic there)
 from hexmj.sweep import run_study
 from tiers import few_of
 

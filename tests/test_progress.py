@@ -13,7 +13,12 @@ import hexmj
 from hexmj import progress
 from hexmj.errors import InputError
 from hexmj.measures import kinematic
-from hexmj.search.network_forms import NetworkForm
+<<<<<<< HEAD
+from hexmj.search.forms import NetworkForm
+=======
+from hexmj import progress
+from hexmj.search.forms import NetworkForm
+>>>>>>> a504e1a (Join the search into five modules; move its command's logic there)
 from hexmj.search.stages import search
 from hexmj.view import live
 from tiers import few_of

@@ -10,7 +10,7 @@ import pytest
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.errors import InputError
-from hexmj.search.samples import Sample
+from hexmj.search.problems import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
 from tiers import few_of

@@ -10,9 +10,9 @@ import pytest
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.controllers import Step, stepwise
-from hexmj.search.convergence import convergence_figure
-from hexmj.search.network_forms import FORMS
-from hexmj.search.samples import Sample
+from hexmj.search.results import convergence_figure
+from hexmj.search.forms import FORMS
+from hexmj.search.problems import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
 

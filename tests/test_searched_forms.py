@@ -14,8 +14,8 @@ from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.controllers import Step, stepwise
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import MIRROR
-from hexmj.search.network_forms import FORMS
-from hexmj.search.samples import Sample
+from hexmj.search.forms import FORMS
+from hexmj.search.problems import Sample
 from hexmj.search.stages import Effort, search
 from pace import Pace
 

@@ -1,1 +1,1 @@
-"""Minimisation of the cost function (paper, Section 4)."""
+"""Search for parameters that minimise the cost function (paper, Section 4)."""

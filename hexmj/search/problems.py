@@ -1,34 +1,43 @@
 """What is minimised (paper, Section 3): Problem 1, a fixed velocity, and Problem 2, velocities drawn from a range."""
 
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from typing import Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hexmj.checks import check_types, numbers, typed
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError
+from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
+from hexmj.measures.kinematic import first_loss
 from hexmj.plain import plain
-from hexmj.search.domain import Domain
-from hexmj.search.forms import Form
-from hexmj.search.network_forms import NetworkForm
-from hexmj.starts import checked_velocities
+from hexmj.progress import Progress, part_of
+from hexmj.search.algorithms import Domain
+from hexmj.search.forms import Form, NetworkForm
+from hexmj.starts import checked_velocities, draw_starts
+from hexmj.stats import wilson_intervals
+from hexmj.threads import thread_count
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, check_in_time, observation_duration, steps_within
+from hexmj.validate import choice, number, numbers
 from hexmj.variants import variants, varied
 
-FARTHEST = 1e6
-"""Greatest reach of a first population."""
+if TYPE_CHECKING:
+    import xarray as xr
 
-MOST = 1e30
-"""Greatest magnitude of a parameter with which a search begins."""
+    from hexmj.physics.settling import Settled
+
+LARGEST = 1e30
+"""Greatest magnitude of a parameter in the first population."""
+
+REFUSED = 1.0
+"""Cost of a candidate that its controller refuses, whose targets no leg reaches, or of which a simulation fails: as if
+every start lost stability."""
 
 Over = Literal["usual", "mean", "worst"]
-"""What is minimised: the FLSS as given, or the mean or the greatest FLSS over all variants."""
-
 Ties = Literal["equal", "later"]
-"""Of candidates that lose equally many starts none is better, or that which loses them later."""
 
 
 @dataclass(frozen=True)
@@ -38,47 +47,47 @@ class Problem:
     form: Form
     """Which parameters are free."""
     low: float
-    """Least velocity of the range W, a fraction of V_p; Problem 1 where it is also the greatest."""
+    """Least velocity of the range W, a fraction of V_p; Problem 1 if it is also the greatest."""
     high: float
     """Greatest velocity of the range W, a fraction of V_p."""
     observation_time: str | float = "walk"
-    """'walk', 'start' or the observation time itself [time units]."""
+    """'walk', 'start' or a number of time units."""
     stride: Stride = field(default_factory=Stride)
     """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11."""
     conditions: Conditions | None = None
-    """Of physical walks, where the physical FLSS is minimised; without it the kinematic one."""
+    """Conditions of physical walks, whose falls are minimised; None minimises losses of kinematic stability."""
     feedback: bool = False
-    """Candidates read the legs, see `SensoryFeedback`, in physical walks."""
+    """Candidates use sensory feedback, in physical walks."""
     over: Over = "usual"
-    """Constants and rules under which a candidate walks, each time from the same starts."""
+    """Minimise the FLSS as given (usual), or its mean or worst over variants of constants and rules that the paper does
+    not print (in physical walks without AEP0 11). A variant that the problem has anyway gets the default instead."""
     ties: Ties = "equal"
-    """What counts among candidates of the same FLSS; 'later' shows a way where all starts lose stability."""
+    """If two candidates lose equally many starts, they cost the same (equal), or later losses cost less (later), which
+    shows a way if all starts lose stability."""
 
     def __post_init__(self) -> None:
-        check_types(self)
-        if not (is_dataclass(self.form) and not isinstance(self.form, type) and isinstance(self.form, Form)):
+        if not (is_dataclass(self.form) and isinstance(self.form, Form)):
             raise InputError(f"form = {self.form!r:.80}; expected a frozen dataclass such as NetworkForm or FieldsForm")
-        if not 0 <= self.low <= self.high < 1:
+        choice("over", self.over, ("usual", "mean", "worst"))
+        choice("ties", self.ties, ("equal", "later"))
+        if not 0 <= number("low", self.low) <= number("high", self.high) < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         if self.feedback and not self.conditions:
-            raise InputError("feedback without conditions; expected it with physical walks only")
+            raise InputError("feedback = True needs physical walks; the problem has no conditions")
         if self.conditions:
             check_ground(self.conditions)
         if self.over != "usual" and not isinstance(self.form, NetworkForm):
-            raise InputError(
-                f"over = {self.over!r} with {self.form!r:.80}; expected it with the 1998 network, whose rules vary"
-            )
+            raise InputError(f"over = {self.over!r} needs a form of the 1998 network")
         ends = checked_velocities([self.low, self.high], 2, self.acceleration)
         duration = observation_duration(self.observation_time, ends, self.stride, self.acceleration)
         check_in_time(ends, duration, self.acceleration)
         steps_within(duration, self.stride)
-        _ = self.variants
 
     @property
     def variants(self) -> "dict[str, Problem]":
-        """The problems over whose FLSS the mean or the greatest is taken, by the names of the variants."""
+        """The problems over which the mean or the greatest FLSS is taken, by the names of the variants."""
         if self.over == "usual":
             return {"usual": self}
         return {
@@ -88,58 +97,203 @@ class Problem:
 
     @property
     def observation_times(self) -> list[str | float]:
-        """The observation time of the cost, and the named ones beside it."""
+        """The observation time of the cost, and the named ones."""
         named = [name for name in OBSERVATION_TIMES if self.low > 0 or name != "walk"]
         return list(dict.fromkeys([self.observation_time, *named]))
 
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
-        """Where a search begins, see `Form.box`; at `begin`, if one is given."""
-        if not 0 < typed("domain", reach, float) <= FARTHEST:
-            raise InputError(f"domain = {reach}; expected above 0 and at most {FARTHEST:g}")
-        form, size = self.form, len(self.form.names)
-        box = numbers("box of the form", form.box(reach))
-        where = form.begin if begin is None else form.vector(begin)
-        where = None if where is None else numbers("begin of the form", where)
-        if box.shape != (2, size):
-            raise InputError(f"the form's box is {box}; expected a least and a greatest value of its {size} parameters")
-        if (odd := np.flatnonzero(~((np.abs(box) <= MOST).all(axis=0) & (box[0] < box[1])))).size:
-            told = f"the form's box of {form.names[odd[0]]} is {box[0, odd[0]]:g} to {box[1, odd[0]]:g}"
-            raise InputError(f"{told}; expected a least and a greatest value, each within {MOST:g} of 0")
-        if where is not None and (where.shape != (size,) or not (np.abs(where) <= MOST).all()):
-            raise InputError(f"a search begins at {where}; expected {size} finite numbers")
-        typed("binary of the form", form.binary, np.ndarray)
-        if form.binary.shape != (size,) or form.binary.dtype != bool:
-            raise InputError(f"the form's binary = {form.binary!r:.80}; expected True or False for {size} parameters")
-        unit = np.abs(numbers("box of the form", form.box(1.0))).max(axis=0)
-        return Domain(box[0], box[1], form.binary, where, unit)
+        """Return the box of the first population, see `Form.box`, with the vector of `begin` if that is given."""
+        if number("domain", reach, 0.0, 1e6) == 0.0:
+            raise InputError("domain = 0; expected a positive number")
+        low, high = (numbers("box of the form", end) for end in self.form.box(reach))
+        if not ((np.abs(low) <= LARGEST) & (np.abs(high) <= LARGEST) & (low < high)).all():
+            raise InputError(f"box of the form = {low}, {high}; expected finite numbers, the least ones first")
+        unit = np.abs(self.form.box(1.0)).max(axis=0)
+        return Domain(low, high, self.form.binary, self.form.begin if begin is None else self.form.vector(begin), unit)
 
     def controller(self, vector: np.ndarray) -> Controller:
-        """A candidate, from (parameter,)."""
-        planning = self.form.controller(vector)
-        return SensoryFeedback(planning) if self.feedback else planning
-
-    @property
-    def minimised(self) -> str:
-        """What a cost is, in words: a frequency only where ties are none."""
-        if self.ties == "equal":
-            cost = "FLSS"
-        else:
-            cost = f"(starts {'that fell' if self.conditions else 'lost'} + mean part of the time lost) / (starts + 1)"
-        return {"usual": cost, "mean": f"mean over variants of {cost}", "worst": f"greatest {cost} of all variants"}[
-            self.over
-        ]
+        """Return the controller of a candidate, (parameter,)."""
+        controller = self.form.controller(vector)
+        return SensoryFeedback(controller) if self.feedback else controller
 
     def refusal(self, vector: np.ndarray) -> str:
-        """Why its controller refuses a candidate, (parameter,); nothing where it does not."""
+        """Return why no controller can be made of a candidate, (parameter,); an empty text if one can."""
         try:
             self.controller(vector)
-        except (InputError, ValueError) as error:
+        except ValueError as error:
             return f"{type(error).__name__}: {error}"
         return ""
 
+    @property
+    def minimised(self) -> str:
+        """The cost in words."""
+        cost = "FLSS"
+        if self.ties == "later":
+            cost = f"(starts {'that fell' if self.conditions else 'lost'} + mean part of the time lost) / (starts + 1)"
+        names = {"usual": cost, "mean": f"mean over variants of {cost}", "worst": f"greatest {cost} of all variants"}
+        return names[self.over]
+
     def settings(self) -> dict[str, Any]:
-        """The problem as plain data."""
+        """Return the problem as plain data."""
         names = "form", "low", "high", "observation_time", "feedback", "over", "ties"
-        told = {name: plain(getattr(self, name)) for name in names}
-        told |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
-        return told | {"conditions": self.conditions and self.conditions.settings()}
+        own = {name: plain(getattr(self, name)) for name in names}
+        own |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
+        return own | {"conditions": self.conditions and self.conditions.settings()}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The starts on which all candidates are judged: the first of a seed, as `flss` and `flss_over_range` draw them."""
+
+    problem: Problem
+    n_starts: int
+    seed: int
+
+    @cached_property
+    def variants(self) -> "dict[str, Sample]":
+        """The same starts for each of the problem's variants, by name."""
+        several = self.problem.over != "usual"
+        return {name: replace(self, problem=one) if several else self for name, one in self.problem.variants.items()}
+
+    @cached_property
+    def starts(self) -> np.ndarray:
+        """(start, leg) tips at time 0 [mm]."""
+        return draw_starts(self.n_starts, self.seed, self.problem.stride)
+
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """(start,) V_r of each start, a fraction of V_p."""
+        return np.random.default_rng([self.seed, 1]).uniform(self.problem.low, self.problem.high, self.n_starts)
+
+    @cached_property
+    def _settled(self) -> "list[Settled]":
+        return []
+
+    def settle(self, threads: int | None = None) -> None:
+        """Let the starts of all variants come to rest if candidates walk physically.
+
+        Raises:
+            InputError, SimulationError: a start does not, see `physics.settling.settle`.
+        """
+        from hexmj.physics.settling import settle
+
+        for one in self.variants.values():
+            if one.problem.conditions and not one._settled:
+                one._settled.append(settle(one.starts, one.problem.conditions, one.problem.stride, threads))
+
+    def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
+        """Return G of each candidate, (candidate,), from (candidate, parameter)."""
+        self.settle(threads)
+        return self._combined([one._costs(vectors, threads) for one in self.variants.values()])
+
+    def _combined(self, values: Any) -> np.ndarray:
+        """Combine values of all variants, (variant, ...), into the one that is minimised, (...)."""
+        return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
+
+    def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
+        """Return G of each candidate, (candidate,), of this variant."""
+
+        def cost(vector: np.ndarray, threads: int | None) -> float:
+            try:
+                candidate = self.problem.controller(vector)
+            except ValueError:
+                return REFUSED
+            try:
+                return self._cost(candidate, threads)
+            except (OutOfReach, Refused, SimulationError):
+                return REFUSED
+
+        # Plans of other controllers may share arrays of their module, and hold the interpreter's lock anyway.
+        if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
+            return np.array([cost(vector, threads) for vector in vectors])
+        with ThreadPoolExecutor(thread_count(threads)) as pool:
+            return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
+
+    def _cost(self, candidate: Controller, threads: int | None) -> float:
+        """Return FLSS; if ties are broken, the mean part of the time lost counts as one more start."""
+        times, (ends,) = self._times(candidate, [self.problem.observation_time], threads)
+        lost = (times <= ends).sum().item()
+        if self.problem.ties == "equal":
+            return lost / self.n_starts
+        return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
+
+    def lost(self, cost: float) -> int | None:
+        """Return how many starts were lost, or fell, at a cost; None for a mean over variants."""
+        if self.problem.over == "mean":
+            return None
+        if self.problem.ties == "equal":
+            return round(cost * self.n_starts)
+        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
+
+    def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
+        """Raise the error of a candidate, (parameter,), that does not walk.
+
+        Raises:
+            InputError: its controller refuses to walk, or no leg reaches its targets.
+            SimulationError: a start's simulation fails.
+        """
+        for one in self.variants.values():
+            try:
+                one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
+            except (InputError, SimulationError) as error:
+                error.add_note("as the best candidate of the search")
+                raise
+
+    def verdict(
+        self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
+    ) -> "xr.Dataset":
+        """Return FLSS of controllers over (controller, observation time) with its 95 % Wilson interval.
+
+        The interval of a mean over variants is that of the rounded mean count. It is rather too wide: as if all
+        variants lost stability together.
+
+        Raises:
+            InputError: a controller does not walk.
+        """
+        import xarray as xr
+
+        self.settle(threads)
+        observation_times = self.problem.observation_times
+        advance = part_of(progress, 1.0 / len(controllers) / len(self.variants))
+
+        def losses(variant: str, controller: Controller) -> np.ndarray:
+            """Return the number of starts lost within each observation time, (observation time,)."""
+            times, ends = self.variants[variant]._times(varied(controller, variant), observation_times, threads)
+            if advance:
+                advance(1.0)
+            return (times <= ends).sum(axis=1)
+
+        lost = self._combined(
+            [[losses(one, controller) for controller in controllers.values()] for one in self.variants]
+        )
+        low, high = wilson_intervals(np.rint(lost), self.n_starts)
+        over, unit = ("controller", "observation_time"), {"units": "1"}
+        return xr.Dataset(
+            {
+                "flss": (over, lost / self.n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
+                "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
+                "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
+            },
+            coords={"controller": list(controllers), "observation_time": list(map(str, observation_times))},
+        )
+
+    def _times(
+        self, controller: Controller, observation_times: list[str | float], threads: int | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return when each start loses stability, or falls, and the ends of its observation times [time units].
+
+        Returns:
+            (start,) and (observation time, start). An end is a millionth of a step late, so that the last step counts.
+        """
+        p, dt = self.problem, self.problem.stride.dt
+        times = [observation_duration(time, self.velocity, p.stride, p.acceleration) for time in observation_times]
+        ends = np.array([steps_within(time, p.stride) for time in times]) * dt
+        longest, how = ends.max(axis=0), {"acceleration": p.acceleration, "threads": threads}
+        if p.conditions:
+            from hexmj.measures.physical import physical_outcomes
+
+            (settled,) = self._settled
+            lost = physical_outcomes(settled, controller, self.velocity, float(longest.max()), **how).fall
+        else:
+            lost = first_loss(self.starts, controller, self.velocity, longest, stride=p.stride, **how)
+        return lost, ends + 1e-6 * dt

@@ -1,0 +1,220 @@
+"""A search with a verdict on fresh starts, and its files: found.toml, the history and its figure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hexmj.controllers.cruse1998 import HWS, LDVS
+from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.named import parameter_file
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.searched import searched_on
+from hexmj.errors import InputError
+from hexmj.files import read_toml, write_text
+from hexmj.io import results_folder, save, save_figure
+from hexmj.plain import plain
+from hexmj.progress import shown
+from hexmj.search.forms import FORMS, NetworkForm
+from hexmj.search.problems import Problem, Sample
+from hexmj.search.stages import STAGES, Effort, Found, search
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.pictures import Picture
+
+FOUND = "found.toml"
+
+EVALUATIONS = "evaluations"
+"""Directory of the cached evaluations, beside the results."""
+
+COLOURS = dict(zip(STAGES, ("#1b6ca8", "#b3261e"), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a search found, and how it compares on fresh starts."""
+
+    problem: Problem
+    effort: Effort
+    found: Found
+    vectors: dict[str, np.ndarray]
+    """Parameters, (parameter,), of the found controller and of those with which it is compared, by name."""
+    verdict: "xr.Dataset"
+    """FLSS with its 95 % interval on fresh starts, over the same controllers and the observation times."""
+    files: list[Path]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Problem and effort as plain data."""
+        effort = plain(self.effort)
+        fresh = {name: effort.pop(name) for name in ("verdict_starts", "verdict_seed")}
+        return {"problem": self.problem.settings(), "effort": effort} | fresh
+
+    def summary(self) -> dict[str, Any]:
+        """Return parameters, cost, verdict and settings as plain data."""
+        found = self.found
+        times, names = self.verdict.observation_time.values.tolist(), self.verdict.controller.values.tolist()
+        at = {
+            name: {time: self.verdict.sel(controller=name, observation_time=time) for time in times} for name in names
+        }
+        return {
+            "found": dict(zip(self.problem.form.names, found.vector.tolist(), strict=True)),
+            "cost": found.cost,
+            "evaluations": found.history.sizes["evaluation"],
+            "replayed": found.replayed,
+            "minimised": self.problem.minimised,
+            "lost": found.lost,
+            "starts": found.starts,
+            "refused": len(found.refused),
+            "verdict": {
+                name: {time: {str(key): values.item() for key, values in one.items()} for time, one in row.items()}
+                for name, row in at.items()
+            },
+            "settings": self.settings,
+            "files": self.files,
+        }
+
+
+def run_search(
+    problem: Problem,
+    effort: Effort,
+    out: Path | str,
+    *,
+    threads: int | None = None,
+    progress: bool = False,
+    fresh: bool = False,
+    figure: str = "convergence.png",
+) -> Result:
+    """Search, judge what was found on fresh starts, and write it.
+
+    The found controller is compared with HWS and LDVS, or with the usual values of the controller that is searched.
+
+    Args:
+        problem: the cost function, of a `NetworkForm` or a `FieldsForm`.
+        effort: algorithm, budgets and starts.
+        out: directory for the found controller (TOML), the history (NetCDF), its figure and the cached evaluations. If
+            a search is killed, the next one with the same settings resumes with equal results.
+        threads: one per core by default; the result does not depend on them.
+        progress: show bars.
+        fresh: discard cached evaluations.
+        figure: name of the figure's file.
+
+    Raises:
+        InputError: settings that make no sense, verdict starts on which a search was made, or a controller that does
+            not walk.
+        SimulationError: a simulation fails.
+    """
+    effort = effort.completed(physical=problem.conditions is not None)
+    earlier = _earlier_seeds(problem, effort)
+    if effort.verdict_seed in {effort.seed, *earlier}:
+        raise InputError(
+            f"verdict_seed = {effort.verdict_seed} is the seed of this search or of the one that found its beginning;"
+            " expected another, for fresh starts"
+        )
+    begins = [name for name in (effort.begin, problem.form.name) if isinstance(name, str)]  # pyright: ignore
+    if (Path(out) / FOUND).resolve() in [Path(name).resolve() for name in begins]:
+        raise InputError(f"out = {out}: the search begins with {FOUND} there; expected another directory")
+    problem.domain(effort.domain, effort.beginning)  # raises before a directory is made
+    controllers, vectors = _compared(problem)
+    judges = Sample(problem, effort.verdict_starts or 0, effort.verdict_seed)
+    out = results_folder(out)
+    judges.settle(threads)  # before the work, if a start does not
+    found = search(problem, effort, folder=out / EVALUATIONS, threads=threads, progress=progress, fresh=fresh)
+    history = found.history.assign_attrs(title=title(problem, effort))
+    seeds = sorted({*earlier, effort.seed})
+    head = f"# hexmj search: {title(problem, effort)}\nsearched = {{ seeds = {seeds} }}\n"
+    files = [
+        save(history, out / "history.nc"),
+        write_text(out / FOUND, head + _controller_toml(problem, found.vector)),
+        _save_figure(history, out / figure),
+    ]
+    with shown(progress, "judging") as advance:
+        verdict = judges.verdict({"found": problem.controller(found.vector), **controllers}, threads, advance)
+    return Result(problem, effort, found, {"found": found.vector} | vectors, verdict, files)
+
+
+def title(problem: Problem, effort: Effort) -> str:
+    """Return form, cost, velocities and algorithm of a search in words."""
+    at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
+    at += f", {problem.over} of all variants" if problem.over != "usual" else ""
+    at += ", later losses first among equals" if problem.ties == "later" else ""
+    kind, form = "physical" if problem.conditions else "kinematic", getattr(problem.form, "name", "form")
+    method = f"observation time {problem.observation_time}, {effort.algorithm}, seed {effort.seed}"
+    return f"{form}, {kind} FLSS at {at}, {method}"
+
+
+def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
+    """Return the seeds of the searches that found what this search begins with."""
+    begins: list[tuple[str, Controller]] = []
+    if not isinstance(problem.form, NetworkForm):
+        begins.append((problem.form.name, problem.form.usual))  # pyright: ignore[reportAttributeAccessIssue]
+    if (begin := effort.beginning) is not None:
+        begins.append((effort.begin if isinstance(effort.begin, str) else begin.name, begin))
+    return {seed for begin in begins for seeds in searched_on(*begin).values() for seed in seeds}
+
+
+def _compared(problem: Problem) -> tuple[Mapping[str, Controller], dict[str, np.ndarray]]:
+    """Return the controllers with which the found one is compared, by name, and their parameters, (parameter,)."""
+    form: Any = problem.form
+    if isinstance(form, NetworkForm):
+        sets = {"hws": HWS, "ldvs": LDVS}
+        vectors = {name: FORMS[form.name].vector(one.weights) for name, one in sets.items()}
+        rules: dict[str, Any] = {"order": form.order, "model_variant": form.model_variant}
+        controllers = {name: replace(one, **rules) for name, one in sets.items()}
+    else:
+        controllers, vectors = {"usual": form.usual}, {"usual": form.begin}
+    if problem.feedback:
+        controllers = {name: SensoryFeedback(one) for name, one in controllers.items()}
+    return controllers, vectors
+
+
+def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
+    """Return the text that `load_controller` reads to the same bits: weights, or a controller and its fields."""
+    import tomli_w
+
+    form: Any = problem.form
+    if isinstance(form, NetworkForm):
+        return network_toml(form.controller(vector))
+    file = parameter_file(form.name)
+    table = read_toml(file) if file else {"controller": form.name, "fields": {}}
+    values = table.get("fields", {}) | dict(zip(form.names, vector.tolist(), strict=True))
+    return tomli_w.dumps({"controller": table["controller"], "fields": values})
+
+
+def _save_figure(history: "xr.Dataset", path: Path) -> Path:
+    from hexmj.pictures import as_shipped
+
+    with as_shipped():
+        return save_figure(convergence_figure(history), path)
+
+
+def convergence_figure(history: "xr.Dataset") -> "Picture":
+    """Draw all candidates' costs and the least so far against the number of evaluations, from `stages.history`."""
+    from hexmj.measures.figures import tidy
+    from hexmj.pictures import head, in_figure, picture
+
+    figure = picture(6.8, 4.2)
+    axes = figure.subplots()
+    history = history.sortby("evaluation")
+    evaluation = history.evaluation.values + 1
+    for number, (stage, colour) in enumerate(COLOURS.items()):
+        of_stage = history.stage.values == number
+        if of_stage.any():
+            x, cost, best = evaluation[of_stage], history.cost.values[of_stage], history.best.values[of_stage]
+            axes.plot(x, cost, ".", color=colour, markersize=2.5, alpha=0.35)
+            marker = "o" if len(x) == 1 else None  # a line needs two points
+            axes.plot(x, best, color=colour, linewidth=1.8, marker=marker, label=stage)
+    cost = history.cost.attrs["long_name"]
+    plain_cost = cost == "FLSS"
+    label = f"{cost if plain_cost else 'cost'} on the starts of the stage"
+    axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
+    head(figure, in_figure(history.attrs["title"]))
+    tidy(axes)
+    below = "lines: least so far, dots: candidates" + ("" if plain_cost else f"\ncost: {cost}")
+    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=below, title_fontsize=8)
+    return figure
