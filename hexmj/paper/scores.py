@@ -17,7 +17,7 @@ from hexmj.paper.protocol import MEASUREMENTS, Gaits, Losses, Protocol
 from hexmj.paper.reproduce import measure
 from hexmj.paper.rules import Answer, Band, Trend
 from hexmj.paper.table import judge
-from hexmj.search.network_forms import NetworkForm
+from hexmj.search.forms import NetworkForm
 from hexmj.search.problems import Problem
 from hexmj.search.stages import Effort, search
 from hexmj.timing import OBSERVATION_TIMES, Stride

@@ -1,7 +1,7 @@
 """Forms: which numbers of a controller a search chooses, as a vector.
 
 A form of the 1998 network has nine or ten numbers if all legs of a side are alike (Appendix A), 29 if only the two
-sides are alike (half of the 58 general weights of Section 2), or all 58. Of other controllers the float fields are free.
+sides are alike (half of the 58 general weights of Section 2), or all 58. Of other controllers float fields are free.
 """
 
 from collections.abc import Callable

@@ -25,7 +25,7 @@ from hexmj.search.stages import STAGES, Effort, Found, search
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.pictures import Picture
+    from matplotlib.figure import Figure
 
 FOUND = "found.toml"
 
@@ -187,16 +187,15 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
 
 
 def _save_figure(history: "xr.Dataset", path: Path) -> Path:
-    from hexmj.pictures import as_shipped
+    from hexmj.plotting import as_shipped
 
     with as_shipped():
         return save_figure(convergence_figure(history), path)
 
 
-def convergence_figure(history: "xr.Dataset") -> "Picture":
+def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw all candidates' costs and the least so far against the number of evaluations, from `stages.history`."""
-    from hexmj.measures.figures import tidy
-    from hexmj.pictures import head, in_figure, picture
+    from hexmj.plotting import head, in_figure, picture, tidy
 
     figure = picture(6.8, 4.2)
     axes = figure.subplots()

@@ -105,8 +105,8 @@ class Found:
     replayed: int
     """Number of distinct candidates whose costs an earlier run had cached."""
     refused: list[str]
-    """Reasons for which no controller could be made of candidates, which cost 1 each. Candidates that do not walk, reach
-    too far or whose simulation fails cost 1 too, and are not listed."""
+    """Reasons for which no controller could be made of candidates, which cost 1 each. Candidates that do not walk,
+    reach too far or whose simulation fails cost 1 too, and are not listed."""
 
     def report(self, problem: Problem) -> list[str]:
         """Return sentences on the evaluations, the least cost and refused candidates."""
