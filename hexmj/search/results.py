@@ -24,7 +24,6 @@ from hexmj.search.stages import STAGES, Effort, Found, search
 
 if TYPE_CHECKING:
     import xarray as xr
-
     from matplotlib.figure import Figure
 
 FOUND = "found.toml"
