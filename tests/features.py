@@ -286,11 +286,11 @@ def examples() -> Any:
 
 WALK = "walk --velocity 0.5 --observation-time 16"
 AHEAD = "walk --velocity 0.7 --observation-time 60 --vp 200 --dt 0.5 --physical --ground-at 45"
-FLSS = "flss --starts 100 --observation-time start --velocities"
-FALLS = "flss --physical --velocities 0.8 --starts 6 --observation-time 40"
+FLSS = "flss --starts 100 --observation-time start --velocity"
+FALLS = "flss --physical --velocity 0.8 --starts 6 --observation-time 40"
 SEARCH = "search --observation-time start --starts 20 --budget 20 --refine-budget 0 --verdict-starts 30 --form"
 FILM = "--width 160 --height 120 --fps 10"
-LEAGUE = "league --quick --starts 10 --physical-starts 2 --trial-starts 1 --velocities 0.5 --trial-velocity 0.8"
+LEAGUE = "league --quick --starts 10 --physical-starts 2 --trial-starts 1 --velocity 0.5 --trial-velocity 0.8"
 FOOT_PATH = "--vp 120 --step-height 9 --standing-height 11 --lift-time 10 --landing-time 15 --contact-gap 5"
 MASSES = "--load 1 --centre-of-mass 2 --leg-mass 0.5 --friction 0.5 --grasp 0.5 --longest-substep 0.3"
 MODELS = ("walknet", "tegotae", "evolved", "turning.py:Turning", "contact_controller.py:Feeler")
@@ -310,7 +310,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "flss kinematic": f"{FLSS} 0.3 0.6 --seed 7 --format pdf",
     "flss accelerating": f"{FLSS} 0.5 --acceleration 0.001",
     "flss range of, resumption, rerun": lambda: resumed(
-        "flss --velocities 0.7 --starts 600 --range-of 200 --observation-time start"
+        "flss --velocity 0.7 --starts 600 --range-of 200 --observation-time start"
     ),
     "flss physical, resumption, rerun": lambda: resumed(FALLS),
     "flss threads": lambda: same_with("--threads 1", f"{FLSS} 0.5"),
@@ -324,14 +324,14 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "controller file and module": lambda: kinematic("tripod.py:Tripod", "tripod:Tripod", "entry-tripod"),
     "controller without and with": lambda: kinematic("ldvs-without-3", "weights.toml-without-1", "ldvs-with-2"),
     "controller wrappers": wrappers,
-    "controller physical": lambda: {name: answer(f"{FALLS} --model {name}") for name in MODELS},
-    "controller learned": f"{FALLS} --model train_cma.py:REFLEXES",
+    "controller physical": lambda: {name: answer(f"{FALLS} --controller {name}") for name in MODELS},
+    "controller learned": f"{FALLS} --controller train_cma.py:REFLEXES",
     "check-controller": "check-controller tripod.py:Tripod",
     "check-controller fails": lambda: answer("check-controller broken.py:Broken", code=1),
     "compare": lambda: resumed(
-        "compare --models hws tripod.py:Tripod --velocities 0.7 --starts 4 --observation-time 40"
+        "compare --controller hws tripod.py:Tripod --velocity 0.7 --starts 4 --observation-time 40"
     ),
-    "compare text": lambda: text("compare --velocities 0.6 --starts 3 --observation-time 20 --no-video --out text"),
+    "compare text": lambda: text("compare --velocity 0.6 --starts 3 --observation-time 20 --no-video --out text"),
     "render one": lambda: shown(f"render walk.nc {FILM}"),
     "render two": lambda: shown(f"render walk.nc plan.nc {FILM} --camera side"),
     "render GIF": lambda: shown(f"render walk.nc {FILM} --camera top --format gif --quality high"),
@@ -343,13 +343,13 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "view live": lambda: view("--velocity 0.5"),
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,
-    "league": f"{LEAGUE} --controllers ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
-    "ablate": "ablate --models ldvs walknet --velocities 0.8 --starts 10 --physical-starts 1 --dt 0.5",
-    "map V_p": lambda: resumed("map --over vp --values 40 160 --velocities 0.8 --starts 4 --observation-time 20"),
-    "map centre of mass": "map --over centre_of_mass --values -5 0 --velocities 0.8 --starts 3 --observation-time 20 --vp 200",
-    "disturb": "disturb --velocities 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
-    "disturb kinematic": "disturb --kinematic --velocities 0.7 --starts 8 --observation-time 40",
-    "terrain": "terrain --velocities 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",
+    "league": f"{LEAGUE} --controller ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
+    "ablate": "ablate --controller ldvs walknet --velocity 0.8 --starts 10 --physical-starts 1 --dt 0.5",
+    "map V_p": lambda: resumed("map --over vp --values 40 160 --velocity 0.8 --starts 4 --observation-time 20"),
+    "map centre of mass": "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200",
+    "disturb": "disturb --velocity 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
+    "disturb kinematic": "disturb --kinematic --velocity 0.7 --starts 8 --observation-time 40",
+    "terrain": "terrain --velocity 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",
     "converge": "converge --velocity 0.7 --vps 200 80 --starts 4 --observation-time start",
     "biology": "biology --starts 1 --periods 4",
     "reproduce claims": "reproduce --quick --only hws-close ideal-0.4 p4 --beside lasting",
@@ -357,12 +357,12 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "search evolution": lambda: resumed(f"{SEARCH} hws --velocity 0.5"),
     "search refined": f"{SEARCH.replace('--refine-budget 0', '--refine-budget 8')} hws --velocity 0.5",
     "search CMA-ES": f"{SEARCH} ldvs --velocity 0.5 --algorithm cmaes",
-    "search range": f"{SEARCH} mirrored --velocities 0.3 0.6 --begin hws --ties later",
+    "search range": f"{SEARCH} mirrored --velocity 0.3 0.6 --begin hws --ties later",
     "search over variants": f"{SEARCH} hws --velocity 0.5 --over mean",
     "search fields": f"{SEARCH} tripod.py:Tripod --velocity 0.5",
     "search physical": f"{SEARCH.replace('20', '10')} hws --velocity 0.7 --physical --vp 200 --dt 0.5",
     "doctor": lambda: {check["name"]: True for check in json.loads(run_command("doctor --json")[1])["checks"]},
-    "errors": lambda: [text("flss --velocities 1.5"), text("walk --model nothing")],
+    "errors": lambda: [text("flss --velocity 1.5"), text("walk --controller nothing")],
     "process": lambda: [process("--help"), process("--version"), process(f"{FLSS} 0.5 --json")],
     "python names": lambda: {name: getattr(hexmj, name) is not None for name in hexmj.__all__},
     "python measures": measures,
@@ -375,7 +375,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "python stable-baselines3": stable_baselines,
     "python examples": examples,
     # These two become scripts.
-    "variants": "variants --models ldvs own-V --velocities 0.5 --starts 20 --observation-time start",
+    "variants": "variants --controller ldvs own-V --velocity 0.5 --starts 20 --observation-time start",
     "model_variants": model_variants,
 }
 

@@ -1,38 +1,134 @@
-"""The command line: arguments in, one call to the package, and errors as one line with an exit code."""
+"""The command line: the list of commands, errors as one line, and exit codes."""
 
+import os
 import sys
-from pathlib import Path
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.commands import COMMANDS, GOES_ON, options_of
 from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.version import __version__
+
+if TYPE_CHECKING:
+    from hexmj.cli.command import Command
+
+ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo; hexmj measures\nits stability."
+
+GROUPS: dict[str, tuple[str, dict[str, str]]] = {
+    "Walk and measure": (
+        "measures",
+        {
+            "walk": "one walk: footfall diagram, stability margin and a recording",
+            "flss": "frequency of the loss of static stability over velocities",
+            "compare": "kinematic, measured and physical FLSS on the same starts",
+        },
+    ),
+    "Look": (
+        "pictures",
+        {
+            "render": "a video of recordings, or of a walk that is recorded first",
+            "page": "an HTML file that plays recordings without a network",
+            "view": "a walk or a recording in a window or a browser",
+        },
+    ),
+    "Studies": (
+        "studies",
+        {
+            "map": "physical FLSS over the velocity and one condition",
+            "disturb": "walks with a halt, a stopped leg or a push",
+            "terrain": "falls at steps, gaps, hurdles and on rough ground",
+            "converge": "the same starts at smaller and smaller V_p",
+            "biology": "forces, gait, posture and work beside those of insects",
+        },
+    ),
+    "Controllers": (
+        "controllers",
+        {
+            "league": "all controllers on the same starts: tables, figures, film",
+            "ablate": "what each mechanism of a controller contributes",
+            "search": "parameters that minimise the FLSS",
+            "check-controller": "interface checks of a controller",
+        },
+    ),
+    "Paper": ("paper", {"reproduce": "the claims and figures of the 1998 paper"}),
+    "Machine": (
+        "machine",
+        {
+            "doctor": "checks of this machine, each with a remedy",
+            "rerun": "repeat a command from its manifest and compare the results",
+        },
+    ),
+}
+"""Title of a group -> the module of its commands, and each command with its summary."""
+
+COMMANDS = {name: module for module, commands in GROUPS.values() for name in commands}
+"""Command -> its module; `check-controller` is the class `CheckController`."""
 
 
 def main() -> None:
-    """Run `hexmj`: exit code 2 for input that makes no sense, 1 for a failed simulation, 130 for Ctrl-C."""
+    """Run `hexmj`: exit code 2 for bad input, 1 for a failed simulation or rendering, 130 for Ctrl-C."""
     sys.path.append("")  # modules of the user in the current directory, as with `python -m hexmj`
-    options: Any = None
+    if sys.platform == "linux" and not ({"MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
+        os.environ["MUJOCO_GL"] = "egl"
     try:
-        options = options_of(sys.argv[1:])
-        options.run()
+        run(sys.argv[1:])
     except KeyboardInterrupt:
-        resumes = getattr(options, "out", None) and GOES_ON in COMMANDS.get(sys.argv[1], "")
-        _exit(f"stopped{f'. {GOES_ON}' if resumes else ''}", 130)
+        _exit("Stopped. Repeat the command to resume.", 130)
     except InputError as error:
         _exit(error, 2)
-    except SimulationError as error:
-        _exit(f"{error}{_saved(error, getattr(options, 'out', None))}", 1)
-    except RenderingError as error:
+    except (SimulationError, RenderingError) as error:
         _exit(error, 1)
+    except BrokenPipeError:  # the reader of standard output has ended, such as `head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
 
 
-def _saved(error: SimulationError, out: Path | None) -> str:
-    """Save the last finite state of a failed simulation and say how to replay it."""
-    if not error.state or out is None:
-        return ""
-    from hexmj.physics.divergence import save_state
+def run(words: list[str]) -> None:
+    """Run a command.
 
-    return f"; replay its last finite state: python -m hexmj.physics.divergence {save_state(error, out)}"
+    Args:
+        words: the command line after `hexmj`.
+    """
+    match words:
+        case [] | ["-h" | "--help"]:
+            print(_help())
+        case ["--version"]:
+            print(f"hexmj {__version__}")
+        case [word, *_] if word.startswith("--tyro-"):
+            _complete(words)
+        case [name, *rest] if name in COMMANDS:
+            command(name).main(name, rest)
+        case [name, *_]:
+            raise InputError(f"{name!r} is no command. `hexmj --help` lists the commands.")
+
+
+def command(name: str) -> "Command":
+    """Return a command by its name."""
+    return getattr(import_module(f"hexmj.cli.{COMMANDS[name]}"), name.title().replace("-", ""))()
+
+
+def _help() -> str:
+    lines = ["usage: hexmj COMMAND [OPTIONS]", "", ABOUT]
+    for title, (_, commands) in GROUPS.items():
+        lines += ["", title, *(f"  {name:18}{summary}" for name, summary in commands.items())]
+    return "\n".join([
+        *lines, "",
+        "`hexmj COMMAND --help` shows the options and examples of a command.",
+        "`hexmj --version` shows the version; `hexmj --tyro-print-completion bash`",
+        "(or zsh) prints a script that completes commands and options.",
+    ])  # fmt: skip
+
+
+def _complete(words: list[str]) -> None:
+    """Print or write what completes commands and options in a shell."""
+    from functools import reduce
+    from operator import or_
+    from typing import Annotated
+
+    import tyro
+
+    commands: list[Any] = [Annotated[command(name).options(name), tyro.conf.subcommand(name)] for name in COMMANDS]
+    every: Any = reduce(or_, commands)
+    tyro.cli(every, prog="hexmj", args=words)
 
 
 def _exit(message: Exception | str, code: int) -> None:

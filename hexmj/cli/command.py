@@ -1,0 +1,166 @@
+"""Base of the commands: options, help with examples, running a study, and the line of settings under every answer."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib import import_module
+from itertools import count
+from pathlib import Path
+from textwrap import fill
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from hexmj.cli.options import Figures, Output, Planning, Workers, build, flat, options_class
+from hexmj.cli.output import lists_of, print_json, show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hexmj.sweep import Study
+
+
+class Command:
+    """A command; its docstring is the description in `--help`."""
+
+    sources: ClassVar[tuple[type | str, ...]] = ()
+    """Dataclasses of settings that options are made from, or their places, such as "measures.compare:Comparison"."""
+    hidden: ClassVar[tuple[str, ...]] = ()
+    """Fields of them that are not offered."""
+    usual: ClassVar[Mapping[str, Any]] = {}
+    """Options with other defaults than those of the dataclasses."""
+    positional: ClassVar[str] = ""
+    """Option that is given without its name."""
+    examples: ClassVar[tuple[str, str]]
+    """Arguments of two examples for `--help`."""
+
+    def options(self, name: str, help: bool = True) -> type:
+        """Return the class of options that tyro parses."""
+        sources = [imported(source) if isinstance(source, str) else source for source in self.sources]
+        how: Any = {"positional": self.positional, "hidden": self.hidden, "usual": self.usual}
+        return options_class(name.replace("-", "_"), *sources, help=help, **how)
+
+    def main(self, name: str, words: list[str]) -> None:
+        """Parse the words after the command's name, and run the command."""
+        import tyro
+
+        help = not {"-h", "--help"}.isdisjoint(words)
+        markers: Any = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
+        how: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
+        if help:
+            print(fill(" ".join((self.__doc__ or "").split()), 80), end="\n\n")
+        try:
+            given = flat(tyro.cli(self.options(name, help), args=words, **how))
+        except SystemExit:
+            if help:
+                print("Examples:", *(f"  hexmj {name} {example}".rstrip() for example in self.examples), sep="\n")
+            raise
+        given.command = [name, *words]
+        self.run(given)
+
+    def run(self, given: SimpleNamespace) -> None:
+        """Run the command with its options by name."""
+        raise NotImplementedError
+
+
+class StudyCommand(Command):
+    """A command that runs a study, writes its result and figures, and prints tables."""
+
+    study: ClassVar[str]
+    """Place of the study's dataclass."""
+    doing: ClassVar[str]
+    """Label of the progress bar."""
+    data: ClassVar[str]
+    """Name of the NetCDF file, in which options may stand in braces."""
+    figures: ClassVar[Mapping[str, str]]
+    """Name of a figure's file, without its ending -> name of the figure, see `hexmj.plot`."""
+    manifest: ClassVar[str] = "manifest.json"
+    own: ClassVar[tuple[type, ...]] = ()
+    """Dataclasses of options beside those of the study."""
+    planning: ClassVar[tuple[type, ...]] = (Planning,)
+
+    def options(self, name: str, help: bool = True) -> type:
+        self.sources = (*self.own, self.study, Output, *self.planning, Workers, Figures)  # pyright: ignore
+        return super().options(name, help)
+
+    def build(self, given: SimpleNamespace) -> "Study":
+        """Return the study that the options describe."""
+        return build(imported(self.study), given)
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        """Return the JSON answer: by default everything but single starts."""
+        return lists_of(result.drop_dims("start", errors="ignore"))
+
+    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
+        """Return the tables and lines of the answer."""
+        raise NotImplementedError
+
+    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write other files, and return their paths."""
+        return []
+
+    def run(self, given: SimpleNamespace) -> None:
+        """Run the study in the results' folder, write the files, and print."""
+        from hexmj.io import results_folder, save, save_manifest, settings
+        from hexmj.sweep import run_study
+
+        study, folder = self.build(given), results_folder(given.out)
+        with at_work(given, self.doing) as execution:
+            result = run_study(study, folder / "walks", **execution)
+        files = [save(result, folder / self.data.format(**vars(given)))]
+        for name, which in self.figures.items():
+            files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
+        files += self.others(given, result)
+        files.append(
+            save_manifest(given.command, settings(result), files, folder / self.manifest.format(**vars(given)))
+        )
+        if given.json:
+            print_json(self.summary(result) | {"searched": searched(given), "files": files})
+        else:
+            show(*self.shown(study, result), settings_line(given, result), *map(str, files))
+
+
+def imported(place: str) -> Any:
+    """Return an object by its place in hexmj, such as "measures.compare:Comparison"."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(f"hexmj.{module}"), name)
+
+
+@contextmanager
+def at_work(given: SimpleNamespace, label: str) -> Iterator[dict[str, Any]]:
+    """Provide the arguments of `Execution` that the options ask for, with a progress bar."""
+    from hexmj.progress import progress_bar
+    from hexmj.sweep import threads_each, workers
+
+    with workers(given.processes, given.scheduler) as executor, progress_bar(label) as progress:
+        threads = threads_each(given.threads, given.processes)
+        yield {"executor": executor, "progress": progress, "threads": threads, "fresh": given.fresh}
+
+
+def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
+    """Draw a result's figure into a file."""
+    from hexmj.io import save_figure
+    from hexmj.plotting import as_shipped, plot
+
+    with as_shipped():
+        return save_figure(plot(result, which), path)
+
+
+def searched(given: SimpleNamespace, names: Collection[str] | None = None) -> dict[str, list[int]]:
+    """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
+    from hexmj.controllers.named import load_controller
+    from hexmj.controllers.searched import searched_on
+
+    own: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
+    chosen = own if names is None else names
+    found = {what: seeds for name in chosen for what, seeds in searched_on(name, load_controller(name)).items()}
+    return {what: seeds for what, seeds in found.items() if given.seed in seeds}
+
+
+def settings_line(given: SimpleNamespace, result: "xr.Dataset", names: Collection[str] | None = None) -> str:
+    """Return what stands under every answer: the caption of the result, and a warning if starts were searched on."""
+    from hexmj.measures.figures import caption
+
+    line = caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ")
+    if found := searched(given, names):
+        seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in found.values()))
+        line += f"; a search used these starts to find {', '.join(found)}, so take others: --seed {seed}"
+    return line

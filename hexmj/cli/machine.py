@@ -1,0 +1,245 @@
+"""`hexmj doctor` and `hexmj rerun`."""
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, metadata, requires, version
+from io import StringIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from hexmj.cli.command import Command
+from hexmj.cli.options import Output
+from hexmj.cli.output import print_json, report_checks
+from hexmj.errors import InputError
+
+RENDERING = """
+import mujoco
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 48, 64) as renderer:
+    renderer.update_scene(data)
+    assert renderer.render().std() > 1, "the frame is empty"
+"""
+"""Renders a frame in a process of its own, since a driver may end the process."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The finding of one check."""
+
+    name: str
+    well: bool
+    found: str
+    """What was found, or the error."""
+    remedy: str = ""
+    """What to do if the check fails."""
+    note: bool = False
+    """Whether an optional part is not installed."""
+
+
+class Doctor(Command):
+    """Check Python and package versions, threads, rendering, films, compiled code and a short walk. Each check that
+    fails names a remedy, and the exit code is 1."""
+
+    sources = (Output,)
+    examples = ("", "--json")
+
+    def run(self, given: SimpleNamespace) -> None:
+        report_checks(examine(), given.json)
+
+
+def examine() -> Iterator[Finding]:
+    """Run every check in turn; its error becomes the finding."""
+    for name, (check, remedy) in CHECKS.items():
+        try:
+            yield Finding(name, True, check())
+        except ModuleNotFoundError as error:
+            yield Finding(name, name == "films", str(error), "" if name == "films" else remedy, note=name == "films")
+        except Exception as error:
+            cause = textwrap.shorten(str(error) or type(error).__name__, 200, placeholder=" [...]")
+            yield Finding(name, False, cause, remedy)
+
+
+def versions() -> str:
+    """Python and all packages are within the bounds that hexmj requires."""
+    from packaging.requirements import Requirement
+    from packaging.specifiers import SpecifierSet
+
+    python, wanted = platform.python_version(), metadata("hexmj")["Requires-Python"]
+    wrong = [] if SpecifierSet(wanted).contains(python) else [f"Python {python}, expected {wanted}"]
+    count = 0
+    for requirement in map(Requirement, requires("hexmj") or []):
+        if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
+            continue
+        count += 1
+        try:
+            found = version(requirement.name)
+        except PackageNotFoundError:
+            wrong.append(f"{requirement.name} is not installed")
+            continue
+        if not requirement.specifier.contains(found, prereleases=True):
+            wrong.append(f"{requirement.name} {found}, expected {requirement.specifier}")
+    if wrong:
+        raise RuntimeError("; ".join(wrong))
+    return f"Python {python}, mujoco {version('mujoco')} and {count - 1} more packages within their bounds"
+
+
+def threads() -> str:
+    """A container's quota of processor time suffices for a thread per core."""
+    from hexmj.threads import cores
+
+    quota = Path("/sys/fs/cgroup/cpu.max")
+    share, period = quota.read_text().split() if quota.is_file() else ("max", "1")
+    if share != "max" and int(share) < cores() * int(period):
+        raise RuntimeError(f"{cores()} threads would share a quota of {int(share) / int(period):g} cores")
+    return f"{cores()}, one for each core that this process may use (of {os.cpu_count()})"
+
+
+def rendering() -> str:
+    """MuJoCo renders a frame."""
+    done = subprocess.run([sys.executable, "-P", "-c", RENDERING], capture_output=True, text=True, timeout=120)
+    if done.returncode != 0:
+        raise RuntimeError((done.stderr.strip().splitlines() or [f"the process ended with {done.returncode}"])[-1])
+    return f"a frame with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}"
+
+
+def films() -> str:
+    """ffmpeg encodes frames."""
+    import imageio_ffmpeg
+    import mediapy
+    import numpy as np
+
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    with tempfile.TemporaryDirectory() as folder:
+        mediapy.write_video(f"{folder}/film.mp4", np.zeros((2, 48, 64, 3), np.uint8), fps=25)
+    return f"two frames through {Path(imageio_ffmpeg.get_ffmpeg_exe()).name}"
+
+
+def compiled() -> str:
+    """numba caches compiled code."""
+    from hexmj.controllers.cruse1998 import kernel
+
+    record: Any = kernel.record
+    if not hasattr(record, "stats"):
+        raise RuntimeError("NUMBA_DISABLE_JIT is set, so that nothing is compiled")
+    folder = record.stats.cache_path
+    with tempfile.TemporaryFile(dir=folder):
+        return f"cached in {folder}"
+
+
+def walking() -> str:
+    """Two insects walk without a fall, to the same bits on one thread and on all."""
+    import numpy as np
+
+    from hexmj.controllers.cruse1998 import LDVS
+    from hexmj.measures.physical import physical_walk
+    from hexmj.starts import draw_starts
+
+    single, several = (physical_walk(draw_starts(2, 0), LDVS, 0.1, 20.0, threads=n) for n in (1, None))
+    if np.isfinite(single.outcomes.fall).any():
+        raise RuntimeError("an insect fell that does not fall on other machines")
+    if not np.array_equal(single.qpos, several.qpos):
+        raise RuntimeError("walks on one thread and on several differ")
+    return "two insects for 20 time units, with the same bits on one thread and on all"
+
+
+CHECKS: dict[str, tuple[Callable[[], str], str]] = {
+    "versions": (versions, "Install hexmj into a fresh environment with Python 3.11 or newer."),
+    "threads": (threads, "Give --threads with the number of granted cores."),
+    "rendering": (rendering, "Install libegl1 libgl1-mesa-dri libopengl0 and set MUJOCO_GL=egl; only films need it."),
+    "films": (films, "Reinstall imageio-ffmpeg and mediapy, or set IMAGEIO_FFMPEG_EXE; only films need it."),
+    "compiled code": (compiled, "Unset NUMBA_DISABLE_JIT, and set NUMBA_CACHE_DIR to a writable folder."),
+    "walking": (walking, "Apply the other remedies, or reinstall mujoco and numba."),
+}
+"""Name of a check -> the check, and its remedy."""
+
+
+@dataclass(frozen=True)
+class RerunOptions:
+    """Options of a repetition."""
+
+    result: Path
+    """A folder that a command wrote results to, or one manifest in it. Files that the command named, such as mine.py,
+    are looked for in the current directory."""
+    threads: int | None = None
+    """Threads of the repeated command. No result depends on it."""
+    processes: int | None = None
+    """Processes of the repeated command, if it has this option. No result depends on it."""
+
+
+class Rerun(Command):
+    """Repeat the command of a manifest in a temporary folder, and compare all numbers to the last bit. If any differs,
+    the exit code is 1, and the versions that differ are named."""
+
+    sources = (RerunOptions, Output)
+    positional = "result"
+    examples = ("results/compare", "results/map/vp-manifest.json --threads 1 --json")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.cli.main import run
+        from hexmj.io import MANIFEST, read_manifest
+
+        path = given.result if given.result.is_file() else next(iter(sorted(given.result.glob(f"*{MANIFEST}"))), None)
+        if path is None:
+            raise InputError(f"{given.result} holds no {MANIFEST} of a command")
+        then = read_manifest(path)
+        with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
+            with redirect_stdout(StringIO()):
+                run([*_without(then["command"], "--out"), *_workers(given), "--out", folder])
+            files = {
+                name: _difference(path.parent / name, Path(folder) / name)
+                for name in then["files"]
+                if name.endswith(".nc")
+            }
+            now = read_manifest(Path(folder) / path.name)
+        if not files:
+            raise InputError(f"{path} names no NetCDF file to compare")
+        changed = {name: [then["versions"].get(name), one] for name, one in now["versions"].items()}
+        changed = {name: pair for name, pair in changed.items() if pair[0] != pair[1]}
+        equal = not any(files.values())
+        if given.json:
+            print_json(
+                {"equal": equal, "manifest": path, "command": then["command"], "differences": files, "versions": changed}
+            )
+        else:
+            for name, text in files.items():
+                print(f"{name}: {text or 'equal to the last bit'}")
+            for name, (old, new) in changed.items():
+                print(f"{name} was {old}, now it is {new}")
+        sys.exit(0 if equal else 1)
+
+
+def _without(words: list[str], option: str) -> list[str]:
+    """Return a command line without an option and its value."""
+    words = [word for word in words if word != "--json" and not word.startswith(f"{option}=")]
+    if option in words:
+        at = words.index(option)
+        del words[at : at + 2]
+    return words
+
+
+def _workers(given: SimpleNamespace) -> list[str]:
+    named = {"--threads": given.threads, "--processes": given.processes}
+    return [word for name, value in named.items() if value is not None for word in (name, str(value))]
+
+
+def _difference(then: Path, now: Path) -> str:
+    """Return how two files differ, or an empty text."""
+    import xarray as xr
+
+    from hexmj.files import read_netcdf
+
+    try:
+        xr.testing.assert_identical(read_netcdf(then), read_netcdf(now))
+    except AssertionError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,346 @@
+"""`hexmj walk`, `hexmj flss` and `hexmj compare`."""
+
+import math
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from hexmj.cli.command import Command, StudyCommand, at_work, draw, searched, settings_line
+from hexmj.cli.options import (
+    Figures,
+    Output,
+    Planning,
+    Threads,
+    Workers,
+    acceleration,
+    build,
+    conditions,
+    controller,
+    no_effect,
+    stride,
+)
+from hexmj.cli.output import (
+    four_digits,
+    interval,
+    physical_report,
+    print_json,
+    report_line,
+    show,
+    table,
+)
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError, RenderingError
+from hexmj.timing import Acceleration, Stride, observation_duration
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from rich.table import Table
+
+    from hexmj.measures.physical import PhysicalWalk
+
+PHYSICAL = tuple(member.name for member in fields(Conditions) if member.name != "body")
+"""Conditions, in the order of their fields."""
+
+FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
+"""Conditions that a recording of a plan shows as well."""
+
+TIMES = ("planned loss", "measured loss", "fall")
+"""Events of a walk, which may not happen."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One walk from a random start."""
+
+    controller: Controller
+    velocity: float = 0.3
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    seed: int = 0
+    """Seed of the random starts."""
+    start: int = 0
+    """Number of the start among the random starts of the seed."""
+    observation_time: str | float = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    stride: Stride = Stride()
+    acceleration: Acceleration | None = None
+    conditions: Conditions = Conditions()
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """Stride and acceleration, as arguments of walks."""
+        return {"stride": self.stride, "acceleration": self.acceleration}
+
+    @property
+    def drawn(self) -> Any:
+        """The start, (1, leg) [mm], the controller, the velocity and the duration [time units]."""
+        from hexmj.starts import draw_start
+
+        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
+        return draw_start(self.start, self.seed, self.stride), self.controller, self.velocity, float(time)
+
+    def walked(self, threads: int | None = None) -> "PhysicalWalk":
+        """Return the physical walk."""
+        from hexmj.measures.physical import physical_walk
+        from hexmj.progress import progress_bar
+
+        with progress_bar("walking") as progress:
+            how: Any = self.how | {"conditions": self.conditions, "progress": progress, "threads": threads}
+            return physical_walk(*self.drawn, **how)
+
+    def recorded(self, physical: bool, title: str, threads: int | None = None) -> "xr.Dataset":
+        """Return a recording of the physical walk, or of the plan."""
+        from hexmj.replay.recording import record, record_plan
+
+        if physical:
+            return record(self.walked(threads), title=title)
+        from hexmj.measures.kinematic import walk
+
+        return record_plan(walk(*self.drawn, **self.how, threads=threads), self.conditions, self.stride, title=title)
+
+    def settings(self, **controllers: Controller) -> dict[str, Any]:
+        """Return what is needed to repeat the walk, as plain data."""
+        from hexmj.measures.tables import settings
+
+        walks = settings(controllers, self.observation_time, 1, self.seed, self.stride, self.acceleration)
+        own = {"velocity": self.velocity, "start": self.start}
+        return own | walks | {"conditions": self.conditions.settings()}
+
+
+def walk_summary(walked: "xr.Dataset") -> dict[str, Any]:
+    """Return when a recorded walk lost stability or fell [time units], and its least margins [mm]."""
+    from hexmj.measures.compare import REPORTED
+    from hexmj.replay.recording import recorded_conditions
+
+    summary: dict[str, Any] = {
+        "time units": float(walked.time[-1]),
+        "planned loss": float(walked.planned_loss_time),
+        "least planned margin [mm]": float(walked.planned_margin.min()),
+    }
+    if "measured_margin" in walked:
+        part = int(walked.fall_part)
+        summary |= {
+            "measured loss": float(walked.measured_loss_time),
+            "least measured margin [mm]": float(walked.measured_margin.min()),
+            "fall": float(walked.fall_time),
+            "fell on": recorded_conditions(walked).body.trunk[part] if part >= 0 else None,
+        }
+        for name in REPORTED:
+            unit = walked[name].attrs["units"]
+            summary[f"{name} [{unit}]" if unit != "1" else name] = walked[name].item()
+    return summary
+
+
+@dataclass(frozen=True)
+class WalkOptions:
+    """Options of one walk."""
+
+    physical: bool = False
+    """Walk the insect in MuJoCo; otherwise the recording shows the plan."""
+    out: Path = Path("results/walk")
+    """Folder for the recording, the figure and the manifest."""
+
+
+class Walk(Command):
+    """Walk once, kinematically or physically, and write a recording (NetCDF) and a figure with the footfall diagram
+    and the stability margin."""
+
+    sources = (WalkOptions, Start, Output, Planning, Threads, Figures)
+    examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.io import MANIFEST, attributes, results_folder, save_manifest
+        from hexmj.replay.recording import save_recording
+
+        if not given.physical:
+            no_effect(given, [*(set(PHYSICAL) - {*FOOT_PATH}), "feedback"], "without --physical")
+        start, out = build(Start, given), results_folder(given.out)
+        title = f"{start.controller.name}, V = {given.velocity:g}"
+        walked = start.recorded(given.physical, title, given.threads)
+        settings = start.settings(**{given.controller: start.controller}) | {"physical": given.physical}
+        files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
+        files.append(save_manifest(given.command, settings, files, out / MANIFEST))
+        summary = walk_summary(walked)
+        if given.json:
+            print_json(summary | {"settings": settings, "searched": searched(given), "files": files})
+        else:
+            lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
+            made = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
+            show(title, *lines, settings_line(given, made), *map(str, files))
+
+
+@dataclass(frozen=True)
+class FlssOptions:
+    """Options of FLSS."""
+
+    controller: Controller
+    velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    n_starts: int | None = None
+    """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 with --physical."""
+    out: Path | None = None
+    """Folder for figure, NetCDF, manifest and cached results; by default nothing is written."""
+    physical: bool = False
+    """Count falls of the insect in MuJoCo instead of losses of the planned stability."""
+    range_of: int | None = None
+    """Starts that are computed and cached as one cell, by default 1600000; no result depends on it."""
+
+
+class Flss(Command):
+    """Measure the FLSS of a controller over velocities, kinematic or physical. A run with --out that was stopped
+    resumes if it is repeated."""
+
+    sources = (FlssOptions, "measures.kinematic:KinematicFlss", Start, Output, Planning, Workers, Figures)
+    hidden = ("start",)
+    examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.io import MANIFEST, attributes, results_folder, save, save_manifest, settings
+
+        if not given.physical:
+            no_effect(given, [*PHYSICAL, "feedback"], "without --physical")
+        elif given.range_of is not None:
+            raise InputError(f"--range-of = {given.range_of} has no effect with --physical")
+        if given.out:
+            results_folder(given.out)
+        result = self.measured(given).assign_attrs(attributes({"model": given.controller, "physical": given.physical}))
+        files: list[Path] = []
+        if given.out:
+            files = [save(result, given.out / "flss.nc"), draw(result, given.out / f"flss.{given.format}")]
+            files.append(save_manifest(given.command, settings(result), files, given.out / MANIFEST))
+        names = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
+        report = physical_report(result) if given.physical else {}
+        if given.json:
+            lists = {name: result[name].values.tolist() for name in ["velocity", *names]}
+            more = {"settings": settings(result), "searched": searched(given), "files": files}
+            print_json(lists | ({"report": report} if report else {}) | more)
+            return
+        columns = [name for name in names if result[name].notnull().any()]
+        rows = [
+            (f"{v:g}", *(four_digits(result[name].sel(velocity=v).item()) for name in columns))
+            for v in result.velocity.values
+        ]
+        lines = [settings_line(given, result), *([report_line(report)] if report else []), *map(str, files)]
+        show(
+            f"{'physical' if given.physical else 'kinematic'} FLSS of {given.controller}",
+            table(("V", *columns), rows),
+            *lines,
+        )
+
+    def measured(self, given: SimpleNamespace) -> "xr.Dataset":
+        """Return the FLSS over velocities."""
+        from hexmj.measures.kinematic import RANGE, flss
+
+        walks: Any = {name: getattr(given, name) for name in ("observation_time", "seed")}
+        walks |= {"stride": stride(given), "acceleration": acceleration(given)}
+        planned, folder = controller(given, given.controller), given.out and given.out / "walks"
+        with at_work(given, f"{'physical' if given.physical else 'kinematic'} FLSS") as execution:
+            how: Any = walks | execution | {"folder": folder}
+            if given.physical:
+                from hexmj.measures.compare import physical_flss
+
+                n_starts = 200 if given.starts is None else given.starts
+                return physical_flss(planned, given.velocity, n_starts=n_starts, conditions=conditions(given), **how)
+            how |= {} if given.starts is None else {"n_starts": given.starts}
+            return flss(planned, given.velocity, range_of=RANGE if given.range_of is None else given.range_of, **how)
+
+
+@dataclass(frozen=True)
+class CompareOptions:
+    """Options of a comparison."""
+
+    out: Path = Path("results/compare")
+    """Folder for the results and cached results."""
+    no_video: bool = False
+    """Leave the video out."""
+
+
+class Compare(StudyCommand):
+    """Compare the kinematic, measured and physical FLSS of controllers on the same starts: table, figure, NetCDF,
+    manifest and a gait video. A run that was stopped resumes if it is repeated."""
+
+    study = "measures.compare:Comparison"
+    own = (CompareOptions,)
+    usual = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
+    doing = "comparing"
+    data = "comparison.nc"
+    figures = {"comparison": "comparison"}  # noqa: RUF012
+    examples = ("", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
+
+    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
+        import numpy as np
+
+        from hexmj.replay.film.video import render
+        from hexmj.replay.recording import save_recording
+
+        if given.no_video:
+            return []
+        name, velocities = str(result.controller.values[0]), result.velocity.values
+        v = float(velocities[np.abs(velocities - 0.3).argmin()])
+        data = result.sel(controller=name, velocity=v)
+        start = int(np.argmax((np.isinf(data.planned_loss) & np.isinf(data.fall)).values))
+        first = build(Start, given, controller=controller(given, given.controller[0]), velocity=v, start=start)
+        walked = first.recorded(True, name, given.threads)
+        files = [save_recording(walked, given.out / "recording.nc")]
+        try:
+            render([walked], given.out / "gait.mp4", progress=True)
+            files.append(given.out / "gait.mp4")
+        except RenderingError as error:
+            print(f"hexmj: no video: {error}", file=sys.stderr)
+        return files
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        from hexmj.io import settings
+        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
+
+        summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
+        keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")]
+        for name in result.controller.values:
+            data = result.sel(controller=name)
+            summary[name] = {key: data[key].values.tolist() for key in [*keys, "agreement", *AGREEMENT]}
+        durations = {"duration": result.duration.values.tolist()}
+        return summary | {"report": physical_report(result), "settings": settings(result) | durations}
+
+    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
+        frequencies, answers = _tables(result)
+        yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
+        yield frequencies
+        yield (
+            "Starts that lost the planned stability and fell (both), did either (kin., phys.) or none; speed over the"
+            " commanded one, least to greatest of the starts that did not fall"
+        )
+        yield answers
+        yield report_line(physical_report(result))
+
+
+def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
+    """Return the frequencies, and what the starts did, with a row for each controller and velocity."""
+    import numpy as np
+
+    from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
+
+    frequencies, answers = [], []
+    for name in result.controller.values:
+        for v in result.velocity.values:
+            data = result.sel(controller=name, velocity=v)
+            intervals = (interval(data, measure) for measure in MEASURES)
+            frequencies.append((name, f"{v:g}", four_digits(data.duration.item()), *intervals))
+            speed = data.speed.values[np.isinf(data.fall.values)]
+            speeds = f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
+            counts = [str(data[case].item()) for case in AGREEMENT]
+            answers.append(
+                (name, f"{v:g}", f"{data.agreement.item():.2f}", *counts, f"{data.toppled.item():.3f}", speeds)
+            )
+    heads = ("agree", "both", "kin.", "phys.", "none", *BESIDE, "speed")
+    return table(("controller", "V", "t", *MEASURES), frequencies), table(("controller", "V", *heads), answers)
+
+
+def _in_words(key: str, value: Any) -> str:
+    """Return a number of a walk as text; an event may not happen."""
+    if key in TIMES:
+        return f"at {four_digits(value)} time units" if math.isfinite(value) else "none within the walk"
+    return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else four_digits(value)

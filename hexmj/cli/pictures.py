@@ -1,0 +1,234 @@
+"""`hexmj render`, `hexmj page` and `hexmj view`."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, Literal
+
+from hexmj.cli.command import Command
+from hexmj.cli.measures import PHYSICAL, Start, walk_summary
+from hexmj.cli.options import Output, Planning, Threads, build, controller, no_effect
+from hexmj.cli.output import print_json, show
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
+from hexmj.errors import InputError, RenderingError
+from hexmj.replay.film.film import MOST_PANELS, Film
+from hexmj.timing import Stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "seed": 0, "start": 0, "beside": None}
+"""Defaults of options that have no effect on recordings."""
+
+END = "Ctrl-C ends it."
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """Options of a video."""
+
+    recordings: tuple[Path, ...] = ()
+    """One recording, or up to six side by side (recording.nc of `hexmj walk`); without any, a physical walk is recorded
+    first."""
+    out: Path = Path("results/render")
+    """Folder for the video and new recordings."""
+    beside: str | None = None
+    """Show side by side, from the same start: 'planned' (the plan with its support polygon) or a second controller."""
+    format: Literal["mp4", "gif"] = "mp4"
+    """Format of the video."""
+
+
+class Render(Command):
+    """Render a gait video, from recordings or from a walk that is recorded first."""
+
+    sources = (RenderOptions, Start, Output, Film, Planning, Threads)
+    positional = "recordings"
+    examples = ("results/walk/recording.nc --camera side", "--controller wilson --velocity 0.5 --beside planned")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.io import MANIFEST, results_folder, save_manifest
+        from hexmj.replay.film.video import missing, render
+        from hexmj.replay.recording import load_recording, save_recording
+
+        film = build(Film, given)
+        film.check_format(given.format)
+        if len(given.recordings) > MOST_PANELS:
+            raise InputError(f"{len(given.recordings)} recordings; expected 1 to {MOST_PANELS}")
+        if given.recordings:
+            names = ["controller", "velocity", "seed", "start", "beside", "feedback", *PHYSICAL]
+            no_effect(given, names, "on recordings", WALKS)
+        shown = [load_recording(path) for path in given.recordings]
+        start = None if shown else build(Start, given)
+        if start and given.beside not in (None, "planned"):
+            controller(given, given.beside)  # raises before the work
+        out = results_folder(given.out)
+        if sentence := missing():
+            raise RenderingError(sentence)
+        settings: dict[str, Any] = {"film": asdict(film)}
+        files: list[Path] = []
+        name = _file_name(given, film, [walked.attrs["title"] for walked in shown])
+        if start:
+            shown = _recorded(start, given)
+            files = [save_recording(walked, out / f"{name}-{n}.nc") for n, walked in enumerate(shown, 1)]
+            settings |= start.settings(**{given.controller: start.controller}) | {"beside": given.beside}
+        video = out / f"{name}.{given.format}"
+        frames = render(shown, video, film, progress=True)
+        files.append(video)
+        files.append(save_manifest(given.command, settings, files, out / f"{video.name}-{MANIFEST}"))
+        if given.json:
+            summary = {"frames": frames, "film": asdict(film), "files": files}
+            print_json(summary | {"recordings": [walk_summary(walked) for walked in shown]})
+        else:
+            show(f"{frames} frames at {film.fps:g} per second", *map(str, files))
+
+
+def _recorded(start: Start, given: SimpleNamespace) -> "list[xr.Dataset]":
+    """Return the recordings of the walk and of what is shown beside it."""
+    from hexmj.replay.recording import record, record_plan
+
+    name, walked = start.controller.name, start.walked(given.threads)
+    shown = [record(walked, title=name)]
+    if given.beside == "planned":
+        return [record_plan(walked.planned, start.conditions, start.stride, title=f"{name}, planned"), *shown]
+    if given.beside:
+        second = build(Start, given, controller=controller(given, given.beside))
+        shown.append(second.recorded(True, second.controller.name, given.threads))
+    return shown
+
+
+def _file_name(given: SimpleNamespace, film: Film, titles: Sequence[str]) -> str:
+    """Return the name of the video's file, which says what it shows."""
+    titles = titles or [f"{given.controller} V {given.velocity:g}", given.beside or ""]
+    camera = "" if film.camera == Film.camera else f" {film.camera}"
+    words = " beside ".join(filter(None, titles))[:120] + camera
+    return re.sub(r"[^A-Za-z0-9.+-]+", "-", words).strip(".-") or "film"
+
+
+@dataclass(frozen=True)
+class PageOptions:
+    """Options of a page."""
+
+    recordings: tuple[Path, ...] = ()
+    """One recording, or two side by side with one clock (recording.nc of `hexmj walk`)."""
+    out: Path = Path("results/page")
+    """Folder for the page."""
+
+
+class Page(Command):
+    """Write one HTML file that plays a recording, or two side by side: 3D, footfall diagram and stability margin. It
+    needs no network."""
+
+    sources = (PageOptions, Output)
+    positional = "recordings"
+    examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --out results/both")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.io import MANIFEST, results_folder, save_manifest
+        from hexmj.replay.page.page import page
+        from hexmj.replay.recording import load_recording
+
+        if not 1 <= len(given.recordings) <= 2:
+            raise InputError(f"{len(given.recordings)} recordings; expected 1 or 2, such as recording.nc of hexmj walk")
+        shown = [load_recording(path) for path in given.recordings]
+        out = results_folder(given.out)
+        files = [page(shown, out / "walk.html")]
+        settings = {"recordings": [str(path) for path in given.recordings]}
+        files.append(save_manifest(given.command, settings, files, out / f"walk.html-{MANIFEST}"))
+        if given.json:
+            print_json({"files": files, "recordings": [walk_summary(walked) for walked in shown]})
+        else:
+            show(f"{files[0].stat().st_size / 1e6:.1f} MB; opens in any browser", *map(str, files))
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """Options of a view."""
+
+    controller: Controller
+    recording: Path | None = None
+    """A recording (recording.nc of `hexmj walk`); without one, an insect walks live."""
+    velocity: float = 0.3
+    """Velocity V_r at the beginning, a fraction of V_p, 0 <= V < 1."""
+    seed: int = 0
+    """Seed of the random starts."""
+    start: int = 0
+    """Number of the first start."""
+    browser: bool = False
+    """Use a browser although there is a screen."""
+    host: str = "127.0.0.1"
+    """Address of the browser's page; with 0.0.0.0 other machines can view and steer too."""
+    port: int = 8080
+    """Port of the browser's page; 0 takes a free one."""
+    conditions: Conditions = Conditions()
+
+
+class View(Command):
+    """View a walking insect or a recording: in MuJoCo's viewer if there is a screen, otherwise in a browser."""
+
+    sources = (ViewOptions, Planning)
+    positional = "recording"
+    examples = ("--velocity 0.5", "results/walk/recording.nc --browser --port 0")
+
+    def run(self, given: SimpleNamespace) -> None:
+        from hexmj.view.desktop import screen
+
+        desktop = screen() and not given.browser
+        if given.recording is None:
+            self.live(given, desktop)
+        else:
+            names = ["controller", "velocity", "seed", "start", "feedback", *PHYSICAL]
+            no_effect(given, names, "on a recording", WALKS)
+            self.recording(given, desktop)
+
+    def live(self, given: SimpleNamespace, desktop: bool) -> None:
+        """Show an insect that walks until the window is closed or Ctrl-C is pressed."""
+        from hexmj.cli.options import conditions
+        from hexmj.progress import progress_bar
+        from hexmj.starts import draw_start
+        from hexmj.view.live import LiveWalk
+        from hexmj.view.port import check_port
+        from hexmj.view.session import LiveSession
+
+        def starts(number: int) -> Any:
+            return draw_start(number, given.seed, Stride())[0]
+
+        planned = controller(given, given.controller)
+        if not desktop:
+            check_port(given.host, given.port)  # before the insect settles
+        with progress_bar("settling"):
+            walk = LiveWalk(planned, given.velocity, starts(given.start), conditions(given))
+        session = LiveSession(walk, given.start, starts)
+        if desktop:
+            from hexmj.view.desktop import KEYS, view_live
+
+            show(KEYS, END)
+            view_live(session)
+        else:
+            from hexmj.view.browser import BrowserView
+
+            view = BrowserView(session, given.host, given.port)
+            show(f"{planned.name} walks at {view.address}", END)
+            view.run()
+
+    def recording(self, given: SimpleNamespace, desktop: bool) -> None:
+        """Play a recording again and again."""
+        from hexmj.replay.recording import load_recording
+
+        recording = load_recording(given.recording)
+        if desktop:
+            from hexmj.replay.take import Take
+            from hexmj.view.desktop import PAUSE, view_recording
+            from hexmj.view.session import ReplaySession
+
+            show(PAUSE, END)
+            view_recording(ReplaySession(Take.of(recording)))
+        else:
+            from hexmj.replay.page.page import page_text
+            from hexmj.view.served import page_server
+
+            with page_server(page_text([recording]), given.host, given.port) as server:
+                show(f"{given.recording} plays at http://{given.host}:{server.server_port}", END)
+                server.serve_forever(poll_interval=0.1)
