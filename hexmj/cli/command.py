@@ -1,6 +1,6 @@
 """Base of the commands: options, help with examples, running a study, and the line of settings under every answer."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import count
@@ -144,7 +144,7 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
         return save_figure(plot(result, which), path)
 
 
-def searched(given: SimpleNamespace, names: Collection[str] | None = None) -> dict[str, list[int]]:
+def searched(given: SimpleNamespace, names: Iterable[str] | None = None) -> dict[str, list[int]]:
     """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
     from hexmj.controllers.named import load_controller
     from hexmj.controllers.searched import searched_on
@@ -155,7 +155,7 @@ def searched(given: SimpleNamespace, names: Collection[str] | None = None) -> di
     return {what: seeds for what, seeds in found.items() if given.seed in seeds}
 
 
-def settings_line(given: SimpleNamespace, result: "xr.Dataset", names: Collection[str] | None = None) -> str:
+def settings_line(given: SimpleNamespace, result: "xr.Dataset", names: Iterable[str] | None = None) -> str:
     """Return what stands under every answer: the caption of the result, and a warning if starts were searched on."""
     from hexmj.measures.figures import caption
 

@@ -208,7 +208,13 @@ class Rerun(Command):
         equal = not any(files.values())
         if given.json:
             print_json(
-                {"equal": equal, "manifest": path, "command": then["command"], "differences": files, "versions": changed}
+                {
+                    "equal": equal,
+                    "manifest": path,
+                    "command": then["command"],
+                    "differences": files,
+                    "versions": changed,
+                }
             )
         else:
             for name, text in files.items():
