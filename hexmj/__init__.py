@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import PhysicalWalk as PhysicalWalk
     from hexmj.measures.physical import physical_walk as physical_walk
     from hexmj.plotting import plot as plot
-    from hexmj.replay.film.film import Film as Film
-    from hexmj.replay.film.video import render as render
-    from hexmj.replay.page.page import page as page
+    from hexmj.replay.film import Film as Film
+    from hexmj.replay.video import render as render
+    from hexmj.replay.page import page as page
     from hexmj.replay.recording import load_recording as load_recording
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
@@ -75,9 +75,9 @@ _MODULES = {
     "measures.kinematic": ("first_loss", "flss", "flss_over_range", "walk"),
     "measures.physical": ("PhysicalWalk", "physical_walk"),
     "plotting": ("plot",),
-    "replay.film.film": ("Film",),
-    "replay.film.video": ("render",),
-    "replay.page.page": ("page",),
+    "replay.film": ("Film",),
+    "replay.video": ("render",),
+    "replay.page": ("page",),
     "replay.recording": ("load_recording", "record", "record_plan", "save_recording"),
     "search.forms": ("FieldsForm", "NetworkForm"),
     "search.problems": ("Problem",),

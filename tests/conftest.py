@@ -5,6 +5,10 @@ from collections.abc import Callable
 
 import pytest
 
+from hexmj.rendering import use_egl_without_display
+
+use_egl_without_display()  # before a test imports MuJoCo
+
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:

@@ -25,8 +25,8 @@ from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
 from hexmj.rendering import gl
-from hexmj.replay.film.film import Film
-from hexmj.replay.film.video import render
+from hexmj.replay.film import Film
+from hexmj.replay.video import render
 from hexmj.replay.recording import load_recording, record, record_plan, recorded_conditions, save_recording
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride

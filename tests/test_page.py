@@ -21,7 +21,7 @@ from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.rendering.shapes import body_shape, geom_shape, ground_shape
-from hexmj.replay.page.page import page, page_text
+from hexmj.replay.page import page, page_text
 from hexmj.replay.recording import record, record_plan, save_recording
 from hexmj.replay.take import Take
 from hexmj.starts import draw_starts

@@ -32,7 +32,7 @@ from hexmj.io import settings
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.measures.tables import reach
 from hexmj.physics.settling import settle
-from hexmj.replay.film.film import Film
+from hexmj.replay.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
 from hexmj.studies.terrain import FARTHER, Terrain, terrain_figure
 from hexmj.sweep import Cell, run_study

@@ -97,8 +97,8 @@ class League(StudyCommand):
 
 def _film(given: SimpleNamespace, result: "xr.Dataset") -> Path:
     """Film the best entrants in physics side by side, from the first random start."""
-    from hexmj.replay.film.film import Film
-    from hexmj.replay.film.video import render
+    from hexmj.replay.film import Film
+    from hexmj.replay.video import render
     from hexmj.studies.standings import by_rank
 
     best = [name for name in by_rank(result).entrant.values if not given.entrants[name].ideal][:FILMED]

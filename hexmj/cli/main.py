@@ -1,11 +1,11 @@
 """The command line: the list of commands, errors as one line, and exit codes."""
 
-import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.rendering import use_egl_without_display
 from hexmj.version import __version__
 
 if TYPE_CHECKING:
@@ -67,8 +67,7 @@ COMMANDS = {name: module for module, commands in GROUPS.values() for name in com
 def main() -> None:
     """Run `hexmj`: exit code 2 for bad input, 1 for a failed simulation or rendering, 130 for Ctrl-C."""
     sys.path.append("")  # modules of the user in the current directory, as with `python -m hexmj`
-    if sys.platform == "linux" and not ({"MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
-        os.environ["MUJOCO_GL"] = "egl"
+    use_egl_without_display()
     try:
         run(sys.argv[1:])
     except KeyboardInterrupt:

@@ -274,7 +274,7 @@ class Compare(StudyCommand):
         """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
         import numpy as np
 
-        from hexmj.replay.film.video import render
+        from hexmj.replay.video import render
         from hexmj.replay.recording import save_recording
 
         if given.no_video:

@@ -14,7 +14,7 @@ from hexmj.cli.output import print_json, show
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
-from hexmj.replay.film.film import MOST_PANELS, Film
+from hexmj.replay.film import MOST_PANELS, Film
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Render(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, results_folder, save_manifest
-        from hexmj.replay.film.video import missing, render
+        from hexmj.replay.video import missing, render
         from hexmj.replay.recording import load_recording, save_recording
 
         film = build(Film, given)
@@ -127,7 +127,7 @@ class Page(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, results_folder, save_manifest
-        from hexmj.replay.page.page import page
+        from hexmj.replay.page import page
         from hexmj.replay.recording import load_recording
 
         if not 1 <= len(given.recordings) <= 2:
@@ -226,7 +226,7 @@ class View(Command):
             show(PAUSE, END)
             view_recording(ReplaySession(Take.of(recording)))
         else:
-            from hexmj.replay.page.page import page_text
+            from hexmj.replay.page import page_text
             from hexmj.view.served import page_server
 
             with page_server(page_text([recording]), given.host, given.port) as server:

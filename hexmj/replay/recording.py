@@ -1,13 +1,14 @@
-"""Recordings: one start of a walk as a file, with all that figures and films need."""
+"""Recordings: one start of a walk as a file, with everything that figures, films and pages need."""
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
-from hexmj.checks import typed
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.files import read_netcdf, write_netcdf
@@ -16,25 +17,75 @@ from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.foot_path import TipTargets, standing_tips
 from hexmj.physics.orders import hold
-from hexmj.replay.schema import MEASURED, PLANNED, TIMES, check_recording, check_settings, stride_settings
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start
 
 
-def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
-    """What the physical insect did from one start, and what was planned; NaN after a fall.
+class Variable(NamedTuple):
+    """Dimensions, unit and meaning of a variable."""
 
-    What is called planned is the plan on paper, whose loss is the kinematic one; but `planned_tip` is where the tips
-    were told to be, which differs where the plan reads the legs.
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+_STEP, _LEG, _ONCE = ("step",), ("step", "leg"), ()
+
+TIMES = {
+    "time": Variable(_STEP, "time unit", "time, in the unit 1 mm / V_p"),
+    "seconds": Variable(_STEP, "s", "time"),
+}
+"""Coordinates of the steps."""
+
+PLANNED = {
+    "velocity": Variable(_STEP, "V_p", "commanded velocity V_r during the step"),
+    "planned_x": Variable(_LEG, "mm", "planned tip on its own axis"),
+    "planned_y": Variable(_LEG, "mm", "planned tip beside the body axis, left positive"),
+    "planned_stance": Variable(_LEG, "1", "leg retracts in the plan"),
+    "planned_margin": Variable(_STEP, "mm", "stability margin of the plan"),
+    "planned_loss_time": Variable(_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
+    "planned_tip": Variable((*_LEG, "coordinate"), "mm", "commanded tip in the world, lifted while it swings"),
+    "qpos": Variable((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
+    "centre_of_mass": Variable((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
+}
+"""Variables of every recording."""
+
+MEASURED = {
+    "measured_x": Variable(_LEG, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
+    "measured_y": Variable(_LEG, "mm", "foot beside the centre of mass, left positive"),
+    "measured_stance": Variable(_LEG, "1", "foot touches the ground"),
+    "measured_margin": Variable(_STEP, "mm", "measured stability margin"),
+    "measured_loss_time": Variable(_ONCE, "time unit", "first loss of measured static stability, or inf"),
+    "fall_time": Variable(_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
+    "fall_part": Variable(_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
+    "clearance": Variable(_ONCE, "mm", "least height of the trunk's lowest point"),
+    "tilt": Variable(_ONCE, "rad", "greatest tilt of the trunk"),
+    "speed": Variable(_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
+    "slip": Variable(_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
+    "tracking": Variable(_ONCE, "mm", "95th percentile of the distance of a foot from its target on the ground"),
+    "depth": Variable(_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
+    "saturation": Variable(_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
+    "unreachable": Variable(_ONCE, "1", "tip targets out of reach"),
+}
+"""Variables of a physical walk. A puppet, which only shows the plan, has none of them."""
+
+
+def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
+    """Record what the physical insect did from one start, and the plan; poses and measures are NaN after a fall.
+
+    The planned variables are those of the kinematic walk, except `planned_tip`: it is where the tips were commanded to
+    be, which differs with sensory feedback.
 
     Args:
-        walk: physical walks kept whole.
-        start: which of them.
+        walk: physical walks.
+        start: index of the start.
         title: shown on films.
+
+    Returns:
+        The variables of `PLANNED` and `MEASURED`, with the title, the conditions and the stride as attributes.
     """
-    typed("walk", walk, PhysicalWalk)
     planned, measured = one_start(walk.planned, start), one_start(walk.measured, start)
     qpos, outcomes = walk.qpos[:, start], walk.outcomes
     tips, _ = _lifted_tips(one_start(walk.ordered, start), walk.conditions, walk.stride)
@@ -60,33 +111,34 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
 def record_plan(
     plan: PlannedWalk, conditions: Conditions, stride: Stride, start: int = 0, title: str = ""
 ) -> xr.Dataset:
-    """A puppet that shows the plan of one start: carried along at V_r, its joints put where the tips are planned.
+    """Record a puppet that shows the plan of one start: its root moves with V_r, its joints reach the planned tips.
 
-    Its trunk stays level at the standing height and its centre of mass is the paper's O.  A leg that cannot
-    reach its tip keeps its last angles.
+    Its trunk stays level at the standing height and its centre of mass is the paper's O. A leg that cannot reach its
+    tip keeps its last angles.
 
     Args:
         plan: planned walks from their first step on.
-        conditions: what the plan leaves open: V_p, and how high and how fast feet are lifted.
+        conditions: of the puppet: V_p, and how high and how fast feet are lifted.
         stride: of the plan.
-        start: which of the walks.
+        start: index of the start.
         title: shown on films.
+
+    Returns:
+        The variables of `PLANNED`, with the title, the conditions and the stride as attributes.
+
+    Raises:
+        InputError: the plan has another geometry than the stride, does not begin with its first step, or a leg cannot
+            reach its tip at time 0.
     """
-    typed("conditions", conditions, Conditions)
-    typed("stride", stride, Stride)
-    planned = one_start(typed("plan", plan, PlannedWalk), start)
+    planned = one_start(plan, start)
     if plan.geometry != stride.geometry:
-        raise InputError(f"the plan's lines are {plan.geometry}; expected those of the stride, {stride.geometry}")
+        raise InputError(f"plan has the geometry {plan.geometry}; expected that of the stride, {stride.geometry}")
     steps = len(plan.time)
-    if not (steps and np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0)):
-        raise InputError(
-            f"the plan's {steps} times are not those of its first steps; expected multiples of {stride.dt}"
-        )
-    if any(np.isnan(told).any() for told in (planned.x, planned.y, planned.velocity)):
-        raise InputError("plan: a walk of which no more is known from a fall on; expected a plan to its end")
+    if steps == 0 or not np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0):
+        raise InputError(f"plan has {steps} steps that do not begin at time 0; expected multiples of {stride.dt}")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
-    root = np.zeros((len(plan.time), ROOT_QPOS))
+    root = np.zeros((steps, ROOT_QPOS))
     root[:, 0] = np.cumsum(planned.velocity[:, 0]) * stride.dt
     root[:, 2] = conditions.standing_height + compiled.foot_radius
     root[:, 3] = 1.0
@@ -94,7 +146,7 @@ def record_plan(
     standing, stands = compiled.inverse(first)
     if not stands.all():
         leg = int(np.argmin(stands))
-        raise InputError(f"leg {LEGS[leg]} cannot reach its tip at time 0, {first[leg].round(3).tolist()} mm")
+        raise InputError(f"plan: leg {LEGS[leg]} cannot reach its tip at time 0, {first[leg].round(3).tolist()} mm")
     if not reachable.all():
         hold(joints, standing)
     return _dataset(
@@ -103,62 +155,76 @@ def record_plan(
         stride,
         title,
         planned_tip=root[:, None, :3] + tips,
-        qpos=np.concatenate([root, joints.reshape(len(joints), -1)], axis=1),
+        qpos=np.concatenate([root, joints.reshape(steps, -1)], axis=1),
         centre_of_mass=root[:, :3],
     )
 
 
 def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
-    """Write a recording as NetCDF with a checksum; the file appears whole or not at all.
+    """Write a recording as NetCDF.
 
     Raises:
-        InputError: it is no recording, see `check_recording`, or cannot be written.
+        InputError: the dataset is no recording, or cannot be written.
     """
-    _check(typed("recording", recording, xr.Dataset))
+    check_recording(recording)
     return write_netcdf(recording, path)
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
-    """Read a recording that `save_recording` wrote.
+    """Read a recording that `save_recording` wrote, also one of version 0.5.0.
 
     Raises:
-        InputError: it cannot be read, is damaged, or is no recording.
+        InputError: the file cannot be read, or is no recording.
     """
     recording = read_netcdf(path)
     try:
-        _check(recording)
+        check_recording(recording)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return recording
 
 
+def check_recording(recording: xr.Dataset) -> None:
+    """Raise InputError if a variable or an attribute of a recording is missing."""
+    physical = not MEASURED.keys().isdisjoint(recording.variables)
+    variables = TIMES | PLANNED | (MEASURED if physical else {})
+    attributes = ["title", *Conditions().settings(), *_stride_settings(Stride())]
+    missing = [name for name in variables if name not in recording.variables]
+    missing += [name for name in attributes if name not in recording.attrs]
+    if missing:
+        raise InputError(f"not a recording of hexmj: {', '.join(missing)} missing")
+
+
 def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Conditions:
-    """The conditions of a recorded walk of a body.
+    """Return the conditions of a recorded walk.
+
+    Args:
+        recording: of a walk of `body`.
+        body: description of the recorded body.
 
     Raises:
-        InputError: one that makes no sense, or the recording is of another body.
+        InputError: the recording is of another body, or has values that the body does not allow.
     """
-    if (name := recording.attrs.get("body")) != body.name:
-        raise InputError(f"the recording is of the body {name!r}, not of {body.name!r}; expected its own description")
-    if (found := recording.sizes["position"]) != (expected := ROOT_QPOS + len(body.joints)):
-        raise InputError(f"the recording has {found} positions; expected {expected} of the body {name!r}")
-    check_settings(recording)
-    told = {name: type(value)(recording.attrs[name]) for name, value in Conditions().values().items()}
-    return Conditions(body=body, **told)
+    name, positions = recording.attrs["body"], recording.sizes["position"]
+    if (name, positions) != (body.name, expected := ROOT_QPOS + len(body.joints)):
+        raise InputError(
+            f"the recording is of the body {name!r} with {positions} positions; expected {body.name!r}"
+            f" with {expected}. Pass the description of the recorded body as `body`."
+        )
+    defaults = Conditions().values()
+    return Conditions(body=body, **{name: type(value)(recording.attrs[name]) for name, value in defaults.items()})
 
 
-def _check(recording: xr.Dataset) -> None:
-    """Refuse what is no recording; conditions as far as the body's bounds are known."""
-    check_recording(recording)
-    if recording.attrs["body"] == STICK_INSECT.name:
-        recorded_conditions(recording)
+def _stride_settings(stride: Stride) -> dict[str, Any]:
+    """Return a stride as flat attributes."""
+    settings = asdict(stride)
+    return settings | {name: list(values) for name, values in settings.pop("geometry").items()}
 
 
 def _dataset(
     planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: np.ndarray
 ) -> xr.Dataset:
-    """A recording of a plan of one start and `values` by the names of their variables."""
-    typed("title", title, str)
+    """Build a recording from the plan of one start and further values by the names of their variables."""
     values |= {
         "time": planned.time,
         "seconds": planned.time / conditions.vp,
@@ -169,13 +235,17 @@ def _dataset(
         "planned_margin": walk_margin(planned)[:, 0],
         "planned_loss_time": loss_time(planned)[0],
     }
-    variables = {
-        name: (one.dimensions, values[name], {"units": one.units, "long_name": one.long_name})
-        for name, one in (TIMES | PLANNED | MEASURED).items()
-        if name in values
-    }
-    coords = {name: variables.pop(name) for name in TIMES} | {"leg": list(LEGS), "coordinate": list("xyz")}
-    return xr.Dataset(variables, coords, {"title": title, **conditions.settings(), **stride_settings(stride)})
+
+    def filled(table: dict[str, Variable]) -> dict[str, Any]:
+        return {
+            name: (row.dimensions, values[name], {"units": row.units, "long_name": row.long_name})
+            for name, row in table.items()
+            if name in values
+        }
+
+    coordinates = filled(TIMES) | {"leg": list(LEGS), "coordinate": list("xyz")}
+    attributes = {"title": title, **conditions.settings(), **_stride_settings(stride)}
+    return xr.Dataset(filled(PLANNED | MEASURED), coordinates, attributes)
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:

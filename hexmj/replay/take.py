@@ -1,4 +1,4 @@
-"""What a film shows of a recording: the measured walk of a physical insect, or the plan that a puppet shows."""
+"""The part of a recording that films and pages show: the measured walk, or the plan that a puppet shows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,15 +10,14 @@ from hexmj.bodies.ground import ground_level
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
-from hexmj.replay.recording import recorded_conditions
-from hexmj.replay.schema import check_recording
+from hexmj.replay.recording import check_recording, recorded_conditions
 from hexmj.rotations import heading, turned
 from hexmj.stability import support_polygon
 
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """The numbers of one recording, in memory; only steps with a pose, so none after a fall."""
+    """The numbers of one recording up to a fall, whose steps have no pose from then on."""
 
     title: str
     physical: bool
@@ -28,9 +27,9 @@ class Take:
     step: float
     """Duration of a step [s]."""
     begin: float
-    """When the first step begins [s]; above 0 in a part of a recording."""
+    """Begin of the first step [s]; above 0 in a part of a recording."""
     end: float
-    """When what was recorded ends [s], also beyond a fall."""
+    """End of the recording [s], which may be after a fall."""
     velocity: np.ndarray
     """(step,) V_r as a fraction of V_p."""
     margin: np.ndarray
@@ -40,34 +39,38 @@ class Take:
     feet: np.ndarray
     """(step, leg, 2) feet in the world [mm]."""
     planned_tip: np.ndarray
-    """(step, leg, 3) planned tips in the world [mm]."""
+    """(step, leg, 3) commanded tips in the world [mm]."""
     centre_of_mass: np.ndarray
     """(step, 3) in the world [mm]."""
     qpos: np.ndarray
-    """(step, position) of the insect."""
+    """(step, position) of the body."""
     lost: float
     """First loss of static stability [s], inf for none."""
     fell: float
     """Fall [s], inf for none."""
     part: str
-    """Part of the trunk that touched the ground first, where `fell` is finite."""
+    """Part of the trunk that touched the ground first; "" without a fall."""
 
     @classmethod
     def of(cls, recording: xr.Dataset, body: Body = STICK_INSECT) -> "Take":
-        """Read a recording of a body."""
-        qpos = recording["qpos"].values
-        shown = slice(np.isfinite(qpos).all(axis=1).sum())
-        if shown.stop == 0:
+        """Read a recording of a body.
+
+        Raises:
+            InputError: the dataset is no recording, is of another body, or holds no pose.
+        """
+        check_recording(recording)
+        conditions = recorded_conditions(recording, body)
+        poses = int(np.isfinite(recording["qpos"].values).all(axis=1).sum())
+        if poses == 0:
             raise InputError(f"the recording {recording.attrs['title']!r} holds no pose; expected at least one")
         physical = "measured_stance" in recording
         kind = "measured" if physical else "planned"
-        few, conditions = recording.isel(step=shown), recorded_conditions(recording, body)
-        if physical and not -1 <= (part := int(recording["fall_part"])) < len(body.trunk):
-            raise InputError(f"a recording has fall_part = {part}; expected 0 to {len(body.trunk) - 1}, or -1 for none")
-        centre, vp = few["centre_of_mass"].values, conditions.vp
+        shown, vp = recording.isel(step=slice(poses)), conditions.vp
+        centre, qpos = shown["centre_of_mass"].values, shown["qpos"].values
         step = float(recording.attrs["dt"]) / vp
-        ahead = few[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
-        seen = np.stack([ahead, few[f"{kind}_y"].values], axis=-1)
+        ahead = shown[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
+        seen = np.stack([ahead, shown[f"{kind}_y"].values], axis=-1)
+        part = int(recording["fall_part"]) if physical else -1
         return cls(
             title=recording.attrs["title"],
             physical=physical,
@@ -75,49 +78,56 @@ class Take:
             step=step,
             begin=float(recording["seconds"][0]) - step,
             end=float(recording["seconds"][-1]),
-            velocity=few["velocity"].values,
-            margin=few[f"{kind}_margin"].values,
-            stance=few[f"{kind}_stance"].values.astype(bool),
-            feet=centre[:, None, :2] + turned(seen, heading(qpos[shown, 3:7])),
-            planned_tip=few["planned_tip"].values,
+            velocity=shown["velocity"].values,
+            margin=shown[f"{kind}_margin"].values,
+            stance=shown[f"{kind}_stance"].values.astype(bool),
+            feet=centre[:, None, :2] + turned(seen, heading(qpos[:, 3:7])),
+            planned_tip=shown["planned_tip"].values,
             centre_of_mass=centre,
-            qpos=qpos[shown],
+            qpos=qpos,
             lost=float(recording[f"{kind}_loss_time"]) / vp,
             fell=float(recording["fall_time"]) / vp if physical else np.inf,
-            part=body.trunk[int(recording["fall_part"])] if physical else "",
+            part=body.trunk[part] if part >= 0 else "",
         )
 
     def row(self, seconds: float) -> int:
-        """The step whose end is nearest to a time; the first one before the beginning, the last one after the end."""
+        """Index of the step whose end is nearest to a time [s], limited to the steps with a pose."""
         return int(np.clip(round((seconds - self.begin) / self.step) - 1, 0, len(self.qpos) - 1))
 
+    def support(self, row: int) -> tuple[np.ndarray, float]:
+        """Support polygon at the end of a step and the level at which it is drawn, see `support_on_ground`."""
+        return support_on_ground(self.conditions, self.feet[row], self.stance[row], self.centre_of_mass[row])
 
-def takes_of(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> list[Take]:
-    """Read recordings of a body.
+
+def takes_of(recordings: Sequence[xr.Dataset], body: Body, most: int) -> list[Take]:
+    """Read one to `most` recordings of a body.
 
     Raises:
-        InputError: what is no recording, holds no pose, or is of another body.
+        InputError: too many recordings or none, or one that cannot be shown.
     """
-    try:
-        for recording in recordings:
-            check_recording(recording)
-        return [Take.of(recording, body) for recording in recordings]
-    except (OSError, RuntimeError) as error:  # of a file opened by xarray
-        raise InputError(f"a recording is damaged ({error}); expected one as `hexmj walk` writes it") from None
+    if not 1 <= len(recordings) <= most:
+        raise InputError(f"{len(recordings)} recordings; expected 1 to {most}")
+    return [Take.of(recording, body) for recording in recordings]
 
 
 def margin_in_words(margin: float) -> str:
-    """A stability margin [mm] as films and views tell it; it is infinite where no foot stands."""
+    """Return a stability margin [mm] as a text; it is infinite if no foot stands."""
     return f"margin {margin:+.1f} mm" if np.isfinite(margin) else "no foot stands"
 
 
 def support_on_ground(
     conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Corners of the support polygon, (corner, 2), none without a foot, and the height at which it is drawn: that of
-    the highest ground below it.
+    """Return the support polygon and the level at which it is drawn.
 
-    Of feet, (leg, 2), as far as they stand, (leg,), and a centre of mass, (3,), in the world; all [mm].
+    Args:
+        conditions: which tell the ground.
+        feet: in the world, (leg, 2) [mm].
+        stance: which of them stand, (leg,).
+        centre: centre of mass in the world, (3,) [mm].
+
+    Returns:
+        Corners, (corner, 2), none without a standing foot, and the height of the highest ground below them [mm].
     """
     corners = support_polygon(feet, stance)
     below = np.vstack([corners, centre[:2]])

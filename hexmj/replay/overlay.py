@@ -1,4 +1,4 @@
-"""What is drawn on the frames of a film: a caption above, a scale, and a footfall diagram that grows below."""
+"""Overlay of a film: a caption above, a scale, and a footfall diagram that grows below."""
 
 from functools import cache, lru_cache
 from math import floor
@@ -10,20 +10,20 @@ from matplotlib.ft2font import FT2Font
 from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
-from hexmj.replay.film.film import Film
+from hexmj.replay.film import Film
 from hexmj.replay.take import Take, margin_in_words
 
 INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
 GREEN, RED = (0, 112, 72), (190, 56, 0)
-"""Of what is stable and what is not; their words and signs differ, too."""
+"""Colours of stable and unstable postures, whose signs and texts differ too."""
 
 MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
 CAPTION, DIAGRAM = 48, 80
-"""Heights on a frame of 640 x 480 pixels, to which all sizes here refer.  The insect's cameras leave them free."""
+"""Heights on a frame of 640 x 480 pixels, to which all sizes here refer. The insect's cameras keep them free."""
 
 BAR = 110
-"""Longest bar of the scale."""
+"""Longest bar of the scale [pixels]."""
 
 
 class Overlay:
@@ -40,37 +40,40 @@ class Overlay:
         self._full = self._bars(self._blank.copy())
 
     def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
-        """Draw on a frame of the scene, (height, width, 3), the state at the end of step `row`, the clock [s] and the
-        scale at the centre of mass [pixels/mm], 0 where that is not ahead of the camera."""
-        now = self._column(seconds)
+        """Draw on a frame of the scene.
+
+        Args:
+            frame: (height, width, 3), changed in place.
+            row: step whose end is shown.
+            seconds: on the clock [s].
+            scale: at the centre of mass [pixels/mm]; 0 if it is not ahead of the camera.
+        """
+        now, cursor = self._column(seconds), self._pixels(1)
         diagram = frame[self._bottom :]
         diagram[:] = self._blank
         diagram[:, :now] = self._full[:, :now]
-        cursor = self._pixels(1)
         diagram[: self._row(6), now : now + cursor] = INK
         frame[: self._top] = self._caption(frame[: self._top], row, seconds)
         strip = frame[self._bottom - self._pixels(18) : self._bottom]
         strip[:] = self._strip(strip, scale)
 
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
-        """The scale, if there is one, and what the diagram's bars are."""
+        """Draw the scale, a bar of a round length at the centre of mass, and the legend of the diagram."""
         image, size, edge = Image.fromarray(background), self._pixels(11), self._pixels(10)
+        middle = image.height // 2
         if scale > 0:
-            self._draw_scale(image, scale, edge, size)
+            draw, length = ImageDraw.Draw(image), _round(self._pixels(BAR) / scale)
+            end = edge + round(length * scale)
+            draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
+            for x in (edge, end):
+                draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
+            _write(image, (end + self._pixels(5), middle), f"{length:g} mm", size)
         legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
-        _write(image, (image.width - edge, image.height // 2), legend, size, anchor="rm")
+        _write(image, (image.width - edge, middle), legend, size, anchor="rm")
         return np.asarray(image)
 
-    def _draw_scale(self, image: Image.Image, scale: float, edge: int, size: int) -> None:
-        """A bar of a round length, as long as it would be at the centre of mass."""
-        draw, length, middle = ImageDraw.Draw(image), _round(self._pixels(BAR) / scale), image.height // 2
-        end = edge + round(length * scale)
-        draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
-        for x in (edge, end):
-            draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
-        _write(image, (end + self._pixels(5), middle), f"{length:g} mm", size)
-
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
+        """Draw title and state in the first line; time, velocities and margin in the second."""
         take, size, edge = self._take, self._pixels(15), self._pixels(10)
         image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
         first, second = round(0.29 * self._top), round(0.75 * self._top)
@@ -78,58 +81,55 @@ class Overlay:
         free = image.width - 3 * edge - _font(size, bold=True).getlength(state)
         _write(image, (edge, first), _shortened(take.title, _font(size, bold=True), free), size, bold=True)
         _write(image, (image.width - edge, first), state, size, colour, "rm", bold=True)
-        told = self._not_told(seconds)
-        known = seconds < take.fell and not told
-        margin = margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown"
-        fields = (
-            f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
-            "V = ?" if told else f"V = {take.velocity[row]:.2f}",
-            f"Vₚ = {take.conditions.vp:g} mm/s",
-            margin,
-        )
-        for place, text in zip((0.0, 0.51, 0.615, 0.79), fields, strict=True):
+        outside = self._outside(seconds)
+        known = seconds < take.fell and not outside
+        fields = {
+            0.0: f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
+            0.51: "V = ?" if outside else f"V = {take.velocity[row]:.2f}",
+            0.615: f"Vₚ = {take.conditions.vp:g} mm/s",
+            0.79: margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown",
+        }
+        for place, text in fields.items():
             _write(image, (edge + place * (image.width - 2 * edge), second), text, self._pixels(12))
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
-        """What is now, in its colour, and what was before."""
+        """Return the state of the body as a text, and its colour."""
         take, lost = self._take, f"{1000 * self._take.lost:.0f} ms"
         if seconds >= take.fell:
             return f"■ fell on {take.part} at {1000 * take.fell:.0f} ms", RED
-        if told := self._not_told(seconds):
-            return told, FAINT
+        if outside := self._outside(seconds):
+            return outside, FAINT
         if take.margin[row] <= 0:
             return f"▲ unstable, first at {lost}" if seconds >= take.lost else "▲ unstable", RED
         return f"● stable, but lost at {lost}" if seconds >= take.lost else "● stable", GREEN
 
-    def _not_told(self, seconds: float) -> str:
-        """What to say where the recording has not begun or is over, as beside a longer one; else nothing."""
+    def _outside(self, seconds: float) -> str:
+        """Return a text for times before or after the recording, as beside a longer one; otherwise ""."""
         take = self._take
         if seconds < take.begin - take.step / 2:
             return f"recorded from {1000 * take.begin:.0f} ms"
         return f"recorded until {1000 * take.end:.0f} ms" if seconds > take.end + take.step / 2 else ""
 
     def _axes(self, width: int, height: int) -> np.ndarray:
-        """The diagram without bars, (height, width, 3)."""
+        """Return the diagram without bars, (height, width, 3)."""
         image = Image.new("RGB", (width, height), PAPER)
-        draw = ImageDraw.Draw(image)
-        font = _font(self._pixels(10))
+        draw, font, label = ImageDraw.Draw(image), _font(self._pixels(10)), self._left - self._pixels(6)
         for leg, name in enumerate(LEGS):
-            middle = (self._row(leg) + self._row(leg + 1)) / 2
-            draw.text((self._left - self._pixels(6), middle), name, INK, font, anchor="rm")
+            draw.text((label, (self._row(leg) + self._row(leg + 1)) / 2), name, INK, font, anchor="rm")
             draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
         baseline = (self._row(6) + height) / 2
-        draw.text((self._left - self._pixels(6), baseline), "ms", FAINT, font, anchor="rm")
+        draw.text((label, baseline), "ms", FAINT, font, anchor="rm")
         for milliseconds in _ticks(1000 * self._begin, 1000 * self._end):
             x = self._column(milliseconds / 1000)
             draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
             half = draw.textlength(f"{milliseconds:g}", font) / 2
-            if self._left - self._pixels(6) < x - half and x + half < width:
+            if label < x - half and x + half < width:
                 draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
         return np.asarray(image)
 
     def _bars(self, axes: np.ndarray) -> np.ndarray:
-        """The whole diagram, on its axes."""
+        """Return the whole diagram, drawn on its axes."""
         take = self._take
         columns = np.arange(self._left, self._right)
         part = (columns - self._left + 0.5) / (self._right - self._left)
@@ -156,18 +156,18 @@ class Overlay:
         return self._pixels(3 + 10 * leg)
 
     def _pixels(self, size: float) -> int:
-        """A length on a frame of 640 x 480, in pixels of this one."""
+        """Convert a length on a frame of 640 x 480 pixels to pixels of this frame."""
         return max(1, round(size * self._scale))
 
 
 def lacking(title: str) -> str:
-    """The characters of a title, each once, for which a box stands, since the captions' font has none of them."""
+    """Return the characters of a title that the font of the captions lacks."""
     known = FT2Font(_font_file(bold=True)).get_charmap()
-    return "".join(dict.fromkeys(one for one in title if ord(one) not in known))
+    return "".join(dict.fromkeys(character for character in title if ord(character) not in known))
 
 
 def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
-    """As much of a text as fits into a width [pixels]."""
+    """Return as much of a text as fits into a width [pixels]."""
     if font.getlength(text) <= width:
         return text
     while text and font.getlength(f"{text}…") > width:
@@ -176,17 +176,17 @@ def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
 
 
 def _round(most: float) -> float:
-    """The greatest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2 ...) that is not above `most`."""
+    """Return the greatest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2 ...) that is not above `most`."""
     power = 10.0 ** np.floor(np.log10(most))
     return max(float(power * part) for part in (1, 2, 5) if power * part <= most)
 
 
 def _ticks(begin: float, end: float) -> np.ndarray:
-    """Round numbers from `begin` to `end`, five to twelve of them."""
+    """Return round numbers from `begin` to `end`, five to twelve of them."""
     span = end - begin
     power = 10.0 ** np.floor(np.log10(span))
     step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if span <= 11 * power * part)
-    return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # never from -0
+    return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # + 0.0: never -0
 
 
 def _write(
@@ -199,7 +199,7 @@ def _write(
     *,
     bold: bool = False,
 ) -> None:
-    """Write a text as `ImageDraw.text` does; most of a caption is the same on the next frame."""
+    """Write a text as `ImageDraw.text` does, with a cache: most of a caption is the same on the next frame."""
     x, y = floor(place[0]), floor(place[1])
     mask, (left, top) = _mask(text, size, anchor, place[0] - x, place[1] - y, bold)
     image.paste(colour, (x + left, y + top), mask)
@@ -207,7 +207,7 @@ def _write(
 
 @lru_cache(64)
 def _mask(text: str, size: int, anchor: str, x: float, y: float, bold: bool) -> tuple[Image.Image, tuple[int, int]]:
-    """A text's opacity beside an anchor that lies a part of a pixel (x, y) off the grid, and where its corner lies."""
+    """Return a text's opacity, for an anchor at a fraction (x, y) of a pixel, and the place of its corner."""
     font = _font(size, bold)
     left, top, right, bottom = font.getbbox(text, anchor=anchor)
     left, top = floor(left) - 2, floor(top) - 2

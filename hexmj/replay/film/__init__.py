@@ -1,1 +1,0 @@
-"""Gait videos from recordings."""

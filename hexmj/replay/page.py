@@ -1,0 +1,151 @@
+"""One HTML file that plays recordings. It contains everything it needs and loads nothing."""
+
+import base64
+import json
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import xarray as xr
+
+from hexmj.bodies.mjcf import compile_body
+from hexmj.body import STICK_INSECT, Body
+from hexmj.conditions import Conditions, unusual
+from hexmj.errors import InputError
+from hexmj.files import write_text
+from hexmj.legs import LEGS
+from hexmj.rendering.shapes import body_shape, ground_shape
+from hexmj.replay.take import Take, takes_of
+
+MOST_RECORDINGS = 2
+"""Most recordings side by side."""
+
+POSE_INTERVAL = 0.005
+"""Time between two poses [s]."""
+
+MOST_POSES = 4000
+"""Most poses in a page; those of a longer walk are farther apart."""
+
+PLANNED = {"seconds": "f8", "velocity": "f4", "planned_margin": "f8", "planned_stance": "u1"}
+MEASURED = {"measured_margin": "f8", "measured_stance": "u1"}
+SHAPE = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
+"""Arrays of a recording, of a physical walk and of a shape in a page, with their types."""
+
+
+def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STICK_INSECT) -> Path:
+    """Write one recording, or two side by side with one clock, as a page that plays in any current browser.
+
+    The page draws the walk in 3D with its support polygon, centre of mass, planned and measured tips, and beside it the
+    footfall diagram and the stability margin with the recording's own values.
+
+    Args:
+        recordings: one or two.
+        path: of the HTML file.
+        body: description of the recorded body.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no recording or too many, another suffix, a recording without a pose or of another body.
+    """
+    if Path(path).suffix != ".html":
+        raise InputError(f"path = {path}; expected a name with .html")
+    return write_text(path, page_text(recordings, body))
+
+
+def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:
+    """Return the page of one or two recordings as a text, see `page`."""
+    takes = takes_of(recordings, body, MOST_RECORDINGS)
+    data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
+    parts = {"STYLE": _asset("page.css"), "SCRIPT": _asset("page.js"), "RECORDINGS": _script_json(data)}
+    text = _asset("page.html")
+    for name, part in parts.items():
+        before, after = text.split(f"<!--{name}-->")
+        text = before + part + after
+    return text
+
+
+def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
+    """Return a recording as JSON: every step's margins and times as float64, some steps' poses as float32."""
+    conditions, body = take.conditions, take.conditions.body
+    compiled = compile_body(conditions)
+    model = compiled.model
+    every = max(1, round(POSE_INTERVAL / take.step), -(-len(take.qpos) // MOST_POSES))
+    rows = np.unique(np.append(np.arange(0, len(take.qpos), every), len(take.qpos) - 1))
+    poses, tips = _poses(model, body, take.qpos[rows])
+    polygons, levels = zip(*(take.support(row) for row in rows), strict=True)
+    padded = [np.pad(corners, ((0, 6 - len(corners)), (0, 0)), constant_values=np.nan) for corners in polygons]
+    return {
+        "title": take.title,
+        "physical": take.physical,
+        "conditions": _conditions_text(conditions, take.physical),
+        "legs": LEGS,
+        "vp": conditions.vp,
+        "step": take.step,
+        "happened": _happened(take),
+        "lost": take.lost if np.isfinite(take.lost) else None,
+        "fell": take.fell if np.isfinite(take.fell) else None,
+        "part": take.part,
+        "plane": float(model.geom(body.ground).pos[2]),
+        "gap": conditions.ground == "gap",
+        "marks": {"tip": body.marks.tip, "outline": body.marks.outline, "centre": body.marks.rim[0]},
+        **_packed_parts(recording, PLANNED),
+        "rows": _packed(rows, "i4"),
+        "poses": _packed(poses, "f4"),
+        "tips": _packed(tips, "f4"),
+        "planned_tips": _packed(take.planned_tip[rows], "f4"),
+        "centre_of_mass": _packed(take.centre_of_mass[rows], "f4"),
+        "polygon": _packed(padded, "f4"),
+        "level": _packed(levels, "f4"),
+        "body": _packed_parts(body_shape(model), SHAPE),
+        "ground": _packed_parts(ground_shape(compiled), SHAPE),
+    } | (_packed_parts(recording, MEASURED) if take.physical else {})
+
+
+def _conditions_text(conditions: Conditions, physical: bool) -> str:
+    """Name the body, V_p and the conditions that differ from the defaults."""
+    values, name = conditions.values(), conditions.body.name.replace("_", " ")
+    shown = f"{name} in physics" if physical else f"the plan, shown by a {name} that follows it"
+    changed = (f"{name.replace('_', ' ')} {values[name]}" for name in unusual(values) if name != "vp")
+    return ", ".join([shown, f"V_p = {conditions.vp:g} mm/s", *changed])
+
+
+def _happened(take: Take) -> str:
+    """Tell when stability was lost and when the body fell, as far as the recording lasts."""
+    events = (take.lost, "stability first lost"), (take.fell, f"fell on {take.part.replace('_', ' ')}")
+    texts = [f"{event} at {1000.0 * seconds:.0f} ms" for seconds, event in events if seconds <= take.end]
+    return ", ".join(texts) or f"stability {'never lost' if take.lost == np.inf else 'not lost in this part'}"
+
+
+def _poses(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and quaternions of all bodies, (pose, body, 7), and the feet, (pose, leg, 3), in the world [mm]."""
+    data, feet = mujoco.MjData(model), [model.site(foot).id for foot in body.feet]
+    poses, tips = np.empty((len(qpos), model.nbody, 7)), np.empty((len(qpos), 6, 3))
+    for n, data.qpos[:] in enumerate(qpos):
+        mujoco.mj_kinematics(model, data)
+        poses[n, :, :3], poses[n, :, 3:], tips[n] = data.xpos, data.xquat, data.site_xpos[feet]
+    return poses, tips
+
+
+def _packed(values: Any, kind: str) -> dict[str, Any]:
+    """Return an array as JSON: its type, little-endian, its shape, and its bytes in base64."""
+    array = np.ascontiguousarray(values, dtype=f"<{kind}")
+    return {"type": kind, "shape": array.shape, "bytes": base64.b64encode(array.tobytes()).decode()}
+
+
+def _packed_parts(source: Any, kinds: dict[str, str]) -> dict[str, Any]:
+    return {name: _packed(getattr(source, name), kind) for name, kind in kinds.items()}
+
+
+def _script_json(value: object) -> str:
+    """Return JSON that neither ends a script of HTML nor begins a comment."""
+    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
+    return json.dumps(value, allow_nan=False).translate(str.maketrans(escapes))
+
+
+def _asset(name: str) -> str:
+    return files("hexmj.replay").joinpath("assets", name).read_text(encoding="utf-8")

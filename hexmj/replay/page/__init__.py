@@ -1,1 +1,0 @@
-"""Recordings as one HTML file that anybody can open and play."""

@@ -1,0 +1,166 @@
+"""Films of recordings: the body, its support polygon, a caption and a footfall diagram."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from warnings import warn
+
+import mujoco
+import numpy as np
+import xarray as xr
+
+from hexmj.bodies.mjcf import compile_body
+from hexmj.body import STICK_INSECT, Body
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError, RenderingError
+from hexmj.files import replacing
+from hexmj.progress import Progress, shown
+from hexmj.rendering import gl
+from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.replay.film import ENCODINGS, MOST_PANELS, Film, encoder, missing_encoder
+from hexmj.replay.overlay import Overlay, lacking
+from hexmj.replay.take import Take, takes_of
+
+BRIGHTER = 1.2
+"""Factor of the ground's colour in films without shadows, which MuJoCo lights less."""
+
+IN_A_ROW = 3
+"""Most recordings in one row."""
+
+GROUND = "ground"
+"""Name of the ground's texture, if the MJCF has one."""
+
+
+def render(
+    recordings: Sequence[xr.Dataset],
+    path: Path | str,
+    film: Film | None = None,
+    progress: Progress | bool | None = None,
+    *,
+    body: Body = STICK_INSECT,
+) -> int:
+    """Film one recording, or up to six side by side with one clock. A body that fell stays in its last pose.
+
+    Args:
+        recordings: one to six; four or more stand in two rows.
+        path: of the film, with the suffix .mp4 or .gif.
+        film: camera, size, speed and quality.
+        progress: True for a bar, or a function that receives the fraction done since its last call.
+        body: description of the recorded body.
+
+    Warns:
+        UserWarning: a title has characters that the font of the captions, DejaVu Sans, lacks.
+
+    Returns:
+        Number of frames: the time from the first beginning to the last end, at `Film.fps`.
+
+    Raises:
+        InputError: no recording or too many, another suffix, a recording without a pose or of another body.
+        RenderingError: nothing can be rendered on this machine, or ffmpeg is missing or fails.
+    """
+    film, path = film or Film(), Path(path)
+    if path.suffix not in ENCODINGS:
+        raise InputError(f"path = {path}; expected a name with {' or '.join(ENCODINGS)}")
+    film.check_camera(body)
+    film.check_format(path.suffix.removeprefix("."))
+    takes = takes_of(recordings, body, MOST_PANELS)
+    if reason := missing():
+        raise RenderingError(reason)
+    begin, end = min(take.begin for take in takes), max(take.end for take in takes)
+    frames = max(1, round((end - begin) * film.slow_motion * film.fps))
+    times = begin + np.arange(frames) / (film.fps * film.slow_motion)
+    for title in dict.fromkeys(take.title for take in takes):
+        if characters := lacking(title):
+            warn(f"the film shows boxes for {characters} in the title {title!r}; its font lacks them", stacklevel=2)
+    overlays = [Overlay(take, film, begin, end) for take in takes]
+    with shown(progress, "rendering") as advance, replacing(path) as part:
+        _write(takes, overlays, part, times, film, advance)
+    return frames
+
+
+def missing() -> str | None:
+    """Return why no film can be made on this machine and what to install, or None."""
+    return gl.missing() or missing_encoder()
+
+
+def _write(
+    takes: Sequence[Take],
+    overlays: Sequence[Overlay],
+    path: Path,
+    times: np.ndarray,
+    film: Film,
+    progress: Progress | None,
+) -> None:
+    """Film takes side by side at times on their clock, (frame,) [s]. A second thread draws overlays and encodes."""
+    rows = 1 if len(takes) <= IN_A_ROW else 2
+    columns = -(-len(takes) // rows)
+    picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
+    panels = [panel for row in np.split(picture, rows) for panel in np.split(row, columns, axis=1)][: len(takes)]
+    with ExitStack() as opened:
+        stages: dict[Conditions, tuple[gl.Renderer, mujoco.MjData]] = {}
+        for conditions in dict.fromkeys(take.conditions for take in takes):
+            model = _filmed_body(film, conditions)
+            renderer = opened.enter_context(gl.renderer(model, film.height, film.width))
+            stages[conditions] = renderer, mujoco.MjData(model)
+        height, width, _ = picture.shape
+        add = opened.enter_context(encoder(path, height, width, film.fps))
+        finishing = opened.enter_context(ThreadPoolExecutor(1))
+
+        def finish(views: Sequence[tuple[np.ndarray, float]], seconds: float) -> None:
+            for take, overlay, panel, (view, scale) in zip(takes, overlays, panels, views, strict=True):
+                panel[:] = view
+                overlay.draw(panel, take.row(seconds), seconds, scale)
+            add(picture)
+
+        finished = finishing.submit(lambda: None)
+        for seconds in times.tolist():
+            views = [_view(stages[take.conditions], film.camera, take, take.row(seconds)) for take in takes]
+            finished.result()
+            finished = finishing.submit(finish, views, seconds)
+            if progress:
+                progress(1 / len(times))
+        finished.result()
+
+
+def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
+    """Return a body on its ground, with the size and quality of a film."""
+    model = compile_body(conditions).model
+    model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
+    if film.quality == "high":
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = 4096, 4
+        return model
+    model.vis.quality.offsamples = 0
+    model.light_castshadow[:] = False
+    if (i := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, GROUND)) >= 0:
+        ground = model.texture(i)
+        begin = int(ground.adr[0])
+        colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
+        colours[:] = np.minimum(BRIGHTER * colours, 255)
+    return model
+
+
+def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row: int) -> tuple[np.ndarray, float]:
+    """Render the end of step `row`, (height, width, 3), and return its pixels per mm at the centre of mass."""
+    renderer, data = stage
+    data.qpos[:] = take.qpos[row]
+    mujoco.mj_kinematics(renderer.model, data)
+    mujoco.mj_comPos(renderer.model, data)
+    mujoco.mj_camlight(renderer.model, data)
+    renderer.update_scene(data, camera)
+    marks, stable, centre = take.conditions.body.marks, bool(take.margin[row] > 0.0), take.centre_of_mass[row]
+    corners, level = take.support(row)
+    mark_support(renderer.scene, marks, corners, level, stable)
+    mark_centre_of_mass(renderer.scene, marks, centre, level, stable)
+    mark_planned_tips(renderer.scene, marks, take.planned_tip[row])
+    return renderer.render(), _pixels_per_mm(renderer, centre)
+
+
+def _pixels_per_mm(renderer: mujoco.Renderer, point: np.ndarray) -> float:
+    """Scale across the view at a point, (3,) [mm]; 0 if the point is not ahead of the camera."""
+    camera = renderer.scene.camera[0]
+    ahead = float(np.dot(point - camera.pos, camera.forward))
+    if ahead <= camera.frustum_near:
+        return 0.0
+    distance = camera.frustum_near if camera.orthographic else ahead
+    return renderer.height * camera.frustum_near / ((camera.frustum_top - camera.frustum_bottom) * distance)
