@@ -1,5 +1,6 @@
 """The command line: the list of commands, errors as one line, and exit codes."""
 
+import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
