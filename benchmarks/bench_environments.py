@@ -13,7 +13,7 @@ from hexmj.environments.gym import StickInsect
 from hexmj.environments.task import Task
 from hexmj.environments.vector import StickInsects
 from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 
 VELOCITY, STEPS = 0.1, 1000  # nobody falls, so both loops take the same steps
 MANY, FEW_STEPS = 1000, 100

@@ -11,10 +11,9 @@ from mujoco.batch import Batch
 from hexmj import LDVS, SensoryFeedback, compare, draw_starts
 from hexmj.controllers.checked_plans import begin
 from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.backend import STATE
-from hexmj.physics.callbacks import STOPPED_CLOCK
+from hexmj.physics.engine import STATE, STOPPED_CLOCK
 from hexmj.physics.foot_path import TipTargets
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.settle import Settled, settle
 
 FLYGYM = Path(__file__).parents[1] / ".venv-flygym" / "bin" / "python"
 VELOCITY, DURATION = 0.1, 20.0  # nobody falls, so both loops take the same steps

@@ -26,7 +26,7 @@ from hexmj.bodies.mjcf import compile_body
 from hexmj.files import write_text
 from hexmj.io import json_text
 from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.settle import Settled, settle
 from hexmj.stats import wilson_interval
 
 VELOCITY, DURATION = 0.5, 40.0

@@ -5,7 +5,7 @@ import numpy as np
 import hexmj
 from hexmj.controllers.losses import planned_losses
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.studies.disturbed_walks import Disturbed, collect_postures, disturbance_of, find_stable_starts
 
 V, STARTS = 0.6, 12

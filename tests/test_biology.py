@@ -15,8 +15,8 @@ from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
 from hexmj.body import STICK_INSECT
 from hexmj.controllers.checked_plans import begin
 from hexmj.legs import MIRROR
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import Settled, Settling
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import Settled, Settling
 from hexmj.studies.biology import (
     ANIMALS,
     MEASURED,

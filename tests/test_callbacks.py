@@ -16,9 +16,9 @@ from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError, SimulationError
-from hexmj.physics.callbacks import CHANGING, STOPPED_CLOCK, UNLOGGED
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import settle
+from hexmj.physics.engine import CHANGING, STOPPED_CLOCK, UNLOGGED
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 
 

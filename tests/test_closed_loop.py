@@ -5,14 +5,15 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import hexmj
-from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.feedback import SensedPlan
+from hexmj.controllers.protocol import Sensed
 from hexmj.environments import dm
 from hexmj.legs import MIRROR
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
-from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes
-from hexmj.physics.settling import settle
+from hexmj.physics.pushes import Push
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.rotations import heading, rotated, turned
 
 LDVS, UNCOORDINATED = hexmj.LDVS, hexmj.UNCOORDINATED

@@ -20,7 +20,7 @@ from hexmj import (
 )
 from hexmj.measures import cells
 from hexmj.measures.compare import Comparison
-from hexmj.physics import settling
+from hexmj.physics import settle as settling
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.static_limit import StaticLimit

@@ -8,10 +8,10 @@ import numpy as np
 
 import hexmj
 from hexmj.conditions import Conditions
-from hexmj.physics.backend import AFTER, MujocoBatch
-from hexmj.physics.drive import drive
-from hexmj.physics.effort import EffortSoFar
-from hexmj.physics.settling import settle
+from hexmj.physics.engine import STATE_BITS, MujocoBatch
+from hexmj.physics.outcomes import EffortSoFar
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.timing import Stride
 
 ONLY = np.array([0])
@@ -49,7 +49,7 @@ def test_the_torque_is_the_one_that_moves_the_masses() -> None:
     batch, data = MujocoBatch(compiled, 1, 1), mujoco.MjData(model)
     batch.put(ONLY, settled.state)
     seen = batch.roll(ONLY, control[np.newaxis], 1)
-    mujoco.mj_setState(model, data, settled.state[0], AFTER)
+    mujoco.mj_setState(model, data, settled.state[0], STATE_BITS)
     moving, masses = [], np.empty((model.nv, model.nv))
     for row in control:
         data.ctrl[:] = row

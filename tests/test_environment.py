@@ -22,8 +22,8 @@ from hexmj.environments import dm
 from hexmj.errors import InputError, SimulationError
 from hexmj.legs import CENTRED, FIG1, LEGS
 from hexmj.measures.physical import physical_walk
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import settle
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride

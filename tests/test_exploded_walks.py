@@ -14,12 +14,12 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import divergence
-from hexmj.physics.backend import Diverged
-from hexmj.physics.divergence import walk_error
-from hexmj.physics.drive import Chunk, Push, drive
-from hexmj.physics.explosions import MOST_ENERGY, explosion
+from hexmj.physics.divergence import MOST_ENERGY, explosion
+from hexmj.physics.engine import Diverged, walk_error
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.pushes import Push
+from hexmj.physics.rollout import Chunk, drive
+from hexmj.physics.settle import Settled, settle
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import every_case
 from tiers import few_of

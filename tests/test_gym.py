@@ -21,7 +21,7 @@ from hexmj.environments import IDS, dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError, SimulationError
-from hexmj.physics import settling
+from hexmj.physics import settle as settling
 from hexmj.timing import Stride
 from plain_observations import plain_observations, plain_rewards
 

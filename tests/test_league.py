@@ -14,7 +14,7 @@ from hexmj.errors import InputError
 from hexmj.measures.figures import rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.plain import plain
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from hexmj.conditions import Conditions
 from hexmj.physics.outcomes import _count_misses, _percentile, _scan, _Sums
-from hexmj.physics.sensing import Senses
-from hexmj.physics.settling import settle
+from hexmj.physics.rollout import Senses
+from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 
 STILL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -20,8 +20,8 @@ from hexmj.controllers.conformance import check_controller
 from hexmj.gaits import CYCLES, limit_gait
 from hexmj.measures.kinematic import KinematicFlss
 from hexmj.measures.physical import PhysicalWalk
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import settle
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
 <<<<<<< HEAD

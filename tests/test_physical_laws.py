@@ -17,12 +17,12 @@ from hexmj.legs import MIRROR
 from hexmj.measures.compare import physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
-from hexmj.physics import chunks as chunks_module
-from hexmj.physics.backend import STATE
-from hexmj.physics.drive import drive
-from hexmj.physics.orders import OrdersFromPlan
+from hexmj.physics import rollout as chunks_module
+from hexmj.physics.engine import STATE
+from hexmj.physics.foot_path import OrdersFromPlan
 from hexmj.physics.outcomes import TOPPLED
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import Settled, settle
 from hexmj.rotations import heading, rotated, turned
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts

@@ -21,12 +21,12 @@ from hexmj.legs import MIRROR
 from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
-from hexmj.physics.backend import AFTER, Diverged, MujocoBatch
-from hexmj.physics.divergence import replay, save_state, walk_error
-from hexmj.physics.drive import drive
-from hexmj.physics.orders import OrdersFromPlan
+from hexmj.physics.divergence import replay, save_state
+from hexmj.physics.engine import STATE_BITS, Diverged, MujocoBatch, walk_error
+from hexmj.physics.foot_path import OrdersFromPlan
 from hexmj.physics.outcomes import Outcomes
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import Settled, settle
 from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
@@ -265,7 +265,7 @@ def test_what_a_body_shows_where_it_stands_is_mujocos_own(settled):
     batch, data, ids = MujocoBatch(settled.compiled, 24, 1), mujoco.MjData(model), np.arange(24)
     batch.stand(ids, states, settled.ctrl)
     for i in ids:
-        mujoco.mj_setState(model, data, states[i], AFTER)
+        mujoco.mj_setState(model, data, states[i], STATE_BITS)
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_sensorPos(model, data)
         for shown in (columns.foot, columns.centre_of_mass, columns.trunk):

@@ -13,9 +13,10 @@ from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics.drive import Push, drive
 from hexmj.physics.outcomes import Outcomes
-from hexmj.physics.settling import settle
+from hexmj.physics.pushes import Push
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.timing import Stride

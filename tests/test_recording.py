@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.legs import FIG1
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import PhysicalWalk, physical_walk, physical_walk_of_plan
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.replay.recording import load_recording, record, record_plan, recorded_conditions, save_recording
 from hexmj.replay.take import Take
 from hexmj.rotations import rotated

@@ -13,7 +13,7 @@ from hexmj.controllers.poor_senses import PoorSenses
 from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
-from hexmj.physics.settling import check_adhesion
+from hexmj.physics.settle import check_adhesion
 from hexmj.studies.ablation import Ablation
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks

@@ -14,7 +14,7 @@ from hexmj.body import STICK_INSECT, Leg
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import FIG1
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 
 

@@ -9,8 +9,8 @@ import hexmj
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.checked_plans import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
-from hexmj.physics.drive import drive
-from hexmj.physics.settling import settle
+from hexmj.physics.rollout import drive
+from hexmj.physics.settle import settle
 from hexmj.studies.entrants import Entrant
 from hexmj.studies.league import in_physics
 from hexmj.walks import PLANNED, part_of

@@ -8,7 +8,7 @@ import pytest
 
 from hexmj.conditions import Conditions
 from hexmj.physics import backend
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 
 

@@ -21,12 +21,13 @@ from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
 from hexmj.environments.walkers import Alone
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics import fine_steps
-from hexmj.physics.backend import Diverged, Engine, Rolled
-from hexmj.physics.drive import Chunk, Push, drive
-from hexmj.physics.fine_steps import FINER, FINEST, FineSteps, in_whole_steps, strikes
+from hexmj.physics import substeps as fine_steps
+from hexmj.physics.engine import Diverged, Engine, Rolled
 from hexmj.physics.outcomes import Outcomes
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.pushes import Push
+from hexmj.physics.rollout import Chunk, drive
+from hexmj.physics.settle import Settled, settle
+from hexmj.physics.substeps import FINER, FINEST, FineSteps, in_whole_steps, strikes
 from hexmj.starts import draw_starts
 from tiers import few_of
 

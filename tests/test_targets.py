@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
-from hexmj.physics.foot_path import EVENLY, TipTargets, standing_tips
+from hexmj.physics.foot_path import EVENLY, TipTargets
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk

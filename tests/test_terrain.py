@@ -31,7 +31,7 @@ from hexmj.bodies.mjcf import compile_body
 from hexmj.io import settings
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.measures.tables import reach
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.replay.film import Film
 from hexmj.replay.recording import load_recording, record, recorded_conditions, save_recording
 from hexmj.studies.terrain import FARTHER, Terrain, terrain_figure

@@ -28,7 +28,7 @@ from hexmj.measures.physical import physical_outcomes
 from hexmj.paper.protocol import FULL
 from hexmj.paper.reproduce import measure
 from hexmj.phases import circular_mean, circular_range, unrolled, wilson_phase
-from hexmj.physics.settling import settle
+from hexmj.physics.settle import settle
 from hexmj.search import samples, stages
 from hexmj.walks import one_start, part_of
 

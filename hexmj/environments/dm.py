@@ -30,8 +30,8 @@ from hexmj.environments.task import (
 )
 from hexmj.environments.walkers import Acted, Alone, Walkers
 from hexmj.errors import InputError
-from hexmj.physics.backend import Diverged
-from hexmj.physics.fine_steps import Shown
+from hexmj.physics.engine import Diverged
+from hexmj.physics.substeps import Shown
 from hexmj.timing import Stride
 from hexmj.validate import whole
 

@@ -11,13 +11,13 @@ from typing import Protocol
 
 import numpy as np
 
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, limits_within
 from hexmj.errors import InputError
-from hexmj.physics.foot_path import TipTargets, standing_tips
-from hexmj.physics.orders import check_made_for
+from hexmj.physics.foot_path import TipTargets, check_made_for
 from hexmj.rotations import lean
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, copied, joined

@@ -22,8 +22,8 @@ except ModuleNotFoundError:
 from hexmj.environments.gym import Frames, checked_mode, compiled_for, metadata_of, spaces_of
 from hexmj.environments.task import Task, action_names, checked_actions, draw_start
 from hexmj.environments.walkers import Walkers
-from hexmj.physics.backend import MujocoBatch
-from hexmj.physics.fine_steps import FineSteps
+from hexmj.physics.engine import MujocoBatch
+from hexmj.physics.substeps import FineSteps
 from hexmj.validate import choice, whole
 
 Observations = dict[str, np.ndarray]

@@ -15,19 +15,17 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.checked_plans import advanced, begin, tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.environments.observing import ROUNDING, Observer, Places, Planned, judge, keep, order, scaled
 from hexmj.environments.task import Task, action_bounds, action_names
 from hexmj.errors import InputError
-from hexmj.physics.backend import AFTER, STATE, Diverged, MujocoBatch, Rolled
-from hexmj.physics.callbacks import check_no_callbacks
-from hexmj.physics.divergence import walk_error
-from hexmj.physics.fine_steps import FineSteps, Shown, allowed_depth, strikes
-from hexmj.physics.foot_path import TipTargets, standing_tips
-from hexmj.physics.orders import check_made_for
-from hexmj.physics.sensing import Senses
-from hexmj.physics.settling import Settling
+from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, check_no_callbacks, walk_error
+from hexmj.physics.foot_path import TipTargets, check_made_for
+from hexmj.physics.rollout import Senses
+from hexmj.physics.settle import Settling
+from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
 
 AHEAD = 128
 """Steps planned at once without sensory feedback."""
@@ -283,7 +281,7 @@ class Alone:
     def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
         """Put the body into a state at rest, (1, state), with its controls, (1, actuator)."""
         mujoco.mj_resetData(self.model, self.data)
-        mujoco.mj_setState(self.model, self.data, states[0], AFTER)
+        mujoco.mj_setState(self.model, self.data, states[0], STATE_BITS)
         self._control[:] = control[0]
         mujoco.mj_step1(self.model, self.data)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.measures.physical import PhysicalWalk
-    from hexmj.physics.settling import Settled
+    from hexmj.physics.settle import Settled
 
 UNITS = {
     "planned_loss": "time unit",
@@ -64,7 +64,7 @@ class WalkSettings:
 @lru_cache(maxsize=1)
 def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> "Settled":
     """Return the seed's starts at rest; cached, since all controllers begin with the same starts."""
-    from hexmj.physics.settling import settle
+    from hexmj.physics.settle import settle
 
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
 

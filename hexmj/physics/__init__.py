@@ -1,1 +1,1 @@
-"""The insect in MuJoCo: plan in, measured walk out."""
+"""Physics: settling, rollouts of plans in MuJoCo, and their outcomes."""

@@ -1,13 +1,18 @@
-"""A simulation that diverged is an error, never an outcome: its last good state can be saved and replayed.
+"""Guards: a simulation that diverged or exploded is an error, never an outcome; its state can be saved and replayed.
 
-`python -m hexmj.physics.divergence FILE` replays one.
+The guard against explosions bounds the energy of the root as a height: its own above the ground and v^2 / 2g, to which
+only V_p may add. Nor does a walk tilt past a right angle, before the trunk touches the ground, with more energy than it
+takes to tumble. A push of impulse J adds at most J / m to the speed of the centre of mass, while the root may move
+faster when the insect turns over: after a push the energy of the centre of mass is bounded.
+
+`python -m hexmj.physics.divergence FILE` replays a saved state.
 """
 
 import json
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,30 +21,123 @@ from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.files import replacing
-from hexmj.physics.backend import Diverged, MujocoBatch
-from hexmj.physics.fine_steps import FineSteps
+from hexmj.jitted import jitted
+from hexmj.physics.engine import Diverged, MujocoBatch
+from hexmj.physics.settle import Settled
+from hexmj.physics.substeps import FineSteps
 from hexmj.rotations import lean
 
 STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
+"""Arrays of a saved state that MuJoCo's data holds."""
+
+MOST_ENERGY = 2.0
+"""Greatest energy of a root without V_p and pushes, as a height in lengths of the shortest leg; measured is 1.2."""
+
+TUMBLING = 1.5
+"""Greatest energy of a root that tilts past a right angle; measured is 1.2."""
 
 
-def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
-    """The error of an insect that diverged while it was `doing` something, at a time [time units]."""
-    state = error.state | {
-        "conditions": np.array(json.dumps(conditions.values(), default=lambda number: number.item()))
-    }
-    sentence = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
-    return SimulationError(sentence, state, f"diverged-start-{error.start}.npz")
+class Explosion(NamedTuple):
+    """The first walk that exploded."""
+
+    row: int
+    """Its row."""
+    substep: int
+    """Its substep."""
+    what: str
+    """What happened."""
+
+
+def explosion(
+    qpos: np.ndarray, centre: np.ndarray, valid: np.ndarray, impulse: np.ndarray, settled: Settled
+) -> Explosion | None:
+    """Find the first walk that exploded, None if none did.
+
+    Args:
+        qpos: before each substep, (n, substep, position).
+        centre: centre of mass before each substep in the world, (n, substep, 3) [mm].
+        valid: substeps up to the fall, (n,).
+        impulse: sum of all pushes so far, (n,) [g mm/s].
+        settled: the starts of the walks.
+    """
+    most, tumbling = most_energy(settled, impulse), TUMBLING * settled.conditions.body.lengths.shortest_leg
+    top, timestep = settled.conditions.highest_ground, settled.compiled.model.opt.timestep
+    twice_g = _twice_gravity(settled)
+    row, t = _first_odd((qpos, centre), valid, impulse != 0.0, (most, tumbling), (top, timestep, twice_g))
+    if row < 0:
+        return None
+    if not impulse[row] and (upright := _upright(qpos[row, t])) < 0.0:
+        return Explosion(row, t, f"it tilts by {np.arccos(upright):.3g} rad, past a right angle, without a push")
+    name, place = ("centre of mass", centre[row]) if impulse[row] else ("root", qpos[row, :, :3])
+    height, speed = place[t, 2] - top, np.linalg.norm(place[t] - place[t - 1]) / timestep
+    what = (
+        f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; height and v^2 / 2g exceed"
+        f" {most[row]:.3g} mm"
+    )
+    return Explosion(row, t, what)
+
+
+@jitted
+def _first_odd(shown: Any, valid: Any, pushed: Any, limits: Any, scale: Any) -> tuple[int, int]:
+    """Row and substep of the first walk beyond the limits; -1 if there is none."""
+    (qpos, centre), (most, tumbling), (top, timestep, twice_g) = shown, limits, scale
+    for n in range(len(qpos)):
+        place = centre[n] if pushed[n] else qpos[n]
+        for t in range(1, valid[n]):
+            squared = 0.0
+            for axis in range(3):
+                squared += (place[t, axis] - place[t - 1, axis]) ** 2
+            energy = place[t, 2] - top + squared / timestep**2 / twice_g
+            if energy > most[n] or (energy > tumbling and not pushed[n] and _upright(qpos[n, t]) < 0.0):
+                return n, t
+    return -1, -1
+
+
+@jitted
+def _upright(qpos: Any) -> float:
+    """Cosine of the tilt of a root, from its positions."""
+    return 1.0 - 2.0 * (qpos[4] ** 2 + qpos[5] ** 2)
+
+
+def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: np.ndarray, settled: Settled) -> None:
+    """Check that no walk ends while its push still throws it: its root has no more energy than without a push.
+
+    Args:
+        ids: starts that have not fallen, (n,).
+        qpos: at the end, (n, position).
+        qvel: at the end, (n, velocity).
+        impulse: sum of all pushes, (n,) [g mm/s].
+        settled: the starts of the walks.
+
+    Raises:
+        StillThrown: the first start that is thrown.
+    """
+    speed, height = np.linalg.norm(qvel[:, :3], axis=1), qpos[:, 2] - settled.conditions.highest_ground
+    energy, most = height + speed**2 / _twice_gravity(settled), most_energy(settled, np.zeros(1))[0]
+    thrown = np.flatnonzero((energy > most) & (impulse != 0.0))
+    if len(thrown):
+        first = thrown[0]
+        raise StillThrown(
+            f"start {ids[first]} is still thrown by its push at the end: its root is {height[first]:.3g} mm above the"
+            f" ground and moves at {speed[first]:.3g} mm/s; expected a longer observation time or a weaker push"
+        )
+
+
+def most_energy(settled: Settled, impulse: np.ndarray) -> np.ndarray:
+    """Greatest energy after a push, (n,) [g mm/s], as a height, (n,) [mm]."""
+    body = settled.conditions.body
+    fastest = settled.conditions.vp + np.abs(impulse) / body.mass
+    return MOST_ENERGY * body.lengths.shortest_leg + fastest**2 / _twice_gravity(settled)
+
+
+def _twice_gravity(settled: Settled) -> float:
+    return 2.0 * settled.compiled.weight / settled.conditions.body.mass
 
 
 def save_state(error: SimulationError, folder: Path) -> Path:
-    """Write the last good state of an error that has one into a folder; `replay` reads it.
-
-    Raises:
-        InputError: it cannot be written.
-    """
+    """Write the last finite state of an error into a folder; `replay` reads it."""
     path = folder / error.file_name
     with replacing(path) as part:
         np.savez(part, allow_pickle=False, **error.state)
@@ -47,31 +145,30 @@ def save_state(error: SimulationError, folder: Path) -> Path:
 
 
 def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A written state of divergence of a body, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep,
-    actuator).
+    """A saved state, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep, actuator).
 
     Raises:
-        InputError: it cannot be read, is damaged, or is of another body.
+        InputError: the file cannot be read, or is of another body.
     """
     _, compiled, data = _read(path, body)
     return compiled.model, data
 
 
 def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
-    """What a written state does under its controls, step by step and finely as it did.
+    """Repeat the steps of a saved state with its controls.
 
     Returns:
         Positions after each physics step, (step, position).
 
     Raises:
-        Diverged: it does so again.
-        InputError: it cannot be read, is damaged, or is of another body.
+        Diverged: it diverges again.
+        InputError: the file cannot be read, or is of another body.
     """
     saved, compiled, _ = _read(path, body)
     only, control = np.array([0]), saved["ctrl"][np.newaxis]
     batch = MujocoBatch(compiled, 1, threads=1)
     batch.put_back(saved)
-    if "substeps" in saved:  # of a walk that exploded, from the beginning of a step of the plan on
+    if "substeps" in saved:  # an explosion, saved from the beginning of a step of the plan
         after = FineSteps.of(batch, int(saved["substeps"]), compiled).take(only, control)["after"]
     else:
         after = batch.roll(only, control, 1).after
@@ -79,7 +176,7 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
 
 
 def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody, mujoco.MjData]:
-    """A written state, the body with its conditions, time step and contacts, and its data in that state."""
+    """A saved state, the body with its conditions, time step and contacts, and MuJoCo's data in that state."""
     try:
         with np.load(path) as file:
             saved = dict(file)
@@ -90,12 +187,12 @@ def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], Compiled
         for name in STATE:
             getattr(data, name)[:] = saved[name]
     except (KeyError, OSError, ValueError) as error:
-        raise InputError(f"{path} is no state of the body {body.name!r}: {error}") from None
+        raise InputError(f"{path} is not a saved state of body {body.name!r}: {error}") from None
     return saved, compiled, data
 
 
 def main(path: str) -> None:
-    """Print how a written state of the stick insect goes on: height and tilt of its root after each physics step."""
+    """Print the height and tilt of the stick insect's root after each physics step of a saved state."""
     try:
         for step, qpos in enumerate(replayed(path)):
             print(f"step {step + 1}: {qpos[2]:.4g} mm high, tilted by {lean(qpos[3:ROOT_QPOS])[1]:.3g} rad")
@@ -107,5 +204,5 @@ def main(path: str) -> None:
 
 if __name__ == "__main__":
     parser = ArgumentParser("python -m hexmj.physics.divergence", description=main.__doc__)
-    parser.add_argument("path", help="a state that a simulation left, .npz")
+    parser.add_argument("path", help="a saved state, .npz")
     main(parser.parse_args().path)

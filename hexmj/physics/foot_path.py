@@ -1,30 +1,41 @@
-"""From the planned walk to the tips that the legs must follow, physics step by physics step.
+"""From the plan to joint targets: tips in time and space, then inverse kinematics, chunk by chunk.
 
-The plan says where a tip is and whether it swings; where it leaves the height to the body, a foot is raised in
-`Conditions.lift_time` as its leg begins to protract, and lowered over the last `Conditions.landing_time` before the AEP
-that the plan names, so that it meets the ground where the plan lets it stand.  Where a swing ends elsewhere it is
-lowered from then on.  These are times of the physical world: both transitions vanish against the stride as V_p goes to
-zero.
+The plan says where a tip is and whether it swings. Unless it names a height, a foot is raised in
+`Conditions.lift_time` when its leg begins to protract, and lowered over the last `Conditions.landing_time` before the
+plan's AEP, so that it meets the ground where the plan lets it stand. A swing that ends elsewhere is lowered from then
+on. These are times of the physical world: both transitions vanish against the stride as V_p goes to zero.
 
-The ground comes half a millimetre early, since the body sags, so a foot is slow over the last millimetre already, and
-`fine_steps` takes care of those that are not.  `docs/feet_that_land.md` tells which paths were tried.
+The ground comes half a millimetre early, since the body sags, so a foot is slow over the last millimetre already.
+`substeps` takes care of feet that are not.
 """
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.conditions import Conditions
+from hexmj.controllers.checked_plans import advanced, check_plan
+from hexmj.controllers.protocol import Plan
+from hexmj.errors import InputError
 from hexmj.jitted import jitted
-from hexmj.timing import Stride
-from hexmj.walks import PlannedWalk
+from hexmj.physics.settle import Settled
+from hexmj.timing import Stride, steps_within
+from hexmj.walks import PlannedWalk, part_of
 
 EVENLY = 0.25
-"""Share of the height that is raised and lowered evenly; it decides how fast a foot meets the ground."""
+"""Share of the height that is raised and lowered evenly; it determines how fast a foot meets the ground."""
+
+CHUNK = 40
+"""Approximate physics steps in a chunk: fewer cost more calls, more waste steps after a fall (0.4 to 0.8 %)."""
+
+AHEAD = 8
+"""Chunks that are planned at once for a single start, since a call of its plan for each takes a twelfth of the time."""
 
 
 class TipTargets:
-    """The targets of many starts, made as the plan goes on."""
+    """The targets of many starts, made while the plan goes on."""
 
     def __init__(self, starts: np.ndarray, conditions: Conditions, stride: Stride) -> None:
         """All feet stand at the starts, (start, leg) [mm]."""
@@ -32,41 +43,145 @@ class TipTargets:
         self._y = np.tile(stride.geometry.y, (len(starts), 1))
         self._stance = np.ones(starts.shape, dtype=bool)
         self._lift, self._height = np.zeros(starts.shape), np.zeros(starts.shape)
-        self._conditions, self._substeps = conditions, conditions.substeps(stride)
+        self._substeps = conditions.substeps(stride)
         substep = 1000.0 * conditions.seconds(stride) / self._substeps
         self._rates = substep / conditions.lift_time, substep / conditions.landing_time, conditions.landing_distance
+        self._heights = conditions.step_height, conditions.standing_height
         self._origin = np.array(stride.geometry.origin)
 
     def follow(self, plan: PlannedWalk, ids: np.ndarray) -> np.ndarray:
-        """Tips in the root frame, (n, substep, leg, 3) forward, left and up [mm], at the end of each substep.
+        """Tips of some starts, (n,), at the end of each substep of the plan's next steps.
 
-        They are those of some starts, (n,), in the next steps of their plan, which is of all starts.
+        Returns:
+            Tips in the root frame, (n, substep, leg, 3) forward, left and up [mm].
         """
-        m, conditions = self._substeps, self._conditions
-        tips = np.empty((len(ids), len(plan.time) * m, 6, 3))
+        tips = np.empty((len(ids), len(plan.time) * self._substeps, 6, 3))
         planned = plan.x, plan.y, plan.stance, plan.aep, plan.height
-        wanted = tuple(map(np.ascontiguousarray, planned))  # of one layout, for it would be compiled for each
+        wanted = tuple(map(np.ascontiguousarray, planned))  # one memory layout, so that numba compiles once
         last = self._x, self._y, self._stance, self._lift, self._height
-        _follow(
-            wanted, ids, last, m, self._rates, (conditions.step_height, conditions.standing_height), self._origin, tips
-        )
+        _follow(wanted, ids, last, self._substeps, self._rates, self._heights, self._origin, tips)
         for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
             old[ids] = values[-1, ids]
         return tips
 
 
-def standing_tips(x: np.ndarray, standing_height: float, stride: Stride) -> np.ndarray:
-    """Tips on the ground in the root frame, (..., leg, 3) [mm], where they are at `x`, (..., leg), on their axes."""
-    tips = x + np.array(stride.geometry.origin), np.broadcast_to(stride.geometry.y, x.shape)
-    return np.stack([*tips, np.full(x.shape, -standing_height)], axis=-1)
+@dataclass(frozen=True, eq=False)
+class Orders:
+    """Joint targets of some starts for the next chunk."""
+
+    plan: PlannedWalk
+    """The plan over the chunk, of all starts."""
+    first: int
+    """Index of the first substep."""
+    ids: np.ndarray
+    """(n,) indices of these starts."""
+    control: np.ndarray
+    """(n, substep, actuator) joint targets [rad], and the adhesion of feet with `Conditions.grasp`."""
+    tips: np.ndarray
+    """(n, substep, leg, 3) targets of the tips before each of these substeps, in the root frame [mm]."""
+    missed: np.ndarray
+    """(n, substep, leg) whether a tip is out of reach."""
+
+    def only(self, keep: np.ndarray) -> "Orders":
+        """The orders of some of the starts, (n,)."""
+        few = {name: getattr(self, name)[keep] for name in ("ids", "control", "tips", "missed")}
+        return replace(self, **few)
+
+
+class OrdersFromPlan:
+    """The orders of settled starts, made while their plan goes on."""
+
+    tips: np.ndarray
+    """(start, leg, 3) current targets of the tips, in the root frame [mm]."""
+
+    def __init__(self, settled: Settled, plan: Plan, duration: float, multiple: int = 0) -> None:
+        """All feet stand, at time 0 of a plan that ends after a duration [time units].
+
+        The steps of a chunk divide `multiple`, see `Push.divisor`.
+
+        Raises:
+            InputError: the plan has other starts or another stride, is not at time 0, or is for other conditions.
+        """
+        check_plan(plan, settled.starts, settled.stride)
+        check_made_for(plan, settled.conditions)
+        self._plan, self._settled, self._substeps = plan, settled, settled.substeps
+        self._steps, self._done = int(steps_within(duration, settled.stride)), 0
+        self._chunk, self._planned = steps_in_chunk(self._substeps, multiple), list[PlannedWalk]()
+        self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
+        self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
+        self.tips = standing_tips(settled.starts, settled.conditions.standing_height, settled.stride)
+
+    def steps_ahead(self) -> int:
+        """Steps of the plan in the next chunk, 0 at the end of the walk."""
+        return min(self._chunk, self._steps - self._done)
+
+    def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
+        """The orders of some starts, (n,), for the next steps, by default a chunk; None at the end of the walk.
+
+        A leg whose tip is out of reach keeps its last angles.
+        """
+        first, m = self._done * self._substeps, self._substeps
+        if self._done == self._steps:
+            return None
+        plan = self._next_chunk() if steps is None else advanced(self._plan, steps)
+        self._done += len(plan.time)
+        tips = self._follow(plan, ids)
+        joints, reachable = self._settled.compiled.inverse(tips)
+        for i in np.flatnonzero(~reachable.all(axis=(1, 2))):
+            hold(joints[i], self._joints[ids[i]])
+        self._joints[ids] = joints[:, -1]
+        tips = np.concatenate([self.tips[ids, None], tips], axis=1)  # targets before each substep
+        self.tips[ids] = tips[:, -1]
+        control = joints.reshape(*joints.shape[:2], -1)
+        if self._settled.conditions.grasp:
+            control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
+        if self._done == self._steps:  # one more substep shows the state at the end
+            control = np.concatenate([control, control[:, -1:]], axis=1)
+        return Orders(plan, first, ids, control, tips[:, : control.shape[1]], ~reachable)
+
+    def _next_chunk(self) -> PlannedWalk:
+        if len(self._settled.starts) > 1:
+            return advanced(self._plan, self.steps_ahead())
+        if not self._planned:
+            steps, size = min(AHEAD * self._chunk, self._steps - self._done), self._chunk
+            planned = advanced(self._plan, steps)
+            self._planned = [part_of(planned, slice(begin, begin + size)) for begin in range(0, steps, size)][::-1]
+        return self._planned.pop()
+
+
+def steps_in_chunk(substeps: int, multiple: int = 0) -> int:
+    """Steps of a plan in a chunk, with `substeps` physics steps each; `multiple` is a multiple of them."""
+    most = max(1, CHUNK // substeps)
+    return next(steps for steps in range(most, 0, -1) if multiple % steps == 0)
+
+
+def check_made_for(plan: Plan, conditions: Conditions) -> None:
+    """Check a plan that lifts the feet itself and has an attribute `made_for`, the conditions for which it does.
+
+    Raises:
+        InputError: V_p, the path of the feet or the body is another one.
+    """
+    made_for = getattr(plan, "made_for", None)
+    if isinstance(made_for, Conditions):
+        for name in ("vp", "step_height", "standing_height", "lift_time", "landing_time", "body"):
+            expected, found = getattr(conditions, name), getattr(made_for, name)
+            if expected != found:
+                raise InputError(f"the plan is made for {name} = {found}; the walk has {expected}")
+
+
+def hold(joints: np.ndarray, last: np.ndarray) -> None:
+    """Replace missing angles, (substep, leg, joint), by those before them, at first by `last`."""
+    for angles in joints:
+        missing = np.isnan(angles)
+        angles[missing] = last[missing]
+        last = angles
 
 
 @jitted
 def _follow(wanted: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, origin: Any, tips: Any) -> None:
-    """Between two steps a tip moves evenly; where the plan names no height, that is a smooth function of the phase of
-    its lift, 0 to 1.
+    """Move tips evenly between two steps; without a planned height, it is a smooth function of the phase of the lift.
 
-    The phase tends to 1 in swing and to 0 in stance, and to the distance from the AEP within `landing` of it [mm].
+    The phase, 0 to 1, tends to 1 in swing and to 0 in stance, and to the share of `landing` [mm] left to the AEP.
     """
     x, y, stance, aep, own_height = wanted
     x_old, y_old, s_old, lift, height_old = last

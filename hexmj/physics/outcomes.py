@@ -1,4 +1,4 @@
-"""What a physical walk has shown: the measured walk, and how every start went."""
+"""Outcomes of physical walks: the measured walk, how every start went, and the effort, chunk by chunk."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -7,34 +7,33 @@ import numpy as np
 
 from hexmj.errors import OutOfReach
 from hexmj.jitted import jitted
-from hexmj.physics.backend import Diverged
-from hexmj.physics.divergence import walk_error
-from hexmj.physics.drive import Chunk
-from hexmj.physics.measured import measured_walk
-from hexmj.physics.orders import steps_in_chunk
-from hexmj.physics.settling import Settled
+from hexmj.physics.engine import Diverged, walk_error
+from hexmj.physics.foot_path import steps_in_chunk
+from hexmj.physics.rollout import Chunk
+from hexmj.physics.settle import Settled
 from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time
+from hexmj.walks import Walk
 
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
-"""Outcomes that every walk has; speed is NaN at V = 0, tracking where no tip shall be on the ground."""
+"""Outcomes that every walk has; speed is NaN at V = 0, tracking if no target is on the ground."""
 
-HAPPENED = {"lost on paper": "planned_loss", "lost as measured": "measured_loss", "fell": "fall", "toppled": "topple"}
-"""What can happen to a start -> the time at which it did."""
+HAPPENED = {"planned loss": "planned_loss", "measured loss": "measured_loss", "fell": "fall", "toppled": "topple"}
+"""Event -> the field of `Outcomes` with its time."""
 
 TOPPLED = 0.1
-"""Tilt of the trunk beyond which it has toppled, whatever the direction [rad]; see `docs/falls.md`."""
+"""Tilt of the trunk beyond which it has toppled, in any direction [rad]."""
 
 MOST_UNREACHABLE = 0.1
-"""Share of the tips that may be out of reach in a walk that counts."""
+"""Greatest share of the targets that may be out of reach."""
 
 LEAST_UPRIGHT = float(np.cos(TOPPLED))
-"""Upward component of the trunk's vertical at that tilt."""
+"""Upward component of the trunk's vertical at the tilt `TOPPLED`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcomes:
-    """How every start went; times in time units, inf where it did not happen."""
+    """How every start went; times in time units, inf for events that did not happen."""
 
     planned_loss: np.ndarray
     """(start,) first loss of static stability of the plan: planned polygon, centre of mass at O."""
@@ -43,27 +42,26 @@ class Outcomes:
     fall: np.ndarray
     """(start,) first contact of head, thorax or abdomen with the ground."""
     topple: np.ndarray
-    """(start,) first tilt of the trunk by more than `TOPPLED`; until the fall, as everything here."""
+    """(start,) first tilt of the trunk by more than `TOPPLED`; until the fall, like all measures here."""
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touched first, -1 for none."""
     clearance: np.ndarray
-    """(start,) least height of the trunk's lowest point above z = 0 [mm], whatever lies ahead; below it by how far it
-    sinks in on contact."""
+    """(start,) least height of the trunk's lowest point above z = 0 [mm]; negative if it sinks in on contact."""
     tilt: np.ndarray
     """(start,) greatest angle between the trunk's vertical and the world's [rad]."""
     speed: np.ndarray
-    """(start,) distance walked ahead, as it stood at first, over distance commanded, until the fall; NaN at V = 0."""
+    """(start,) distance walked in the initial heading over distance commanded, until the fall; NaN at V = 0."""
     slip: np.ndarray
     """(start,) mean sliding speed of a foot in contact [mm/s]."""
     tracking: np.ndarray
     """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], in bins
-    of `Lengths.tracking_bin`: to 0.01 mm, and inf beyond 20 mm, of the stick insect."""
+    of `Lengths.tracking_bin`: to 0.01 mm, and inf beyond 20 mm, for the stick insect."""
     depth: np.ndarray
-    """(start,) how deep the deepest foot was in the ground until the fall [mm]."""
+    """(start,) greatest depth of a foot in the ground until the fall [mm]."""
     saturation: np.ndarray
-    """(start,) fraction of joints times physics steps in which the torque stood at its limit."""
+    """(start,) fraction of joints times physics steps in which the torque is at its limit."""
     unreachable: np.ndarray
-    """(start,) tip targets out of reach; such a leg keeps its last angles and is counted here."""
+    """(start,) targets out of reach; such a leg keeps its last angles."""
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{name} {int(np.isfinite(getattr(self, time)).sum())}" for name, time in HAPPENED.items())
@@ -72,31 +70,31 @@ class Outcomes:
 
 
 class _Sums(NamedTuple):
-    """What is added up of every start, or the least of it so far."""
+    """Sums and extremes of every start so far."""
 
     clearance: np.ndarray
     """(start,) see `Outcomes.clearance`."""
     upright: np.ndarray
     """(start,) least upward component of the trunk's vertical."""
     toppled: np.ndarray
-    """(start,) substeps until the trunk has toppled; inf where it has not."""
+    """(start,) substeps until the trunk has toppled; inf if it has not."""
     slid: np.ndarray
-    """(start,) way that feet slid in contact [mm]."""
+    """(start,) distance that feet slid in contact [mm]."""
     contacts: np.ndarray
     """(start,) substeps in which a foot was in contact, over all feet."""
     saturated: np.ndarray
-    """(start,) substeps in which a torque stood at its limit, over all joints."""
+    """(start,) substeps in which a torque was at its limit, over all joints."""
     shown: np.ndarray
     """(start,) substeps."""
     misses: np.ndarray
-    """(start, bin) how often a foot was so far from its target on the ground."""
+    """(start, bin) counts of distances of feet from their targets."""
 
 
 class OutcomesSoFar:
     """Adds up the outcomes of all starts, chunk by chunk."""
 
     def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:
-        """Begin with nothing but the plan's losses, (start,) [time units]."""
+        """Begin with the plan's losses, (start,) [time units]."""
         size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
         self._settled, self._planned_loss = settled, planned_loss
         self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
@@ -112,7 +110,7 @@ class OutcomesSoFar:
         self._scale = ground, lengths.tracking_bin
 
     def add(self, chunk: Chunk) -> None:
-        """Take in one chunk of `drive.drive`."""
+        """Take in one chunk of `rollout.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
         seen = chunk.qpos, chunk.sensors, np.ascontiguousarray(chunk.targets), chunk.force, chunk.valid
         since = self._before, chunk.first, len(chunk.plan.time) * m, steps_in_chunk(m) * m
@@ -129,24 +127,24 @@ class OutcomesSoFar:
         self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
         share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
         steps = np.vstack([self._commanded[ids], share * chunk.plan.velocity[:, ids]])
-        self._commanded[ids] = np.add.accumulate(steps)[-1]  # step by step: the same bits, however chunks are cut
+        self._commanded[ids] = np.add.accumulate(steps)[-1]  # step by step, so that chunks do not change the bits
         stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
         _, measured, _ = measured_walk(chunk, settled, stable)
         if measured.stance.size:
             self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
-        """How every start went, as far as the chunks reach.
+        """How every start went in the chunks so far.
 
         Raises:
-            OutOfReach: a walk of which more than `MOST_UNREACHABLE` of the tips could not be reached.
-            SimulationError: a walk of which something cannot be measured, as the slip where no foot is ever in contact.
+            OutOfReach: more than `MOST_UNREACHABLE` of a walk's targets are out of reach.
+            SimulationError: a measure of a walk is NaN, as the slip if no foot is ever in contact.
         """
         sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
         with np.errstate(invalid="ignore", divide="ignore"):
             speed = np.where(self._commanded > 0, self._walked / (self._commanded * self._settled.stride.dt), np.nan)
             slip = sums.slid / (sums.contacts * compiled.model.opt.timestep)
-            saturation = sums.saturated / (sums.shown * compiled.joints)
+            saturation = sums.saturated / (sums.shown * len(compiled.torque_limits))
         found = Outcomes(
             planned_loss=self._planned_loss,
             measured_loss=self._measured_loss,
@@ -162,33 +160,107 @@ class OutcomesSoFar:
             saturation=saturation,
             unreachable=self._unreachable,
         )
-        asked = 6.0 * sums.shown
-        if (lost := self._unreachable > MOST_UNREACHABLE * asked).any():
+        targets = 6.0 * sums.shown
+        if (lost := self._unreachable > MOST_UNREACHABLE * targets).any():
             start = int(np.argmax(lost))
+            share = self._unreachable[start] / targets[start]
             raise OutOfReach(
-                f"start {start}: {self._unreachable[start]} of {asked[start]:.0f} tips that its legs were told are out"
-                " of reach; expected at most a tenth, or nothing is walked"
+                f"Start {start}: {share:.0%} of the foot targets are out of reach (limit: {MOST_UNREACHABLE:.0%})."
             )
         for name in NUMBERS:
             if (wrong := np.isnan(getattr(found, name))).any():
                 start = int(np.argmax(wrong))
-                kinds = f"its {name} is no number" + (", since no foot has stood" if name == "slip" else "")
-                error = Diverged(start, kinds, self._settled.saved(start))
+                reason = f"its {name} is NaN" + (", since no foot has stood" if name == "slip" else "")
+                error = Diverged(start, reason, self._settled.saved(start))
                 raise walk_error(error, "walking", 0.0, self._settled.conditions)
         return found
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
-    """Upper end [mm] of the bin that holds this share of the counts, (start, bin); inf in the last, open one."""
+    """Upper end [mm] of the bin that holds this share of the counts, (start, bin); inf for the last, open one."""
     reached = np.cumsum(counts, axis=1) >= share * counts.sum(axis=1, keepdims=True)
     ends = np.append(np.arange(1, counts.shape[1]) * width, np.inf)
     return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
 
 
+def measured_walk(
+    chunk: Chunk, settled: Settled, rows: np.ndarray | None = None
+) -> tuple[np.ndarray, Walk, np.ndarray]:
+    """The measured walk at the plan's steps within a chunk.
+
+    Args:
+        chunk: of `rollout.drive`.
+        settled: starts of the walk.
+        rows: rows of the chunk's starts, (n,), by default all.
+
+    Returns:
+        Columns of the chunk's substeps, (step,), the walk of these starts, and the centre of mass in the world,
+        (step, n, 3) [mm]. After a fall the walk is NaN and no foot stands; its velocities are NaN throughout.
+    """
+    m, stride, columns = settled.substeps, settled.stride, settled.compiled.columns
+    rows = np.arange(len(chunk.ids)) if rows is None else rows
+    substep = np.arange(chunk.qpos.shape[1])
+    shown = substep[((chunk.first + substep) % m == 0) & (chunk.first + substep > 0)]
+    shape = len(shown), len(rows)
+    x, y, stance = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan), np.zeros((*shape, 6), dtype=bool)
+    centre, places = np.full((*shape, 3), np.nan), (columns.foot.start, columns.centre_of_mass.start)
+    _look((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
+    time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
+    walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
+    return shown, walk, centre
+
+
+def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heights of the feet above the ground [mm] and the load of the ground on them, without adhesion [g mm/s^2].
+
+    Both are (step, n, leg), in some columns of a chunk's substeps, (step,); NaN after a fall.
+    """
+    sensors, compiled = chunk.sensors[:, columns], settled.compiled
+    feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
+    valid = (columns < chunk.valid[:, None])[..., None]
+    height = np.where(valid, -compiled.depth(feet), np.nan).swapaxes(0, 1)
+    return height, np.where(valid, chunk.load[:, columns], np.nan).swapaxes(0, 1)
+
+
+class EffortSoFar:
+    """Adds up the positive work of the joints and their greatest torque, chunk by chunk, of each start until it falls.
+
+    Work is the sum over joints and physics steps of max(torque x speed, 0) h: a joint that is moved against its torque
+    does no work and returns none. The torque is `Chunk.torque`.
+    """
+
+    work: np.ndarray
+    """(start,) [g mm^2/s^2]."""
+    torque: np.ndarray
+    """(start,) greatest torque of a joint over its limit."""
+
+    def __init__(self, settled: Settled) -> None:
+        """Begin without work."""
+        size, compiled = len(settled.starts), settled.compiled
+        self.work, self.torque = np.zeros(size), np.zeros(size)
+        self._columns, self._limits = compiled.columns, compiled.torque_limits
+        self._rows = np.zeros((size, 0, 2, compiled.joints))  # last angles and torques of the chunk before
+
+    def add(self, chunk: Chunk) -> None:
+        """Take in one chunk; its last step counts with the next one."""
+        before = self._rows[chunk.ids]
+        now = np.stack([chunk.qpos[..., self._columns.qpos], chunk.torque], axis=2)
+        rows = np.concatenate([before, now], axis=1)
+        turned, torques = np.diff(rows[:, :, 0], axis=1), rows[:, :-1, 1]
+        walking = np.arange(rows.shape[1] - 1) - before.shape[1] + 1 < chunk.valid[:, None]
+        self.work[chunk.ids] += (np.maximum(torques * turned, 0.0).sum(axis=2) * walking).sum(axis=1)
+        share = (np.abs(torques) / self._limits).max(axis=2) * walking
+        self.torque[chunk.ids] = np.maximum(self.torque[chunk.ids], share.max(axis=1, initial=0.0))
+        self._rows = np.zeros((len(self.work), 1, *now.shape[2:]))
+        self._rows[chunk.ids] = rows[:, -1:]
+
+
 @jitted
 def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
-    """Take a chunk's substeps into the sums and counts of its starts; of sliding those to the first substep of a usual
-    chunk, wherever pushes cut it, are left out."""
+    """Add a chunk's substeps to the sums of its starts.
+
+    Sliding to the first substep of a chunk of usual length does not count, wherever pushes cut chunks.
+    """
     qpos, sensors, targets, force, valid = chunk
     last, first, end, usual = since
     feet, touch, corner, radius, limit = body
@@ -214,7 +286,7 @@ def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) ->
 
 @jitted
 def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -> None:
-    """Count the distance of each foot, (leg * axis), from its target, (leg, 3), if that is on the ground."""
+    """Count the distance of each foot, (leg * axis), from its target, (leg, 3), if the target is on the ground."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix(qpos[3], qpos[4], qpos[5], qpos[6])
     ground, width = scale
     for leg in range(6):
@@ -225,3 +297,27 @@ def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -
             off_z = qpos[2] + zx * a + zy * b + zz * c - feet[3 * leg + 2]
             place, last = np.sqrt(off_x * off_x + off_y * off_y + off_z * off_z) / width, len(counts) - 1
             counts[int(place) if place < last else last] += 1
+
+
+@jitted
+def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
+    """Positions of the feet relative to the centre of mass in the root's heading, up to the fall."""
+    qpos, sensors, standing, valid = chunk
+    foot, centre_of_mass = places
+    x, y, stance, centre = walk
+    for n, column in enumerate(shown):
+        for i, row in enumerate(rows):
+            if column >= valid[row]:
+                continue
+            q = qpos[row, column]
+            along, _, _, across, _, _, _, _, _ = matrix(q[3], q[4], q[5], q[6])
+            length = np.hypot(along, across)
+            cosine, sine = along / length, across / length
+            for axis in range(3):
+                centre[n, i, axis] = sensors[row, column, centre_of_mass + axis]
+            for leg in range(6):
+                forward = sensors[row, column, foot + 3 * leg] - centre[n, i, 0]
+                left = sensors[row, column, foot + 3 * leg + 1] - centre[n, i, 1]
+                x[n, i, leg] = cosine * forward + sine * left
+                y[n, i, leg] = cosine * left - sine * forward
+                stance[n, i, leg] = standing[row, column, leg]

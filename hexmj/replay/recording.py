@@ -15,8 +15,9 @@ from hexmj.files import read_netcdf, write_netcdf
 from hexmj.legs import LEGS
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
-from hexmj.physics.foot_path import TipTargets, standing_tips
-from hexmj.physics.orders import hold
+from hexmj.bodies.kinematics import standing_tips
+from hexmj.physics.foot_path import TipTargets
+from hexmj.physics.foot_path import hold
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.timing import Stride

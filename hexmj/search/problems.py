@@ -27,7 +27,7 @@ from hexmj.variants import variants, varied
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.physics.settling import Settled
+    from hexmj.physics.settle import Settled
 
 LARGEST = 1e30
 """Greatest magnitude of a parameter in the first population."""
@@ -175,7 +175,7 @@ class Sample:
         Raises:
             InputError, SimulationError: a start does not, see `physics.settling.settle`.
         """
-        from hexmj.physics.settling import settle
+        from hexmj.physics.settle import settle
 
         for one in self.variants.values():
             if one.problem.conditions and not one._settled:

@@ -80,7 +80,7 @@ class Study:
 
     def check_walks(self, velocities: Sequence[float], *conditions: Conditions) -> None:
         """Raise InputError if a controller refuses a velocity, or feet with adhesion cannot be settled."""
-        from hexmj.physics.settling import check_adhesion
+        from hexmj.physics.settle import check_adhesion
 
         for controller in self.plans().values():
             check_velocities(controller, velocities, self.stride, self.procedure)

@@ -13,6 +13,7 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import REPEATED, advanced, begin, begin_at_speed, check_repeats
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import (
     Controller,
@@ -22,7 +23,6 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     check_steerable,
 )
-from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError
 from hexmj.gaits import limit_gait
 from hexmj.measures.kinematic import first_loss
@@ -516,8 +516,8 @@ class StableWalks:
         import xarray as xr
 
         from hexmj.measures.physical import outcomes_of_plan
-        from hexmj.physics.drive import Push
-        from hexmj.physics.settling import settle
+        from hexmj.physics.pushes import Push
+        from hexmj.physics.settle import settle
 
         which = np.arange(self.n_starts) if which is None else which
         disturbance = disturbance_of(self.found, case.kind, self.planner, self.velocity, self.stride)

@@ -112,7 +112,7 @@ class League(Study):
     def cells(self) -> list[Cell]:
         """Return every cell."""
         from hexmj.controllers.checked_plans import check_velocities
-        from hexmj.physics.settling import check_adhesion
+        from hexmj.physics.settle import check_adhesion
 
         for entrant in self.controllers.values():
             random = () if entrant.ideal else (self.trial_velocity, RANGE[1], *([FINAL] if self.accelerating else []))

@@ -150,10 +150,9 @@ def walks(
     Raises:
         SimulationError: none of the random starts comes to rest, whoever walks.
     """
-    from hexmj.physics.drive import drive
-    from hexmj.physics.effort import EffortSoFar
-    from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
-    from hexmj.physics.settling import settle
+    from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar
+    from hexmj.physics.rollout import drive
+    from hexmj.physics.settle import settle
 
     starts = entrant.starts(n_starts, seed, velocity, stride)
     duration = float(observation_duration(observation_time, velocity, stride))
@@ -209,7 +208,7 @@ def unless_refused(
 
 def _check_settles(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> None:
     """Raise the first error if no start comes to rest."""
-    from hexmj.physics.settling import settle
+    from hexmj.physics.settle import settle
 
     failed = []
     for start in starts:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.bodies.compiled import CompiledBody
-    from hexmj.physics.drive import Chunk
-    from hexmj.physics.settling import Settled
+    from hexmj.physics.rollout import Chunk
+    from hexmj.physics.settle import Settled
 
 SEGMENTS = ("front", "middle", "hind")
 """Pairs of legs from front to rear."""
@@ -141,7 +141,7 @@ def last_strides(
         measured: last part of it [time units].
         threads: by default one per core.
     """
-    from hexmj.physics.drive import drive
+    from hexmj.physics.rollout import drive
 
     plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
     first = (duration - measured) / settled.stride.dt * settled.substeps
@@ -214,7 +214,7 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
     """
     import xarray as xr
 
-    from hexmj.physics.settling import Settling
+    from hexmj.physics.settle import Settling
 
     n_starts, conditions, stride = walks.n_starts, walks.conditions, walks.stride
     steps = measured / stride.dt * conditions.substeps(stride)

@@ -214,7 +214,7 @@ def standing_starts(
 
 def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> np.ndarray:
     """Find the starts that come to rest on six feet, (start,), by halving; one that diverges is an error."""
-    from hexmj.physics.settling import settle
+    from hexmj.physics.settle import settle
 
     try:
         settle(starts, conditions, stride, threads)

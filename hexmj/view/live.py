@@ -15,11 +15,11 @@ from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.legs import leg_last
-from hexmj.physics.chunks import Chunk, Insects
-from hexmj.physics.measured import measured_walk
-from hexmj.physics.orders import Orders, OrdersFromPlan, steps_in_chunk
+from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
+from hexmj.physics.outcomes import measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
-from hexmj.physics.settling import settle
+from hexmj.physics.rollout import Chunk, Rollout
+from hexmj.physics.settle import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
 from hexmj.timing import MOST_STEPS, Stride
@@ -111,7 +111,7 @@ class LiveWalk:
         plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
-        self._insects = Insects(settled, self._push, threads=1)
+        self._insects = Rollout(settled, self._push, threads=1)
         self._lasts = steps_in_chunk(settled.substeps)
         self.start, self.conditions, self.settled = start, wanted, settled
         self.trace, self.fell_on = [], ""

@@ -1,4 +1,4 @@
-"""Every start is put on its six feet in MuJoCo and comes to rest before it walks."""
+"""Settling: every start is put on its six feet in MuJoCo and comes to rest before it walks."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -8,25 +8,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.body import ROOT_QPOS
-from hexmj.checks import given
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, OutOfReach, SimulationError
-from hexmj.physics.backend import STATE, Diverged, MujocoBatch
-from hexmj.physics.divergence import walk_error
-from hexmj.physics.fine_steps import SINK
-from hexmj.physics.foot_path import standing_tips
+from hexmj.physics.engine import STATE, Diverged, MujocoBatch, walk_error
+from hexmj.physics.substeps import SINK
 from hexmj.starts import checked_starts, draw_starts
 from hexmj.threads import check_memory
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0
-"""How much of the depth at which steps are taken finely adhesion may press a foot in at rest; the rest is for walking,
-see `docs/exploded_walks.md`."""
+"""Share of the depth that causes fine steps to which adhesion may press a foot at rest; the rest is for walking."""
 
-KEPT = 120_000
-"""Memory that a start takes while it walks, as measured of the stick insect [bytes]."""
+MEMORY = 120_000
+"""Memory of a start while it walks, as measured for the stick insect [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +33,19 @@ class Settled:
     starts: np.ndarray
     """(start, leg) planned tips [mm]."""
     state: np.ndarray
-    """(start, state) positions, velocities and what the solver goes on from, as `backend.Engine.put` takes it."""
+    """(start, state) positions, velocities and the solver's initial values; `engine.Engine.put` takes it."""
     ctrl: np.ndarray
-    """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion where they grasp."""
+    """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion with `Conditions.grasp`."""
     load: np.ndarray
-    """(start, leg) force of the ground on each foot along its normal, adhesion taken off [g mm/s^2]."""
+    """(start, leg) force of the ground on each foot along its normal, without adhesion [g mm/s^2]."""
     torques: np.ndarray
     """(start, joint) of the servos [g mm^2/s^2]."""
     compiled: CompiledBody
     """With the time step and the conditions of the walk."""
     conditions: Conditions
+    """Of the walk."""
     stride: Stride
+    """Of the plan."""
 
     @property
     def qpos(self) -> np.ndarray:
@@ -59,7 +58,7 @@ class Settled:
         return self.conditions.substeps(self.stride)
 
     def saved(self, start: int) -> dict[str, np.ndarray]:
-        """What replays one start from here on, see `divergence.replayed`: a step of the plan at rest."""
+        """What replays one step of the plan at rest from here, see `divergence.replayed`."""
         model = self.compiled.model
         state = np.split(self.state[start], np.cumsum([model.nq, model.nv]))
         return dict(zip(STATE, state, strict=True)) | {
@@ -72,16 +71,21 @@ class Settled:
 
 
 class Settling:
-    """A body that comes to rest at some starts after others; to the same bits, whatever it did before."""
+    """A body that comes to rest at different starts, to the same bits whatever it did before."""
 
     def __init__(
         self, conditions: Conditions, stride: Stride, threads: int | None = None, *, pushes: bool = False
     ) -> None:
-        """Under some conditions of the walk; `threads` step it, one per core unless given, and `pushes` measures what
-        its feet push the ground with.
+        """Compile the body.
+
+        Args:
+            conditions: of the walk.
+            stride: of the plan.
+            threads: one per core unless given.
+            pushes: measure the forces of the feet on the ground.
 
         Raises:
-            InputError: a home that is not as described.
+            InputError: posture home is not as described.
         """
         self._conditions, self._stride, self._threads = conditions, stride, threads
         self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False, pushes=pushes)
@@ -89,55 +93,46 @@ class Settling:
         self._batch: MujocoBatch | None = None
 
     def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
-        """At every start, (start, leg) [mm]; errors tell which by the numbers in `names`, (start,), or by its row.
+        """Settle at every start, (start, leg) [mm].
+
+        Args:
+            starts: planned tips, (start, leg) [mm].
+            names: numbers of the starts in errors, (start,), by default their rows.
 
         Raises:
             InputError, SimulationError: see `settle`.
         """
         conditions, stride, compiled = self._conditions, self._stride, self._compiled
-        height, settling_time = conditions.standing_height, conditions.settling_time
         x = checked_starts(starts, stride)
         names = np.arange(len(x)) if names is None else names
-        check_memory(f"{len(x)} starts that walk at once in physics", KEPT * len(x))
-        model, columns = compiled.model, compiled.columns
-        tips = standing_tips(x, height, stride)
-        joints, reachable = compiled.inverse(tips)
+        check_memory(f"{len(x)} starts that walk at once in physics", MEMORY * len(x))
+        model, columns, height = compiled.model, compiled.columns, conditions.standing_height
+        joints, reachable = compiled.inverse(standing_tips(x, height, stride))
         if not reachable.all():
             start, leg = np.argwhere(~reachable)[0]
             raise OutOfReach(
                 f"start {names[start]}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
                 f" at a standing height of {height:g} mm"
             )
-        batch = self._begun(len(x))
+        batch = self._initial_batch(len(x))
         batch.qpos[:, :ROOT_QPOS] = (0.0, 0.0, height + compiled.foot_radius, 1.0, 0.0, 0.0, 0.0)
         batch.qpos[:, columns.qpos] = joints.reshape(len(x), -1)
         ctrl = np.ones((len(x), model.nu))
         ctrl[:, columns.ctrl] = joints.reshape(len(x), -1)
         try:
-            batch.rest(ctrl, max(1, round(settling_time / 1000.0 / model.opt.timestep)))
+            batch.rest(ctrl, max(1, round(conditions.settling_time / 1000.0 / model.opt.timestep)))
         except Diverged as error:
             error.start = int(names[error.start])
             raise walk_error(error, "settling", 0.0, conditions) from None
         if conditions.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
-        touch, trunk = batch.sensors[:, columns.touch], batch.sensors[:, columns.trunk]
         load = compiled.carried(batch.sensors, batch.force)
-        speed, at_rest = np.linalg.norm(batch.qvel[:, :3], axis=1), conditions.body.lengths.speed_at_rest
-        moving = speed[np.argmax(speed > at_rest)]
-        for name, failed in {
-            f"it still moves at {moving:.3g} mm/s; expected at most {at_rest:g} mm/s": speed > at_rest,
-            "a foot is off the ground": (touch <= 0).any(axis=1),
-            "its feet carry less than half of its weight": load.sum(axis=1) < 0.5 * compiled.weight,
-            "the trunk is on the ground": (trunk > 0).any(axis=1),
-        }.items():
-            if failed.any():
-                start = names[np.argmax(failed)]
-                raise SimulationError(f"start {start} did not settle in {settling_time:g} ms: {name}")
+        _check_rest(batch, load, names, compiled)
         torques = batch.force[:, columns.ctrl].copy()
         return Settled(x, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride)
 
-    def _begun(self, count: int) -> MujocoBatch:
-        """As many bodies that have not moved yet; those of last time, where they were as many."""
+    def _initial_batch(self, count: int) -> MujocoBatch:
+        """Bodies in their initial state; the last batch is used again if it has as many."""
         batch = self._batch
         if batch and len(batch.qpos) == count:
             batch.reset()
@@ -158,36 +153,48 @@ def settle(
         threads: one per core unless given.
 
     Raises:
-        InputError: a start that the legs cannot reach, a home that is not as described, or more adhesion than the
-            contacts can hold.
-        SimulationError: a start that does not settle: still moving, a foot off the ground, or the trunk on it.
+        InputError: a start is out of reach, posture home is not as described, or the adhesion is too strong.
+        SimulationError: a start does not settle: it still moves, a foot is off the ground, or the trunk is on it.
     """
-    conditions, stride = given("conditions", conditions, Conditions), given("stride", stride, Stride)
-    return Settling(conditions, stride, threads).at(starts)
+    return Settling(conditions or Conditions(), stride or Stride(), threads).at(starts)
 
 
 def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:
-    """Refuse before the work adhesion that presses feet too deep, as the seed's first start at rest shows.
+    """Check with the first start of a seed, before a study, that adhesion does not press the feet too deep.
 
     Raises:
         InputError: it does.
     """
     if conditions.grasp > 0:
-        with suppress(OutOfReach, SimulationError):  # whether this start comes to rest is asked where it walks
+        with suppress(OutOfReach, SimulationError):  # the walk itself reports these
             settle(draw_starts(1, seed, stride), conditions, stride, threads=1)
 
 
-def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
-    """Refuse adhesion that presses feet at rest, (start, leg * axis) [mm], deeper into the ground than they may be.
+def _check_rest(batch: MujocoBatch, load: np.ndarray, names: np.ndarray, compiled: CompiledBody) -> None:
+    """Raise SimulationError for the first start that is not at rest on its feet."""
+    touch, trunk = batch.sensors[:, compiled.columns.touch], batch.sensors[:, compiled.columns.trunk]
+    speed, at_rest = np.linalg.norm(batch.qvel[:, :3], axis=1), compiled.conditions.body.lengths.speed_at_rest
+    moving = speed[np.argmax(speed > at_rest)]
+    for fault, failed in {
+        f"it still moves at {moving:.3g} mm/s; expected at most {at_rest:g} mm/s": speed > at_rest,
+        "a foot is off the ground": (touch <= 0).any(axis=1),
+        "its feet carry less than half of its weight": load.sum(axis=1) < 0.5 * compiled.weight,
+        "the trunk is on the ground": (trunk > 0).any(axis=1),
+    }.items():
+        if failed.any():
+            start, duration = names[np.argmax(failed)], compiled.conditions.settling_time
+            raise SimulationError(f"start {start} did not settle in {duration:g} ms: {fault}")
 
-    Every step would be taken finely then, on contacts so hard that they throw the insect off.
+
+def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
+    """Raise InputError if adhesion presses feet at rest, (start, leg * axis) [mm], too deep into the ground.
+
+    Every step would be a fine step then, with contacts so hard that they throw the insect off.
     """
     deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.grasp
     allowed = RESTING * SINK * compiled.conditions.standing_height
     if deepest > allowed:
-        load = compiled.conditions.load
         raise InputError(
-            f"grasp = {grasp:g}; expected at most about {grasp * allowed / deepest:.2g}"
-            f"{f' with a load of {load:g}' if load else ''}: it presses feet"
-            f" {deepest:.3g} mm into the ground at rest, more than {allowed:.3g} mm"
+            f"grasp = {grasp:g} presses feet {deepest:.3g} mm into the ground at rest, more than {allowed:.3g} mm;"
+            f" expected at most about {grasp * allowed / deepest:.2g}"
         )

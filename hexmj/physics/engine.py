@@ -1,54 +1,64 @@
-"""MuJoCo's batch: many bodies side by side on a pool of threads.  The only module that steps MuJoCo in bulk.
+"""MuJoCo's batch: many bodies side by side on a pool of threads. The only module that steps MuJoCo in bulk.
 
-Another engine is another module with an `Engine` in it.
+Another engine is another module with an `Engine` in it. While a batch steps, MuJoCo's warnings are not logged and its
+clock is stopped: without the clock bodies walk 5 % faster (measured), to the same bits.
 """
 
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from numba import cfunc
 
 from hexmj.bodies.compiled import CompiledBody
+from hexmj.conditions import Conditions
+from hexmj.errors import InputError, SimulationError
 from hexmj.jitted import jitted
-from hexmj.physics.callbacks import batched
 from hexmj.rotations import lowest
 from hexmj.threads import thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
-"""What a body goes on from."""
+"""Arrays that determine how a body goes on."""
+
+STATE_BITS = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
+"""The same as a set of MuJoCo's state elements, which it records in one array."""
 
 CLEAR = 0.01
-"""How high a trunk is at least of which nothing touches flat ground, in standing heights."""
+"""Height of a trunk above flat ground from which it cannot touch it, in standing heights."""
 
-HEARD = 20_000
-"""Steps of a body that are taken at rest before somebody who stops the program is heard; a fifth of a second."""
+INTERRUPTIBLE = 20_000
+"""Steps of one body between two chances for Ctrl-C while bodies settle; a fifth of a second."""
 
-AFTER = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
-"""The same as MuJoCo records it, in one array."""
+CALLBACKS = "control", "passive", "contactfilter", "sensor", "act_dyn", "act_gain", "act_bias"
+"""MuJoCo's callbacks that change the physics."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rolled:
-    """What some bodies have shown over physics steps."""
+    """Record of some bodies over physics steps."""
 
     before: np.ndarray
-    """(n, state) as they began; what `Engine.put` takes."""
+    """(n, state) before the first step; `Engine.put` takes it."""
     feet: np.ndarray
     """(n, 1 + step, leg, 3) before the first and after each step, in the world [mm]."""
     sensors: np.ndarray
-    """(n, step, column) as each step begins."""
+    """(n, step, column) at the beginning of each step."""
     force: np.ndarray
-    """(n, step, actuator) as each step begins [g mm^2/s^2]."""
+    """(n, step, actuator) at the beginning of each step [g mm^2/s^2]."""
     torque: np.ndarray
-    """(n, step, joint) as it acted over each step, in which the speed changes and with it the damping [g mm^2/s^2]."""
+    """(n, step, joint) as it acts over each step, in which the speed changes and with it the damping [g mm^2/s^2]."""
     after: np.ndarray
-    """(n, step, state) after each step; what `Engine.put` takes."""
+    """(n, step, state) after each step; `Engine.put` takes it."""
 
 
 class Replayed(NamedTuple):
-    """What replays some bodies from a moment on."""
+    """What is needed to replay some bodies from a moment on."""
 
     states: np.ndarray
     """(n, state)."""
@@ -57,26 +67,26 @@ class Replayed(NamedTuple):
 
 
 class Engine(Protocol):
-    """Bodies that step side by side, none of which knows of another."""
+    """Independent bodies that step side by side."""
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """Put some bodies where they shall go on from, (n, state)."""
+        """Set the states of some bodies, (n, state)."""
         ...
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """Step some bodies with these controls, (n, step, actuator).
 
-        With `parts` above 1 each row of the controls is a part of a step, and contacts are as hard as it allows: of
-        two parts.
+        With `parts` above 1 each row of the controls is a part of a step, and the time constant of the contacts is two
+        parts, the hardest possible.
 
         Raises:
-            Diverged: a body of which nothing can be made any more.
+            Diverged: the state of a body is no longer finite, or MuJoCo warns of it.
         """
         ...
 
 
 class Diverged(Exception):
-    """One body that diverged; `physics.divergence` makes a sentence of it."""
+    """One body that diverged; `walk_error` makes the user's error of it."""
 
     def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray], substep: int = 0) -> None:
         """`start` is its index, `kinds` names what happened, `state` replays it."""
@@ -84,25 +94,32 @@ class Diverged(Exception):
         self.start, self.kinds, self.state, self.substep = start, kinds, state, substep
 
 
+def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
+    """The error of a body that diverged while it was `doing` something, at a time [time units]."""
+    text = json.dumps(conditions.values(), default=lambda number: number.item())
+    message = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
+    return SimulationError(message, error.state | {"conditions": np.array(text)}, f"diverged-start-{error.start}.npz")
+
+
 class MujocoBatch:
     """An `Engine`: MuJoCo's batch of one compiled body."""
 
     qpos: np.ndarray
-    """(start, position), as they are now."""
+    """(start, position), current."""
     qvel: np.ndarray
-    """(start, velocity), as they are now."""
+    """(start, velocity), current."""
     push: np.ndarray
     """(start,) force on the root to the left [g mm/s^2], 0 unless the caller sets it."""
 
     def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
-        """As many bodies; `threads` step them, one per core unless given."""
+        """Make `count` bodies, stepped by `threads`, one per core unless given."""
         self._model, self._root = compiled.model, compiled.root
         model = compiled.model
         self._batch = Batch(model, count, thread_count(threads))
         self._timestep, self._contact = self._batch.expand("opt.timestep"), self._batch.expand("pair_solref")
         self._disabled, self._corners = self._batch.expand("opt.disableflags"), compiled.trunk_corners
         flat = compiled.conditions.ground == "flat"
-        self._clear = CLEAR * compiled.body.standing_height if flat else np.inf
+        self._clear = CLEAR * compiled.conditions.body.standing_height if flat else np.inf
         self._state = [self._batch.bind(name) for name in STATE]
         self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]
         self.qpos, self.qvel = self._state[:2]
@@ -113,37 +130,37 @@ class MujocoBatch:
         self._joints = speeds, servos.start, -model.actuator_biasprm[servos, 2], compiled.torque_limits
 
     def reset(self) -> None:
-        """All bodies as they were at first; nothing remains of those that diverged."""
+        """Put all bodies into their initial state, those that diverged too."""
         self._batch.warning[:] = 0
-        with batched():
+        with stepping():
             self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
 
     def states(self, ids: np.ndarray) -> np.ndarray:
-        """What some bodies go on from, (n, state)."""
+        """The states of some bodies, (n, state); `put` takes them."""
         return _side_by_side(ids, tuple(self._state))
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """See `Engine.put`."""
-        for values, now in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
-            now[ids] = values
+        for values, current in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
+            current[ids] = values
 
     @property
     def rotation(self) -> np.ndarray:
-        """From the root frames to the world, (start, axis, axis), where places are current."""
+        """From the root frames to the world, (start, axis, axis), if positions are up to date."""
         return self._batch.bind("xmat")[:, self._root].reshape(-1, 3, 3)
 
     def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
-        """Put some bodies where they stand at rest, (n, state), by controls, (n, actuator); their places are current.
+        """Put some bodies into states of rest, (n, state), and update their positions.
 
-        Controls are those of the steps to come, so nothing is kept of these; of bodies that diverged nothing remains.
+        Controls, (n, actuator), are those of the steps to come, so this engine does not need them.
         """
         self._batch.warning[ids] = 0
         self.put(ids, states)
-        with batched():
-            self._look(ids)
+        with stepping():
+            self._update(ids)
 
     def rest(self, control: np.ndarray, steps: int) -> None:
-        """Step all bodies with one control, (start, actuator), and make everything that they show current.
+        """Step all bodies with one control, (start, actuator), and update everything that they show.
 
         Raises:
             Diverged: see `Engine.roll`.
@@ -152,54 +169,53 @@ class MujocoBatch:
         ids = np.arange(len(control))
         before = self.replayed(ids)
         self._batch.bind("ctrl")[:] = control
-        with batched():
-            while steps > (some := max(1, HEARD // len(ids))):
+        with stepping():
+            while steps > (some := max(1, INTERRUPTIBLE // len(ids))):
                 self._batch.step(nstep=some)
                 steps -= some
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
         self._check(ids, before, control[:, np.newaxis])
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """See `Engine.roll`; a warning of MuJoCo or a number that is not finite is a body that diverged."""
+        """See `Engine.roll`."""
         model, before = self._model, self.replayed(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
-        record = (AFTER, "sensordata", "actuator_force")
+        record = (STATE_BITS, "sensordata", "actuator_force")
         try:
-            with batched():
+            with stepping():
                 seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
                 self._check(ids, before, control)
-                self._look(ids)  # for the feet at the end
+                self._update(ids)  # for the feet at the end
         finally:
             if parts > 1:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
-        torque = _acting(before.states, seen[AFTER], seen["actuator_force"], *self._joints)
-        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], torque, seen[AFTER])
+        torque = _acting(before.states, seen[STATE_BITS], seen["actuator_force"], *self._joints)
+        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
 
     def replayed(self, ids: np.ndarray) -> Replayed:
-        """What replays some bodies from now on; MuJoCo takes back states and pushes of one that diverges."""
+        """Copy what is needed to replay some bodies, since MuJoCo resets a body that diverges."""
         return Replayed(self.states(ids), self.push[ids])
 
     def saved(self, before: Replayed, i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
-        """What replays the i-th body of those, with its controls since, (step, actuator), time step and contacts."""
+        """What replays the i-th body of `before`: its state, push, controls, (step, actuator), time step, contacts."""
         model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
         applied[self._root, 1] = before.push[i]
         state = dict(zip(STATE, np.split(before.states[i], self._ends), strict=True))
-        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
-        return state | {"xfrc_applied": applied} | now
+        settings = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep)}
+        return state | {"xfrc_applied": applied} | settings | {"ctrl": control}
 
     def put_back(self, saved: dict[str, np.ndarray]) -> None:
-        """Put the only body where it was saved."""
+        """Put the only body into a state of `saved`."""
         for name, values in zip(STATE, self._state, strict=True):
             values[0] = saved[name]
         self._batch.bind("xfrc_applied")[0] = saved["xfrc_applied"]
 
-    def _look(self, ids: np.ndarray) -> None:
-        """Make current where some bodies are, and contacts of those whose trunk may touch the ground: to look for
-        contacts takes two fifths of the time."""
+    def _update(self, ids: np.ndarray) -> None:
+        """Update positions, and contacts of trunks that may touch the ground: contacts take two fifths of the time."""
         usual = self._model.opt.disableflags
         above = ids[_lowest(ids, self.qpos, *self._corners) > self._clear]
         self._disabled[above] = usual | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
@@ -209,7 +225,7 @@ class MujocoBatch:
             self._disabled[above] = usual
 
     def _check(self, ids: np.ndarray, before: Replayed, control: np.ndarray) -> None:
-        """Raise `Diverged` with the first of some bodies that did, their states before, and the controls since."""
+        """Raise `Diverged` for the first body that did, with its state before and its controls since."""
         warned = self._batch.warning
         i = _first_broken(ids, warned, self.qpos)
         if i == len(ids):
@@ -220,32 +236,79 @@ class MujocoBatch:
         raise Diverged(start, ", ".join(kinds) or "a state that is not finite", state)
 
 
+def check_no_callbacks() -> None:
+    """Raise InputError if a callback is set that changes the physics, since no result would show it."""
+    for name in CALLBACKS:
+        if getattr(mujoco, f"get_mjcb_{name}")() is not None:
+            raise InputError(
+                f"MuJoCo's callback mjcb_{name} changes the physics; expected mujoco.set_mjcb_{name}(None)"
+            )
+
+
+@cfunc("float64()")
+def _stopped_clock() -> float:
+    return 0.0
+
+
+def _ignore(warning: str) -> None:
+    """Do not log a warning."""
+
+
+_lock, _users = Lock(), []  # the user's clock and warning callbacks, once for each thread that steps
+
+
+@contextmanager
+def stepping() -> Iterator[None]:
+    """Stop MuJoCo's clock and its log of warnings within the block; the last thread restores the user's callbacks.
+
+    Raises:
+        InputError: a callback is set that changes the physics.
+    """
+    check_no_callbacks()
+    with _lock:
+        _users.append(_users[0] if _users else (mujoco.get_mjcb_time(), mujoco.get_mju_user_warning()))
+        if len(_users) == 1:
+            mujoco.set_mjcb_time(_stopped_clock.ctypes)
+            mujoco.set_mju_user_warning(_users[0][1] or _ignore)
+    try:
+        yield
+    finally:
+        with _lock:
+            clock, warning = _users.pop()
+            if not _users:
+                mujoco.set_mjcb_time(clock)
+                mujoco.set_mju_user_warning(warning)
+
+
 @jitted
 def _side_by_side(ids: Any, values: Any) -> Any:
-    """Rows of some arrays, each (start, number), one after the other, (n, number)."""
+    """Rows of some arrays, each (start, number), side by side, (n, number)."""
     columns = 0
-    for of_one in values:
-        columns += of_one.shape[1]
+    for array in values:
+        columns += array.shape[1]
     rows, at = np.empty((len(ids), columns)), 0
-    for of_one in values:
+    for array in values:
         for i, n in enumerate(ids):
-            for j in range(of_one.shape[1]):
-                rows[i, at + j] = of_one[n, j]
-        at += of_one.shape[1]
+            for j in range(array.shape[1]):
+                rows[i, at + j] = array[n, j]
+        at += array.shape[1]
     return rows
 
 
 @jitted
 def _acting(before: Any, after: Any, force: Any, speeds: int, servos: int, damping: Any, limits: Any) -> Any:
-    """Torques of the joints over each step, (n, step, joint), of forces as it begins, and states before and after.
+    """Torques of the joints over each step, (n, step, joint), from the forces at its beginning and the states.
 
-    The damping of a servo is integrated implicitly, but of one that pulls at its limit.
+    The damping of a servo is integrated implicitly, except at the limit of its torque.
 
     Args:
-        speeds: first column of the states that holds a joint's.
-        servos: first column of the forces of a joint's.
+        before: states before the first step, (n, state).
+        after: states after each step, (n, step, state).
+        force: of the actuators at the beginning of each step, (n, step, actuator).
+        speeds: first column of the states that holds a joint's speed.
+        servos: first column of the forces that holds a joint's servo.
         damping: of each servo, (joint,).
-        limits: of each, (joint,).
+        limits: of each servo, (joint,).
     """
     torque = np.empty((force.shape[0], force.shape[1], len(damping)))
     for n in range(torque.shape[0]):
@@ -260,7 +323,7 @@ def _acting(before: Any, after: Any, force: Any, speeds: int, servos: int, dampi
 
 @jitted
 def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
-    """Heights of the lowest points of some trunks, (n,) [mm]; corners (corner, axis) and radii (corner,) [mm]."""
+    """Heights of the lowest points of some trunks, (n,) [mm], from `CompiledBody.trunk_corners`."""
     heights = np.empty(len(ids))
     for i, n in enumerate(ids):
         heights[i] = lowest(qpos[n], corners, radii)
@@ -269,8 +332,8 @@ def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
 
 @jitted
 def _first_broken(ids: Any, warned: Any, qpos: Any) -> int:
-    """Index of the first of some bodies of which MuJoCo has warned, (start, kind, [last, count]), or whose state is not
-    finite; `len(ids)` if none."""
+    """Index of the first body with a warning, (start, kind, [last, count]), or a state that is not finite; `len(ids)`
+    if there is none."""
     for i, n in enumerate(ids):
         for kind in range(warned.shape[1]):
             if warned[n, kind, 1] > 0:

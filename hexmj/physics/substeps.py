@@ -1,11 +1,11 @@
-"""Feet that strike the ground: a step of the plan in which one would sink in is taken again, more finely.
+"""Fine steps: a step of the plan in which a foot sinks into the ground is repeated with shorter physics steps.
 
-A body that tips, or a swing that ends early, brings a foot down at 0.4 m/s and more.  One physics step takes it
-0.25 mm into the ground before any contact can act, so it needs shorter steps and a contact as hard as they allow.  Few
-of a plan's steps need it, and only those are divided; `docs/feet_that_land.md` has the figures.
+A body that tips, or a swing that ends early, brings a foot down at 0.4 m/s and more. One physics step takes it 0.25 mm
+into the ground before a contact can act, so it needs shorter steps and a contact as hard as they allow. Only the few
+steps of the plan that need it are divided.
 
-Whether a step is taken again depends on nothing but its own body, so results do not depend on the batch.  A body that
-diverges ends everything even in steps that would have been taken again.
+Whether a step is repeated depends on its own body only, so results do not depend on the batch. A body that diverges
+is an error even in a step that would have been repeated.
 """
 
 from collections.abc import Callable
@@ -16,48 +16,47 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.jitted import jitted
-from hexmj.physics.backend import Diverged, Engine
+from hexmj.physics.engine import Diverged, Engine
 
 Shown = dict[str, np.ndarray]
-"""What is shown of some bodies by its name, each (n, substep, ...): sensors, force, torque, depth, and the states
-after."""
+"""Record of some bodies by name, each (n, substep, ...): sensors, force, torque, depth, and the states after."""
 
 SINK = 0.02
-"""How deep a foot may be in the ground, as a share of the standing height."""
+"""Allowed depth of a foot in the ground, as a share of the standing height."""
 
 FINER, FINEST = 4, 64
-"""Into how many parts a physics step is divided, again and again while a foot sinks in; and into how many at most."""
+"""Number of parts of a physics step, again and again while a foot sinks in; and their greatest number."""
 
 BRAKED = 0.5
-"""Share of its speed that a foot in the ground is taken to keep over a physics step; measured are 0.2 to 0.7."""
+"""Assumed share of its speed that a foot in the ground keeps over a physics step; measured are 0.2 to 0.7."""
 
 
 @dataclass(frozen=True, eq=False)
 class FineSteps:
-    """The loop that takes whole steps of a plan, and those again, more finely, in which a foot strikes."""
+    """Takes whole steps of a plan, and repeats those more finely in which a foot strikes."""
 
     engine: Engine
     """Steps the bodies."""
     substeps: int
-    """Physics steps in one of the plan."""
+    """Physics steps in one step of the plan."""
     depth_of: Callable[[np.ndarray], np.ndarray]
-    """How deep feet in the world are in the ground, (..., 3) -> (...) [mm]."""
+    """Depth of feet in the world in the ground, (..., 3) -> (...) [mm]."""
     allowed: float
-    """How deep a foot may be [mm]."""
+    """Allowed depth of a foot [mm]."""
     forces: np.ndarray
-    """Columns of the sensors that hold forces, (column,)."""
+    """Columns of the sensors that are forces, (column,)."""
 
     @classmethod
     def of(cls, engine: Engine, substeps: int, compiled: CompiledBody) -> "FineSteps":
-        """Of an engine that steps such a body."""
+        """For an engine that steps this body."""
         columns = compiled.columns
         forces = np.r_[columns.touch, columns.feet_push]
         return cls(engine, substeps, compiled.depth, allowed_depth(compiled), forces)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """What some bodies show while they take the substeps of these controls, (n, substep, actuator).
+        """Let some bodies take the substeps of these controls, (n, substep, actuator), and record them.
 
-        What strikes the ground is put back to where that step of the plan began, takes it finely, and goes on.
+        A body whose foot strikes the ground is put back to the beginning of that step of the plan and repeats it.
 
         Raises:
             Diverged: a body that diverged.
@@ -77,8 +76,12 @@ class FineSteps:
     def _roll(
         self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int
     ) -> tuple[np.ndarray, Shown, np.ndarray]:
-        """Every part of some substeps, after the states before, (n, state); and where the first step begins in which a
-        foot strikes, (n,), or `end`."""
+        """Take some substeps in parts.
+
+        Returns:
+            The states before, (n, state), the record of every part, and the beginning of the first step in which a foot
+            strikes, (n,), or `end`.
+        """
         try:
             seen = self.engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
         except Diverged as error:
@@ -92,7 +95,7 @@ class FineSteps:
         return seen.before, shown, struck
 
     def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
-        """One step's substeps in parts, in more where even then a foot strikes; shown is every substep."""
+        """Take one step's substeps in parts, in more where a foot still strikes; record every substep."""
         before, every, struck = self._roll(ids, control, begin, end, parts)
         torque = every["torque"].reshape(len(ids), end - begin, parts, every["torque"].shape[2])
         shown = {
@@ -110,28 +113,28 @@ class FineSteps:
 
 
 def allowed_depth(compiled: CompiledBody) -> float:
-    """How deep a foot of a body may be in the ground [mm]."""
+    """Allowed depth of a foot of a body in the ground [mm]."""
     return SINK * compiled.conditions.standing_height
 
 
 def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:
-    """Show something else of some rows, from a substep on."""
+    """Replace the record of some rows, from a substep on."""
     for name, values in instead.items():
         shown[name][rows, begin : begin + values.shape[1]] = values
 
 
 @jitted
 def strikes(depth: Any, substeps: int, allowed: float) -> Any:
-    """In which physics steps a foot gets too deep, or will be too deep one step later, (n, step).
+    """Physics steps in which a foot gets too deep, or will be too deep one step later, (n, step).
 
-    The latter is asked only where a step of the plan ends: the next one can be taken again from there, not from
-    before, and then it would begin with a foot that is too deep and too fast.
+    The latter counts only at the end of a step of the plan: the next one could be repeated only from there on, when
+    the foot is already too deep and too fast.
 
     Args:
         depth: of the feet before the first and after each physics step, (n, 1 + step, leg) [mm]; negative above ground.
             It begins where a step of the plan begins.
-        substeps: physics steps in one of the plan.
-        allowed: how deep a foot may be [mm].
+        substeps: physics steps in one step of the plan.
+        allowed: allowed depth [mm].
     """
     struck = np.zeros((depth.shape[0], depth.shape[1] - 1), dtype=np.bool_)
     for n in range(struck.shape[0]):
@@ -146,8 +149,10 @@ def strikes(depth: Any, substeps: int, allowed: float) -> Any:
 
 
 def in_whole_steps(sensors: np.ndarray, fine: int, forces: np.ndarray) -> np.ndarray:
-    """What sensors show as each step begins that was taken in `fine` parts, (..., step, column), from what they show as
-    each part does, (..., step * part, column); `forces`, in these columns, are the means over its parts."""
+    """Sensors at the beginning of each step, (..., step, column), from those of its `fine` parts, (..., part, column).
+
+    The columns `forces` are means over the parts.
+    """
     parts = sensors.reshape(*sensors.shape[:-2], -1, fine, sensors.shape[-1])
     whole = parts[..., 0, :].copy()
     whole[..., forces] = parts[..., forces].mean(axis=-2)

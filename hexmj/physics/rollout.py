@@ -1,0 +1,331 @@
+"""Rollouts: settled starts follow a plan in MuJoCo, all at once on all cores, and chunks record what they do.
+
+A start whose trunk has touched the ground is dropped. A feedback plan senses the bodies before each of its steps. Any
+other plan goes on by itself: while MuJoCo's threads step one chunk, this thread plans the next, and the caller measures
+the last.
+
+A chunk records the bodies before each of their physics steps: MuJoCo's sensors after a step belong to the state before
+it. Of a fine step (`substeps`) it records the first part, except for the ground's forces, the torques and the depth.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
+from hexmj.body import ROOT_QPOS, ROOT_QVEL
+from hexmj.conditions import ROUNDING
+from hexmj.controllers.checked_plans import tell
+from hexmj.controllers.protocol import FeedbackPlan, Plan, Sensed
+from hexmj.errors import InputError, SimulationError
+from hexmj.jitted import jitted
+from hexmj.physics.divergence import check_landed, explosion
+from hexmj.physics.engine import Diverged, MujocoBatch, walk_error
+from hexmj.physics.foot_path import Orders, OrdersFromPlan
+from hexmj.physics.pushes import Push, steps_pushed
+from hexmj.physics.settle import Settled
+from hexmj.physics.substeps import FineSteps, Shown
+from hexmj.progress import Progress
+from hexmj.rotations import heading, lean, turned
+from hexmj.timing import steps_within
+from hexmj.walks import PlannedWalk, joined
+
+RECORDED = ("qpos", "sensors", "standing", "load", "targets", "force", "torque", "depth")
+"""Fields of `Chunk` that are recorded before each substep."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Record of some physics steps of the starts that still walk."""
+
+    plan: PlannedWalk
+    """The plan over the chunk, of all starts."""
+    first: int
+    """Index of the first substep."""
+    ids: np.ndarray
+    """(n,) indices of the starts that walk."""
+    qpos: np.ndarray
+    """(n, substep, position)."""
+    sensors: np.ndarray
+    """(n, substep, column), see `compiled.Columns`; the ground's forces are means over a fine step."""
+    standing: np.ndarray
+    """(n, substep, leg) whether the ground carried the foot within the last `Conditions.contact_gap`."""
+    load: np.ndarray
+    """(n, substep, leg) force of the ground on the foot along its normal, without adhesion [g mm/s^2]."""
+    targets: np.ndarray
+    """(n, substep, leg, 3) targets of the tips in the root frame [mm]."""
+    force: np.ndarray
+    """(n, substep, joint) torques of the joints [g mm^2/s^2]."""
+    torque: np.ndarray
+    """(n, substep, joint) torques as they act over each substep, means over a fine step [g mm^2/s^2]."""
+    depth: np.ndarray
+    """(n, substep) depth of the deepest foot in the ground at the end of each substep [mm]; negative above it."""
+    valid: np.ndarray
+    """(n,) substeps up to and including the fall."""
+    fell: np.ndarray
+    """(n,) whether the trunk touched the ground."""
+    unreachable: np.ndarray
+    """(n,) number of targets out of reach."""
+
+
+def drive(
+    settled: Settled,
+    plan: Plan,
+    duration: float,
+    *,
+    push: Push | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Chunk]:
+    """Walk settled starts by a plan, chunk by chunk.
+
+    Args:
+        settled: starts at rest.
+        plan: of the same starts, at time 0.
+        duration: observation time [time units].
+        push: from the side.
+        threads: one per core unless given; the result does not depend on it.
+        progress: called with the fraction done since the last call.
+
+    Raises:
+        InputError: the plan has other starts or another stride, is not at time 0, or returns other shapes than asked
+            for; a push lies outside of the observation time.
+        SimulationError: a simulation diverged; the error has its last finite state.
+        StillThrown: the observation time ends while a push still throws a start; raised after the last chunk.
+    """
+    divisor = 0
+    if push:
+        push.check_within(duration, settled.conditions, settled.stride, len(settled.starts))
+        divisor = push.divisor(settled.conditions, settled.stride)
+    rollout, orders = Rollout(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
+    total = int(steps_within(duration, settled.stride)) * settled.substeps
+    reported, walking = 0.0, np.arange(len(settled.starts))
+    chunks = _with_feedback(rollout, plan, orders) if isinstance(plan, FeedbackPlan) else _planned(rollout, orders)
+    for chunk in chunks:
+        yield chunk
+        if progress:
+            done = 1.0 if chunk.fell.all() else min(1.0, (chunk.first + chunk.qpos.shape[1]) / total)
+            progress(done - reported)
+            reported = done
+        walking = chunk.ids[~chunk.fell]
+    if push:
+        rollout.check_landed(walking)
+
+
+def _planned(rollout: "Rollout", orders: OrdersFromPlan) -> Iterator[Chunk]:
+    """Follow a plan that goes on whatever the bodies do."""
+    now = orders.ahead(np.arange(len(rollout.settled.starts)))
+    with ThreadPoolExecutor(1) as stepper:
+        stepping = now and stepper.submit(rollout.carry_out, [now])
+        while now and stepping:
+            ahead = orders.ahead(now.ids)
+            chunk = stepping.result()
+            now = ahead.only(~chunk.fell) if ahead and not chunk.fell.all() else None
+            stepping = now and stepper.submit(rollout.carry_out, [now])
+            yield chunk
+
+
+def _with_feedback(rollout: "Rollout", plan: FeedbackPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
+    """Follow a plan that senses the bodies before each of its steps."""
+
+    def step_by_step(steps: int) -> Iterator[Orders]:
+        for _ in range(steps):
+            tell(plan, rollout.sensed(ids))
+            if now := orders.ahead(ids, steps=1):
+                yield now
+
+    ids = np.arange(len(rollout.settled.starts))
+    while len(ids) and (steps := orders.steps_ahead()):
+        chunk = rollout.carry_out(step_by_step(steps))
+        yield chunk
+        ids = ids[~chunk.fell]
+
+
+class Rollout:
+    """Settled starts that carry out orders."""
+
+    def __init__(self, settled: Settled, push: Push | None = None, threads: int | None = None) -> None:
+        """Put all starts at rest; `threads` step them, one per core unless given."""
+        self.settled, self._push, self._columns = settled, push, settled.compiled.columns
+        self._pushed = np.zeros(len(settled.starts))  # sum of the impulses' sizes [g mm/s]
+        self._batch = MujocoBatch(settled.compiled, len(settled.starts), threads)
+        self._batch.put(np.arange(len(settled.starts)), settled.state)
+        self._steps, self._senses = FineSteps.of(self._batch, settled.substeps, settled.compiled), Senses(settled)
+
+    def sensed(self, ids: np.ndarray) -> Sensed:
+        """What some starts, (n,), sense now."""
+        return self._senses.sensed(ids, self._batch.qpos[ids], self._batch.qvel[ids])
+
+    def carry_out(self, orders: Iterable[Orders]) -> Chunk:
+        """Carry out orders for the same starts, one after the other; no push begins or ends within them.
+
+        Each is made when those before it are done, so it may depend on them.
+
+        Raises:
+            SimulationError: a simulation diverged or exploded.
+            InputError: a walk leaves the ground.
+        """
+        first = next(rest := iter(orders))
+        self._apply_push(first)
+        before = self._batch.replayed(first.ids)
+        done, records = [first], [self._step(first)]
+        for each in rest:
+            records.append(self._step(each))
+            done.append(each)
+        whole: dict[str, Any] = {name: _joined([record[name] for record in records]) for name in RECORDED}
+        touching = (whole["sensors"][:, :, self._columns.trunk] > 0).any(axis=2)
+        fell = touching.any(axis=1)
+        valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
+        centre = whole["sensors"][:, :, self._columns.centre_of_mass]
+        if odd := explosion(whole["qpos"], centre, valid, self._pushed[first.ids], self.settled):
+            control = _joined([each.control for each in done])[odd.row, : odd.substep + 1]
+            start = int(first.ids[odd.row])
+            state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
+            raise self._error(Diverged(start, odd.what, state, odd.substep), first)
+        self._check_ground(whole["sensors"], valid, first.ids)
+        missed = _joined([each.missed for each in done]).sum(axis=2)
+        unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
+        plan = joined([each.plan for each in done])
+        return Chunk(plan, first.first, first.ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
+
+    def check_landed(self, ids: np.ndarray) -> None:
+        """Raise StillThrown if a push still throws one of these starts, (n,), which have not fallen."""
+        check_landed(ids, self._batch.qpos[ids], self._batch.qvel[ids], self._pushed[ids], self.settled)
+
+    def _step(self, orders: Orders) -> Shown:
+        """Take the orders' substeps and record them."""
+        ids, width = orders.ids, self._batch.qpos.shape[1]
+        before = self._batch.qpos[ids, None]
+        try:
+            shown = self._steps.take(ids, orders.control)
+        except Diverged as error:
+            raise self._error(error, orders) from None
+        standing, load = self._senses.feel(ids, shown["sensors"], shown["force"])
+        return shown | {
+            "qpos": np.concatenate([before, shown["after"][:, :-1, :width]], axis=1),
+            "force": shown["force"][:, :, self._columns.ctrl],
+            "standing": standing,
+            "load": load,
+            "targets": orders.tips,
+        }
+
+    def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
+        """Raise InputError if a walk, (n, substep, column) until it falls, leaves the ground."""
+        conditions = self.settled.conditions
+        if conditions.ground not in WITH_ENDS:
+            return
+        feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
+        beyond = beyond_the_ground(conditions, feet).any(axis=2)
+        beyond &= np.arange(sensors.shape[1]) < valid[:, None]
+        if beyond.any():
+            row, substep = np.argwhere(beyond)[0]
+            x, y, _ = feet[row, substep].mean(axis=0).round().tolist()
+            place = f"x = {x:g} mm, y = {y:g} mm"
+            raise InputError(f"start {ids[row]} leaves the {conditions.ground} at {place}; expected a shorter walk")
+
+    def _error(self, error: Diverged, orders: Orders) -> SimulationError:
+        """The user's error of a start that diverged while it carried out orders."""
+        time = orders.plan.time[0] + (error.substep / self.settled.substeps - 1) * self.settled.stride.dt
+        doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
+        return walk_error(error, doing, time, self.settled.conditions)
+
+    def _apply_push(self, orders: Orders) -> None:
+        """Push the starts whose push acts when the orders begin."""
+        if self._push:
+            self._batch.push[:] = 0.0
+        if self._push and self._push.impulse.any():
+            stride, seconds = self.settled.stride, self.settled.conditions.seconds(self.settled.stride)
+            first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions, stride)
+            begin = self._push.begins(stride)
+            now = (begin <= first) & (first < begin + lasts)
+            self._batch.push[:] = now * (self._push.impulse / (lasts * seconds))
+            self._pushed += (begin == first) * np.abs(self._push.impulse)
+
+
+class Senses:
+    """Senses of settled starts; a foot stands if the ground carried it within the last `Conditions.contact_gap`."""
+
+    def __init__(self, settled: Settled) -> None:
+        """All feet stand."""
+        self._compiled = settled.compiled
+        self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
+        gap = settled.conditions.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
+        self._longest_gap = math.floor(gap * (1.0 + ROUNDING))  # substeps
+        self._before = np.ones(settled.starts.shape, dtype=bool)
+        self._load, self._torques = settled.load.copy(), settled.torques.copy()
+
+    def restart(self, ids: np.ndarray, settled: Settled) -> None:
+        """Put some starts at rest again, as others that were settled, (n,)."""
+        self._unloaded[ids], self._before[ids] = 0, True
+        self._load[ids], self._torques[ids] = settled.load, settled.torques
+
+    def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Take in the next substeps of some starts.
+
+        Args:
+            ids: of the starts, (n,).
+            sensors: as of `engine.Rolled`.
+            force: of the actuators, the joints' first, (n, substep, actuator).
+
+        Returns:
+            Which feet stand after each substep, and the force of the ground on them along its normal, without adhesion
+            [g mm/s^2], both (n, substep, leg).
+        """
+        felt = self._unloaded, self._load, self._torques
+        loads = self._compiled.carried(sensors, force)
+        touch = sensors[..., self._compiled.columns.touch]
+        return _feel(ids, touch, loads, force, self._longest_gap, felt), loads
+
+    def standing(self, ids: np.ndarray | slice = np.s_[:]) -> np.ndarray:
+        """Which feet of some starts stand now, (n, leg), by default of all."""
+        return self._unloaded[ids] <= self._longest_gap
+
+    def sensed(self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> Sensed:
+        """What some starts sense; contacts gained and lost are those since the last call.
+
+        Args:
+            ids: of the starts, (n,).
+            qpos: (n, position).
+            qvel: (n, velocity).
+        """
+        before, contact = self._before[ids], self.standing(ids)
+        self._before[ids] = contact
+        joints, root = qpos[:, self._compiled.columns.qpos].reshape(len(ids), 6, -1), qpos[:, 3:ROOT_QPOS]
+        return Sensed(
+            ids=ids.copy(),
+            tips=self._compiled.forward(joints),
+            contact=contact,
+            gained=contact & ~before,
+            lost=before & ~contact,
+            load=self._load[ids],
+            joints=joints,
+            torques=self._torques[ids].reshape(joints.shape),
+            tilt=np.arcsin(np.clip(lean(root)[0], -1.0, 1.0)),
+            velocity=np.concatenate([turned(qvel[:, None, :2], -heading(root))[:, 0], qvel[:, 2:3]], axis=1),
+            turning=qvel[:, 3:ROOT_QVEL],
+        )
+
+
+@jitted
+def _feel(ids: Any, touch: Any, loads: Any, force: Any, longest_gap: int, felt: Any) -> Any:
+    """See `Senses.feel`; updates `felt`: substeps without touch and load, (start, leg), and torques, (start, joint)."""
+    unloaded, load, torques = felt
+    standing = np.empty(touch.shape, dtype=np.bool_)
+    for i, start in enumerate(ids):
+        for t in range(touch.shape[1]):
+            for leg in range(6):
+                unloaded[start, leg] = 0 if touch[i, t, leg] > 0 else unloaded[start, leg] + 1
+                standing[i, t, leg] = unloaded[start, leg] <= longest_gap
+        load[start] = loads[i, -1]
+        for joint in range(torques.shape[1]):
+            torques[start, joint] = force[i, -1, joint]
+    return standing
+
+
+def _joined(values: list[np.ndarray]) -> np.ndarray:
+    """Join values over the substeps, (n, substep, ...)."""
+    return values[0] if len(values) == 1 else np.concatenate(values, axis=1)
