@@ -24,13 +24,8 @@ from hexmj.physics.rollout import drive
 from hexmj.physics.settle import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
-<<<<<<< HEAD
 from hexmj.search.problems import Sample
 from hexmj.studies.entrants import entrants
-=======
-from hexmj.search.problems import Sample
-from hexmj.studies.league.entrants_by_name import entrants
->>>>>>> a504e1a (Join the search into five modules; move its command's logic there)
 from hexmj.walks import PlannedWalk
 from tiers import few_of
 

@@ -110,7 +110,7 @@ class InsectPhysics(mujoco.Physics):
         self._control[:] = self._rows[0]
 
     def step(self, nstep: int = 1) -> None:
-        """Advance by `nstep` substeps, which are divided if a foot strikes the ground, see `fine_steps`."""
+        """Advance by `nstep` substeps, which are divided if a foot strikes the ground, see `substeps`."""
         rows = self._rows
         rows[0] = self._control
         if len(rows) < nstep:

@@ -31,7 +31,7 @@ AHEAD = 128
 """Steps planned at once without sensory feedback."""
 
 Take = Callable[[np.ndarray, np.ndarray], Shown]
-"""Takes one step of some bodies, (n,), with controls, (n, substep, actuator); see `fine_steps.FineSteps.take`."""
+"""Takes one step of some bodies, (n,), with controls, (n, substep, actuator); see `substeps.FineSteps.take`."""
 
 Bodies = Union["Alone", MujocoBatch]
 """Engine of the insects, which shows their places and puts them into a state."""
@@ -258,7 +258,7 @@ class Walkers:
 
 
 class Alone:
-    """An `Engine` of one body, bit for bit as `physics.backend.MujocoBatch`; every `ids` is [0].
+    """An `Engine` of one body, bit for bit as `physics.engine.MujocoBatch`; every `ids` is [0].
 
     Between two steps, the first half of the next step is done already, so that places are current.
     """
@@ -274,7 +274,7 @@ class Alone:
         self._warned, self._begun = data.warning.number, np.empty((1, mujoco.mj_stateSize(model, _STATE)))
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """Put the body into a state, see `backend.Engine.put`."""
+        """Put the body into a state, see `engine.Engine.put`."""
         mujoco.mj_setState(self.model, self.data, states[0], _STATE)
         mujoco.mj_step1(self.model, self.data)
 
@@ -286,7 +286,7 @@ class Alone:
         mujoco.mj_step1(self.model, self.data)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """Take one step of the plan; if a foot strikes the ground, by `fine_steps.FineSteps.take`."""
+        """Take one step of the plan; if a foot strikes the ground, by `substeps.FineSteps.take`."""
         check_no_callbacks()
         substeps = control.shape[1]
         mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
@@ -297,7 +297,7 @@ class Alone:
         return {"sensors": sensors, "force": force}
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """Take substeps, see `backend.Engine.roll`; neither torques nor states are stored."""
+        """Take substeps, see `engine.Engine.roll`; neither torques nor states are stored."""
         before = np.empty_like(self._begun)
         mujoco.mj_getState(self.model, self.data, before[0], _STATE)
         if parts == 1:

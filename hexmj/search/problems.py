@@ -173,7 +173,7 @@ class Sample:
         """Let the starts of all variants come to rest if candidates walk physically.
 
         Raises:
-            InputError, SimulationError: a start does not, see `physics.settling.settle`.
+            InputError, SimulationError: a start does not, see `physics.settle.settle`.
         """
         from hexmj.physics.settle import settle
 
