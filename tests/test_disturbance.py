@@ -1,30 +1,50 @@
-"""Disturbed walks: the plan that meets a disturbance, and the strategies."""
+"""Disturbed walks: the plan that meets a disturbance, the strategies, the starts, and the frequencies."""
 
-from dataclasses import replace
+import json
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, SensoryFeedback, Stride, physical_walk
+from hexmj import (
+    HWS,
+    LDVS,
+    UNCOORDINATED,
+    Acceleration,
+    Conditions,
+    Cruse1998,
+    InputError,
+    SensoryFeedback,
+    Stride,
+    draw_starts,
+    first_loss,
+    physical_walk,
+    walk,
+)
+from hexmj.controllers.baselines.table import BASELINES
 from hexmj.controllers.checked_plans import begin
-from hexmj.controllers.losses import planned_losses
-from hexmj.controllers.protocol import Sensed
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.feedback import SensedPlan
-from hexmj.measures.kinematic import first_loss, walk
+from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.disturbance import DisturbedWalks, every_case, with_flss_after
 from hexmj.studies.disturbed_walks import (
     PAUSE,
+    SETTLED,
+    Case,
     Disturbance,
     Disturbed,
     DisturbedPlan,
     Postures,
+    StableWalks,
     collect_postures,
     disturbance_of,
     find_stable_starts,
     reorganise,
 )
+from hexmj.sweep import run_study
 from tiers import few_of
 
 STRIDE, V, GRID = Stride(), 0.5, 20
@@ -201,14 +221,6 @@ def test_a_reorganised_walk_goes_on_with_the_posture_s_states(postures):
         assert not whole.velocity[step:resumed, start].any() and whole.velocity[resumed, start] == V
 
 
-def test_planned_losses_are_those_of_the_network():
-    starts = np.random.default_rng(1).uniform(-10, 10, (40, 6))
-    lost = planned_losses(begin(LDVS, starts, 0.7, STRIDE), np.array(1200))
-    times = np.where(lost > 0, lost * STRIDE.dt, np.inf)
-    np.testing.assert_allclose(times, first_loss(starts, LDVS, 0.7, 120.0))
-    assert 0 < np.isfinite(times).sum() < 40
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", few_of(["halt", "leg", "push"], "leg"))
 @pytest.mark.parametrize("strategy", ["none", "reorganise", "slow_down"])
@@ -240,22 +252,213 @@ def test_a_halted_start_holds_on_to_where_its_tips_were_seen():
     np.testing.assert_allclose(rest[-1].x[0, start], tips[0] - V * STRIDE.dt)
 
 
-def test_disturbances_that_make_no_sense_are_refused():
-    wrong: list[tuple[Any, list[float], list[int]]] = [
-        ("jump", [1], [0]),
-        ("halt", [-1], [0]),
-        ("halt", [0.5], [0]),
-        ("leg", [1], [6]),
-    ]
-    for kind, step, leg in wrong:
-        with pytest.raises(InputError, match=r"expected|valid names"):
-            Disturbance(kind, np.array(step), np.array(leg))
-    one = Disturbance("halt", np.array([1]), np.array([0]))
-    with pytest.raises(InputError, match="a disturbance of 1 starts; expected one of 6"):
-        begin(Disturbed(LDVS, one), STABLE.starts, V, STRIDE)
-    with pytest.raises(InputError, match="expected above 0 and at least"):
-        DisturbedWalks(LDVS, velocities=[0.05], n_starts=2)
-    with pytest.raises(InputError, match="none of 20 starts reaches"):
+def test_starts_are_stable_until_disturbed_and_do_not_depend_on_their_number():
+    period = 20 * (1 + 1 / V) / STRIDE.dt
+    assert (STABLE.step % GRID == 0).all()
+    assert ((STABLE.step >= SETTLED * period) & (STABLE.step < (SETTLED + 1) * period + GRID)).all()
+    assert np.isinf(first_loss(STABLE.starts, LDVS, V, STABLE.step * STRIDE.dt)).all()
+    more = find_stable_starts(LDVS, V, 50, 0, STRIDE, GRID)
+    for name in ("starts", "step", "draw"):
+        assert np.array_equal(getattr(more, name)[:6], getattr(STABLE, name))
+
+
+def test_only_losses_after_the_disturbance_and_within_the_window_count():
+    #              before, short, between, whole's end, later, never
+    lost = [[5.0, 20.0, 31.0, 45.0, 45.1, np.inf], [np.inf, np.inf, np.inf, 12.0, np.inf, np.inf]]
+    table = xr.Dataset(
+        {
+            "time": (("velocity", "case", "start"), np.full((1, 2, 6), 10.0)),
+            "back": (("velocity", "case", "start"), np.full((1, 2, 6), 25.0)),
+            "planned_loss": (("velocity", "case", "start"), [lost]),
+        },
+        coords={
+            "duration": ("velocity", [20.0]),
+            "disturbance": ("case", ["halt", "halt"]),
+            "strategy": ("case", ["none", "slow_down"]),
+        },
+    )
+    result = with_flss_after(table).isel(velocity=0)
+    assert result.kinematic_reached.values.tolist() == [5, 6]
+    np.testing.assert_allclose(result.kinematic.sel(observation_time="short"), [1 / 5, 1 / 6])
+    np.testing.assert_allclose(result.kinematic.sel(observation_time="whole"), [3 / 5, 1 / 6])
+    np.testing.assert_allclose(result.kinematic_buys.sel(observation_time="whole")[1], 2 / 5)
+    assert (result.kinematic_low <= result.kinematic).all() and (result.kinematic <= result.kinematic_high).all()
+
+
+FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "observation_time": 30.0}
+
+
+@pytest.mark.thorough
+def test_disturbed_walks_can_read_their_legs():
+    halted: dict[str, Any] = FEW | {
+        "disturbances": ["halt"],
+        "strategies": ["reorganise"],
+        "n_starts": 2,
+        "observation_time": 15.0,
+    }
+    alone, model_variant = (run_study(DisturbedWalks(one, **halted)) for one in (LDVS, SensoryFeedback(LDVS)))
+    assert np.isfinite(model_variant.physical.sel(observation_time="whole")).all()
+    assert all(model_variant[name].equals(alone[name]) for name in ("time", "back", "planned_loss"))
+
+
+@pytest.mark.thorough
+def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
+    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "observation_time": 45.0}
+    study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)
+    result = run_study(study, tmp_path, threads=1)
+    assert result.physical_reached.values.tolist() == [[4, 4]]
+    assert result.physical.sel(observation_time="whole").values.tolist() == [[0.0, 0.25]]
+    assert (result.planned_loss.isel(case=0) == result.planned_loss.isel(case=1)).all()
+    files = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    assert len(files) == 2
+    assert run_study(study, tmp_path, threads=2).identical(result)
+    assert files == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    other = run_study(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
+    assert other.fall[0, 2].equals(result.fall[0, 1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["halt", "leg", "push"])
+def test_some_starts_alone_go_as_among_all(kind):
+    walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)
+    asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
+    every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
+    assert alone.identical(every.isel(start=[2, 0]))
+
+
+@dataclass(frozen=True)
+class Lifts:
+    """LDVS, which lifts its feet itself, and steps beside its lines."""
+
+    name: str = "lifts"
+
+    def begin(self, *given, **how) -> Any:
+        return self.begin_at_speed(*given, **how)
+
+    def begin_at_speed(self, *given, **how) -> Any:
+        plan: Any = LDVS.begin_at_speed(*given, **how)
+        goes_on = plan.advance
+
+        def advance(steps):
+            walk = goes_on(steps)
+            return replace(walk, y=walk.y + 0.01 * walk.x, height=np.where(walk.stance, 0.0, 9.0))
+
+        plan.advance = advance
+        return plan
+
+
+def test_a_halted_start_puts_its_feet_down_where_they_are():
+    disturbed = Disturbed(Lifts(), disturbance("halt"))
+    walk = disturbed.begin(STABLE.starts, np.full(6, V), STRIDE).advance(STEPS)
+    for start, step in enumerate(STABLE.step):
+        rest = slice(step, step + PAUSED)
+        assert np.isnan(walk.height[rest, start]).all() and walk.stance[rest, start].all()
+        assert (walk.y[rest, start] == walk.y[step - 1, start]).all() and (
+            walk.y[:step, start] != walk.y[0, start]
+        ).any()
+        assert not np.isnan(walk.height[step + PAUSED :, start]).any()
+
+
+@dataclass(frozen=True)
+class Stands(Lifts):
+    """On all its feet."""
+
+    name: str = "stands"
+
+    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
+        plan: Any = LDVS.begin_at_speed(*given, **how)
+        goes_on = plan.advance
+        plan.advance = lambda steps: replace(goes_on(steps), stance=np.ones((steps, *plan.starts.shape), dtype=bool))
+        return plan
+
+
+def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
+    with pytest.raises(InputError, match="leg"):
+        disturbance_of(STABLE, "leg", Stands(), V, STRIDE)
+
+
+def test_a_start_that_is_halted_restarts_beside_tips_that_are_some(monkeypatch):
+    """What it hands on is the plan's own to change, and of starts that do not restart it is where they began."""
+    starts, given = draw_starts(6, 0), []
+    righetti: Any = BASELINES["righetti"]
+    plan_of = type(righetti.begin(starts, np.full(6, 0.5), Stride()))
+    restart = plan_of.restart
+
+    def kept(plan, which, tips):
+        given.append(tips.copy())
+        restart(plan, which, tips.copy())
+        tips[:], which[:] = np.nan, True
+
+    disturbed = Disturbed(righetti, Disturbance("halt", np.arange(6) * 50 + 20, np.zeros(6, dtype=int)))
+    usual = begin(disturbed, starts, 0.5, Stride()).advance(600)
+    monkeypatch.setattr(plan_of, "restart", kept)
+    walk = begin(disturbed, starts, 0.5, Stride()).advance(600)
+    assert np.array_equal(walk.x, usual.x)
+    assert len(given) == 6
+    assert np.array_equal(given[0][1:], starts[1:])
+
+
+@dataclass(frozen=True)
+class Unsteerable:
+    name: str = "unsteerable"
+
+    def begin(self, *given, **how):
+        return LDVS.begin(*given, **how)
+
+
+def test_any_weights_can_be_disturbed():
+    """General weights have no hash."""
+    controller = Cruse1998(general(HWS.weights))
+    study = DisturbedWalks(controller, disturbances=["halt"], strategies=["reorganise"], kinematic=True, **FEW)
+    assert np.isfinite(run_study(study).kinematic.sel(observation_time="whole")).all()
+
+
+def test_without_physics_pushes_and_grasping_are_left_out():
+    cases = every_case(["halt", "push"], [1.0], ["reorganise", "grasp"], physical=False)
+    assert [(case.disturbance, case.strategy) for case in cases] == [
+        ("undisturbed", "none"), ("halt", "none"), ("halt", "reorganise"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("disturbances", {"disturbances": ["fall"]}),
+        ("disturbances", {"disturbances": ["halt", "halt"]}),
+        ("strategies", {"strategies": ["jump"]}),
+        ("impulses", {"impulses": [-1.0]}),
+        ("impulses", {"impulses": []}),
+        ("disturbances", {"disturbances": ["push"], "kinematic": True}),
+        ("velocities", {"velocities": [0.05]}),
+        ("observation_time", {"observation_time": 1.9}),
+        ("duration", {"recovery": 1e-7}),
+        ("grasp", {"conditions": Conditions(grasp=3.0)}),
+        (
+            "unsteerable",
+            {"controller": Unsteerable()},
+        ),
+    ],
+)
+def test_bad_input_is_refused(name, wrong):
+    with pytest.raises(InputError, match=name):
+        DisturbedWalks(**{"controller": LDVS} | FEW | wrong)
+
+
+def test_walks_that_cannot_be_disturbed_are_errors():
+    alone = Disturbance("halt", np.array([1]), np.array([0]))
+    with pytest.raises(InputError):
+        begin(Disturbed(LDVS, alone), STABLE.starts, V, STRIDE)
+    with pytest.raises(InputError):
         collect_postures(UNCOORDINATED, 0.9, 0, STRIDE)
-    with pytest.raises(InputError, match="expected fewer starts or a lower velocity"):
+    with pytest.raises(InputError):
         find_stable_starts(UNCOORDINATED, 0.9, 50_000, 0, STRIDE, GRID)
+
+
+@pytest.mark.slow
+def test_the_command_writes_its_files(tmp_path, run):
+    words = ["disturb", "--kinematic", "--velocities", 0.5, "--starts", 20, "--out", tmp_path / "out"]
+    code, text, _ = run(*words, "--strategies", "slow_down", "--json")
+    assert code == 0
+    assert json.loads(text)["strategy"] == ["none", "none", "slow_down", "none", "slow_down"]
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"disturb.nc", "disturb.png", "manifest.json", "walks"}

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.bodies.mjcf import gravity
 from hexmj.rotations import lean
 from hexmj.stability import walk_margin
 from hexmj.walks import Walk
@@ -128,6 +127,8 @@ def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]
 
 def _time_constant(walk: "PhysicalWalk") -> int:
     """Return the time constant of an inverted pendulum of the standing height, sqrt(h / g), in steps of the plan."""
+    from hexmj.bodies.mjcf import gravity
+
     seconds = np.sqrt(walk.conditions.standing_height / gravity(walk.conditions.body))
     return int(np.ceil(seconds / walk.conditions.seconds(walk.stride)))
 
