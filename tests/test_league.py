@@ -1,39 +1,44 @@
-"""A small league: what it comes to, and how its tables and figures show it."""
+"""The league: entrants, cells, standings with ranks, tables and figures, and walks that fail."""
 
-from dataclasses import replace
-from itertools import pairwise
-from typing import Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypedDict
 
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose
 
 import hexmj
+from hexmj.conditions import Conditions
+from hexmj.controllers.cruse1998.presets import network_toml
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.errors import InputError
-from hexmj.measures.figures import rules
+from hexmj.controllers.protocol import settings_of
+from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
+from hexmj.measures.figures import network_rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
+from hexmj.measures.tables import frequencies, happened
 from hexmj.physics.settle import settle
-from hexmj.plain import plain
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
-from hexmj.studies.entrants import Entrant, entrants
+from hexmj.studies.entrants import EVERYONE, Entrant, entrants, short_names
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import losses, walks
+from hexmj.studies.league_cells import losses, unless_refused, walks
 from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
-from hexmj.studies.standings import by_rank, league_markdown, tables
+from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells
 from hexmj.timing import Stride
-from standing_still import Still
+from standing_still import Still, Stretched
 
+SHORT: dict[str, Any] = {"accelerating": False, "periods": 12, "seed": 0}
 NAMES = ("wilson", "ldvs", "graham-ideal")
 
 
 @pytest.fixture(scope="module")
 def league() -> League:
     takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(takes_part, (0.3, 0.6), 12, 2, 2, observation_time=40.0, accelerating=False, periods=12, seed=0)
+    return League(takes_part, (0.3, 0.6), 2, 2, n_starts=12, observation_time=40.0, **SHORT)
 
 
 @pytest.fixture(scope="module")
@@ -70,12 +75,6 @@ def test_the_way_is_what_was_walked_in_whole_steps() -> None:
 
 
 @pytest.mark.slow
-def test_everything_tells_its_units(result) -> None:
-    assert {values.attrs["units"] for values in result.values()} == {"1", "mm/s", "time unit"}
-    assert (result.slip.units, result.reached.units, result.cost.units) == ("mm/s", "time unit", "1")
-
-
-@pytest.mark.slow
 def test_differences_are_those_on_the_same_starts(result) -> None:
     assert result.attrs["reference"] == "ldvs"
     assert not result.kinematic_above.sel(entrant="ldvs").any()
@@ -102,7 +101,7 @@ def test_what_cannot_be_asked_is_not_known(result) -> None:
 @pytest.mark.slow
 def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, data) -> None:
     """But for those of disturbances, which look long for starts that keep stability until then."""
-    alone = replace(league, entrants={"wilson": league.entrants["wilson"]}, velocities=(0.6,)).named_cells()
+    alone = replace(league, controllers={"wilson": league.controllers["wilson"]}, velocities=(0.6,)).named_cells()
     asked = {name: cell for name, cell in alone.items() if name[1] not in ("halt", "leg", "push")}
     assert len(asked) > 10
     for name, cell in asked.items():
@@ -112,20 +111,8 @@ def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League,
 def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:
     """It lasts 2 time units."""
     for observation_time, pushed in ((1.9, False), (2.0, True)):
-        short = replace(league, entrants={"ldvs": league.entrants["ldvs"]}, observation_time=observation_time)
+        short = replace(league, controllers={"ldvs": league.controllers["ldvs"]}, observation_time=observation_time)
         assert (("ldvs", "push") in short.named_cells()) == pushed
-
-
-def test_velocities_that_look_alike_are_not_the_same(league: League) -> None:
-    near = replace(league, velocities=(0.3, 0.3000001))
-    assert len(near.named_cells()) == len(league.named_cells())
-
-
-@pytest.mark.parametrize("name", ["n_physical", "n_tried"])
-def test_no_more_starts_walk_in_physics_than_on_paper(league: League, name: str) -> None:
-    how: dict[str, Any] = {name: 13}
-    with pytest.raises(InputError, match=f"{name} = 13; expected at most n_starts = 12"):
-        replace(league, **how)
 
 
 @pytest.mark.parametrize("observation_time", ["start", 40.0])
@@ -143,8 +130,6 @@ def test_tables_and_figure_show_every_entrant(result) -> None:
         assert {row[0] for row in table.rows} == {*NAMES, "still"}
         assert all(len(row) == len(table.head) for row in table.rows)
         assert f"### {table.title}" in text
-        assert ("FLSS of" in table.title) == table.title.endswith("; graham-ideal from one start")
-    assert "graham-ideal from one start" in league_figure(result).get_supxlabel()
     assert "nan" not in text
     for draw in (league_figure, walks_figure):
         names = [label.get_text() for label in draw(result).axes[0].get_yticklabels()]
@@ -164,43 +149,192 @@ def test_figures_say_where_walks_are_missing_and_where_nothing_is_known(result) 
     few, most = result.fell_starts.values, result.fell_starts.max().item()
     assert trials.count(NOTHING) == np.isnan(result.fell).sum() > 0
     assert trials.count(FEWER) == ((few > 0) & (few < most)).sum()
-    assert f"{NOTHING} not asked" in walks_figure(result).get_supxlabel()
+    assert NOTHING in walks_figure(result).get_supxlabel()
     lost = result.missing.copy()
     lost.loc[{"entrant": "still", "velocity": 0.6}] = 1
     fewer = result.assign(missing=lost)
     figure = league_figure(fewer)
     assert [one.count(FEWER) for one in marks(figure)[:3]] == [0, 1, 1]
-    assert "walks are missing that diverged or were out of reach (in all still 1)" in figure.get_supxlabel()
+    assert "still 1" in figure.get_supxlabel()
     assert FEWER in marks(walks_figure(fewer))[3]
-
-
-@pytest.mark.slow
-def test_titles_and_panels_keep_clear_of_each_other(result) -> None:
-    for draw in (league_figure, walks_figure):
-        for shown in (result, result.isel(velocity=[0], entrant=[0]).assign_attrs(velocities="[0.3]")):
-            figure = draw(shown)
-            figure.draw_without_rendering()
-            boxes = [axes.title.get_window_extent() for axes in figure.axes if axes.get_title()]
-            assert len(boxes) == 4
-            assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
-            assert boxes[0].x0 >= 0 and boxes[-1].x1 <= figure.bbox.width
-
-
-@pytest.mark.slow
-def test_a_set_that_is_not_read_as_printed_is_told_everywhere(league: League, data) -> None:
-    """Whatever it did: here all of them did what ldvs does."""
-    others = replace(league, entrants=entrants(("lasting", "ldvs", "walknet", "walknet-reacog")))
-    result = others.result([data["ldvs", what] for _, what in others.named_cells()])
-    assert hexmj.settings(result)["not_printed"] == {"reading lasting": ["lasting"]}
-    assert "| lasting (reading lasting) |" in league_markdown(result)
-    for which in ("league", "walks"):
-        title = hexmj.plot(result, which).get_suptitle()
-        assert "reading lasting: lasting; " in title and title.count("lasting") == 2
 
 
 def test_sequential_sets_and_those_that_read_legs_are_told_too() -> None:
     slow = replace(hexmj.load_controller("lasting"), order="sequential")  # pyright: ignore[reportArgumentType]
     for one in (slow, SensoryFeedback(slow)):
-        assert rules(plain(one)) == "sequential order, reading lasting"
+        assert network_rules(settings_of(one)) == "sequential order, model variant lasting"
     for name in ("ldvs", "walknet", "graham"):
-        assert rules(plain(hexmj.load_controller(name))) == ""
+        assert network_rules(settings_of(hexmj.load_controller(name))) == ""
+
+
+class Walked(TypedDict):
+    """How walks go."""
+
+    seed: int
+    conditions: Conditions
+    stride: Stride
+
+
+def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
+    entrant, how = Entrant(Stretched()), Walked(seed=0, conditions=Conditions(), stride=Stride())
+    found = walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
+    refused = hexmj.draw_starts(6, 0)[:, 0] > 0
+    assert refused.any() and not refused.all()
+    still = walks(Entrant(Still()), Still(), 0.5, 10.0, n_starts=6, **how)
+    for name, values in found.items():
+        assert np.isnan(values.values[refused]).all()
+        assert np.array_equal(values.values[~refused], still[name].values[~refused], equal_nan=True)
+    assert np.array_equal(happened(found.fall).isnull(), refused)
+    told = frequencies("fell", happened(found.fall).values[None], ("entrant",))
+    assert told["fell_starts"][1] == (~refused).sum()
+
+
+def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -> None:
+    entrant = Entrant(Stretched())
+    alone = League(
+        {"far": entrant}, (0.5,), 1, 1, n_starts=1, observation_time=10.0, accelerating=False, periods=12, seed=0
+    )
+    result = alone.result([cell.compute(threads=1) for cell in alone.cells()])
+    assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
+    assert "nan" not in league_markdown(result)
+    league_figure(result)
+    walks_figure(result)
+
+
+@pytest.mark.parametrize("error", [SimulationError, OutOfReach, StillThrown])
+def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[Exception]) -> None:
+    def walked(which: np.ndarray, refused: tuple[int, ...] = ()) -> xr.Dataset:
+        if np.isin(which, refused).any():
+            raise error("refused")
+        return xr.Dataset({"fall": ("start", np.sqrt(which), {"units": "mm"})})
+
+    def found(*refused: int) -> xr.DataArray:
+        return unless_refused(lambda which: walked(which, refused), 4, {"fall": "mm"}).fall
+
+    whole = found()
+    assert found(2).identical(whole.where([True, True, False, True]))
+    assert np.isnan(found(0, 1, 2, 3)).all()
+    with pytest.raises(ZeroDivisionError):
+        unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
+
+
+@pytest.mark.slow
+def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
+    one = League(
+        {"far": Entrant(Stretched())},
+        (0.5,),
+        6,
+        1,
+        n_starts=6,
+        observation_time=10.0,
+        accelerating=False,
+        periods=12,
+        seed=0,
+    )
+    result = one.result([cell.compute(threads=1) for cell in one.cells()])
+    left = int((hexmj.draw_starts(6, 0)[:, 0] <= 0).sum())
+    assert result.missing.item() == 6 - left and 0 < left < 6
+    text = league_markdown(result)
+    assert f") of {left} |" in text and f"far (walks missing: {6 - left}) |" in text
+
+
+def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
+    entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions(settling_time=3.0), stride=Stride())
+    with pytest.raises(SimulationError):
+        walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)
+
+
+def test_a_difference_leaves_out_starts_that_are_not_known_and_takes_parts_of_walks() -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.uniform(size=(2, 50)) < [[0.3], [0.5]]
+    known = rng.uniform(size=50) < 0.8
+    blanked = np.where(known, one, np.nan)
+    assert np.array_equal(paired_difference(blanked, other), paired_difference(one[known], other[known]))
+    assert np.isnan(paired_difference(np.full(50, np.nan), other)).all()
+    middle, low, high = paired_difference(one / 2, other / 2)
+    whole = paired_difference(one, other)
+    assert np.isclose(middle, whole[0] / 2) and low < middle < high and high - low < whole[2] - whole[1]
+
+
+def test_ranks_are_given_only_where_intervals_separate() -> None:
+    rng = np.random.default_rng(0)
+    often, rarely, seldom = (rng.uniform(size=200) < p for p in (0.8, 0.2, 0.22))
+    best, worst = ranks(np.array([often, rarely, seldom, np.full(200, np.nan)], dtype=float))
+    assert best.tolist() == [3, 1, 1, 0]
+    assert worst.tolist() == [3, 2, 2, 0]
+    few = np.array([[0.0, 0.0], [1.0, 1.0]])  # two starts separate nobody
+    assert [one.tolist() for one in ranks(few)] == [[1, 1], [2, 2]]
+
+
+def test_paired_differences():
+    rng = np.random.default_rng(0)
+    one, other = rng.random((2, 5, 4000)) < np.array([0.5, 0.3])[:, None, None]
+    middle, low, high = paired_difference(one, other)
+    assert_allclose(middle, one.mean(axis=1) - other.mean(axis=1))
+    back, back_low, back_high = paired_difference(other, one)
+    assert_allclose([back, back_low, back_high], [-middle, -high, -low])
+    spread = (one.astype(float) - other).std(axis=1) / np.sqrt(4000)  # of the mean, for many starts
+    assert_allclose(high - low, 2 * 1.96 * spread, rtol=0.01)
+    same, low, high = paired_difference(one, one)
+    assert_allclose(same, 0.0)
+    assert (low < 0).all() and (high > 0).all()
+
+
+def test_everyone_is_found_and_can_be_asked_everything() -> None:
+    takes_part = entrants(EVERYONE)
+    assert len(takes_part) == len(EVERYONE)
+    named = League(takes_part).named_cells()
+    for name, entrant in takes_part.items():
+        asked = {what for one, what in named if one == name}
+        assert "physics 0.5" in asked and "kinematic 0.5" in asked
+        assert entrant.ideal != ({*TRIALS} <= asked)
+    with pytest.raises(InputError, match="ideal_start"):
+        entrants(("ldvs-ideal",))
+
+
+OWN = """
+from dataclasses import dataclass
+from hexmj.controllers.baselines.metronomes import Metronome
+
+@dataclass(frozen=True)
+class One(Metronome):
+    name: str = "one"
+
+@dataclass(frozen=True)
+class Ldvs(One):
+    name: str = "ldvs"
+"""
+
+
+def test_controllers_of_files_have_short_and_distinct_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.py").write_text(OWN)
+    Path("found.toml").write_text(network_toml(hexmj.LDVS))
+    expected = {"own.py:One": "one", "own.py:Ldvs": "own.py:Ldvs", "found.toml": "found", "ldvs": "ldvs"}
+    assert short_names({name: hexmj.load_controller(name) for name in expected}) == expected
+    takes_part = entrants(("own.py:One", "own.py:One-ideal", "graham-ideal"))
+    assert [*takes_part] == ["one", "one-ideal", "graham-ideal"]
+    assert [entrant.ideal for entrant in takes_part.values()] == [False, True, True]
+
+
+@dataclass(frozen=True)
+class Many(Still):
+    def ideal_start(self, velocity, stride):
+        return np.zeros((3, 6))
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("controllers", lambda: League({})),
+        ("load", lambda: League(entrants(("ldvs",)), conditions=Conditions(load=2.0))),
+        ("ground", lambda: League(entrants(("ldvs",)), conditions=Conditions(ground="step"))),
+        ("periods", lambda: League(entrants(("ldvs",)), periods=0)),
+        ("trial_starts", lambda: League(entrants(("ldvs",)), trial_starts=0)),
+        ("ideal_start", lambda: entrants(("ldvs-ideal",))),
+        ("ideal_start", lambda: Entrant(Many(), ideal=True).starts(1, 0, 0.5, Stride())),
+    ],
+)
+def test_bad_input_is_refused(name: str, make: Any) -> None:
+    with pytest.raises(InputError, match=name):
+        make()

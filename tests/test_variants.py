@@ -1,12 +1,17 @@
 """Variants: the usual one is plain FLSS, each changes one thing, and a search over them costs what the study counts."""
 
 import json
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hexmj.studies.variants.figure import STYLES, variants_figure
+from hexmj.studies.variants.study import Variants, notes
 
 import hexmj
 from hexmj import HWS, LDVS, Conditions, FieldsForm, InputError, NetworkForm, Problem, SensoryFeedback, Stride
@@ -14,8 +19,6 @@ from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import ModelVariant
 from hexmj.legs import CENTRED
 from hexmj.search.problems import Sample
-from hexmj.studies.variants.figure import STYLES, variants_figure
-from hexmj.studies.variants.study import Variants, notes
 from hexmj.sweep import Cell, run_study
 from hexmj.variants import VARIANTS, instead, variants, varied
 
@@ -260,3 +263,12 @@ def test_the_command(run, result, tmp_path):
     assert told["flss"] == result.flss.values.tolist()
     assert told["worst_variant"] == result.worst_variant.values.tolist()
     assert {path.name for path in tmp_path.iterdir()} >= {"variants.nc", "variants.png", "manifest.json"}
+
+
+@pytest.mark.slow
+def test_the_example_prints_a_table(tmp_path):
+    words = ["--controllers", "ldvs", "own-V", "--velocities", "0.5", "--n-starts", "4", "--observation-time", "start"]
+    script = Path(__file__).parents[1] / "examples" / "variants.py"
+    done = subprocess.run([sys.executable, script, *words], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert all(name in done.stdout for name in variants())
+    assert (tmp_path / "results/variants/variants.nc").exists()

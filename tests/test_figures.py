@@ -1,0 +1,214 @@
+"""Results and their figures: saved and loaded without a change, and every number in its place."""
+
+import io
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+
+import hexmj
+from hexmj.errors import InputError
+from hexmj.plotting import FIGURES
+from hexmj.search.stages import history
+from hexmj.studies.ablation import Ablation, switched
+from hexmj.studies.biology import Biology
+from hexmj.studies.disturbance import DisturbedWalks
+from hexmj.studies.disturbed_walks import NO_DISTURBANCE
+from hexmj.studies.entrants import entrants
+from hexmj.studies.league import League
+from hexmj.studies.stability_map import StabilityMap
+from hexmj.studies.static_limit import StaticLimit
+from hexmj.studies.terrain import Terrain
+from hexmj.sweep import run_study
+from tiers import few_of
+
+PHYSICAL: dict[str, Any] = {"n_starts": 3, "observation_time": 20.0}
+KINEMATIC: dict[str, Any] = {"n_starts": 20, "observation_time": 20.0, "kinematic": True, "strategies": ["reorganise"]}
+FEW: dict[str, Any] = {"n_starts": 3, "physical_starts": 2, "periods": 12}
+SHORT: dict[str, Any] = FEW | {"trial_starts": 1, "observation_time": 10.0}
+NAME = "ß: 1 $"
+"""A name that JSON escapes, and that figures could set as a formula."""
+
+
+def compared() -> xr.Dataset:
+    conditions = hexmj.Conditions(vp=200.0, ground="step", friction=0.5)
+    how: dict[str, Any] = PHYSICAL | {"conditions": conditions, "acceleration": hexmj.Acceleration(rate=0.02)}
+    return hexmj.compare({NAME: hexmj.LDVS, "null": hexmj.load_controller("graham")}, [0.3, 0.5], **how)
+
+
+def searched() -> xr.Dataset:
+    costs = {"population": [0.9, 0.5, 0.7], "simplex": [0.6, 0.4, 0.5]}
+    return history([(stage, np.zeros((3, 1)), np.array(values)) for stage, values in costs.items()], ["a"], "FLSS")
+
+
+def recorded() -> xr.Dataset:
+    return hexmj.record(hexmj.physical_walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 10.0), 0, NAME)
+
+
+MADE: dict[str, Callable[[], xr.Dataset]] = {
+    "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], **PHYSICAL),
+    "compare": compared,
+    "map": lambda: run_study(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
+    "converge": lambda: run_study(StaticLimit(hexmj.LDVS, vps=[320.0, 160.0], **PHYSICAL)),
+    "terrain": lambda: run_study(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
+    "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **KINEMATIC)),
+    "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
+    "league": lambda: run_study(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
+    "ablate": lambda: run_study(Ablation({"ldvs": switched("ldvs")}, [0.5, 0.7], **FEW)),
+    "search": searched,
+    "recording": recorded,
+}
+QUICK = "flss", "compare", "search", "recording"
+
+
+@cache
+def made(name: str) -> xr.Dataset:
+    return MADE[name]()
+
+
+def pixels(result: xr.Dataset, which: str | None = None) -> bytes:
+    drawn = io.BytesIO()
+    hexmj.plot(result, which).savefig(drawn, format="rgba", dpi=50)
+    return drawn.getvalue()
+
+
+@pytest.mark.parametrize("name", few_of(MADE, *QUICK, "map", "terrain"))
+def test_a_result_and_its_figures_stay_the_same_when_saved_and_loaded(name: str, tmp_path: Path) -> None:
+    result = made(name)
+    read = hexmj.load(hexmj.save(result, tmp_path / "result.nc"))
+    assert read.equals(result) and hexmj.settings(read) == hexmj.settings(result)
+    for which in FIGURES[name]:
+        assert pixels(read, which) == pixels(result, which)
+
+
+@pytest.mark.parametrize("name", few_of([name for name in MADE if name != "recording"], "flss", "compare", "search"))
+def test_the_order_of_the_axes_changes_no_pixel(name: str) -> None:
+    result = made(name)
+    for which in FIGURES[name]:
+        assert pixels(result.transpose(*[*result.sizes][::-1]), which) == pixels(result, which)
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    few_of(
+        [("flss", "velocity"), ("compare", "velocity"), ("disturb", "velocity"), ("converge", "vp")],
+        ("flss", "velocity"),
+    ),
+)
+def test_curves_join_neighbours_in_any_order(name: str, axis: str) -> None:
+    drawn = hexmj.plot(made(name).isel({axis: slice(None, None, -1)}))
+    curves = [line.get_xdata() for axes in drawn.axes for line in axes.lines if line.get_linestyle() != "None"]
+    assert len(curves) > 0 and all(np.all(np.diff(x) >= 0.0) for x in map(np.asarray, curves))
+
+
+def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
+    """Title, row and column of each cell of a map's panels, its text and the number behind its colour."""
+    found, figure = [], hexmj.plot(result)
+    for axes in figure.axes:
+        (image,) = axes.images
+        labels = axes.get_xticklabels(), figure.axes[0].get_yticklabels()
+        columns, rows = ([text.get_text() for text in texts] for texts in labels)
+        for text in axes.texts:
+            x, y = map(int, text.get_position())
+            number = str(np.asarray(image.get_array())[y, x])
+            found.append((axes.get_title(), rows[y], columns[x], text.get_text(), number))
+    return sorted(found)
+
+
+def test_every_number_of_a_map_stands_in_its_cell() -> None:
+    result, backwards = made("map"), {"value": slice(None, None, -1), "velocity": slice(None, None, -1)}
+    whole = cells(result)
+    assert {words for *_, words in whole} - {"0.0", "nan"}
+    for other in (result.transpose("velocity", "value", ...), result.isel(backwards)):
+        assert cells(other) == whole
+    assert set(cells(result.isel(velocity=[1]))) < set(whole)
+
+
+def test_only_the_undisturbed_case_is_drawn_as_such() -> None:
+    result = made("disturb")
+    expected = result.kinematic.sel(observation_time="whole").isel(case=0).values
+    for figure in (hexmj.plot(result), hexmj.plot(result.isel(case=slice(None, None, -1)))):
+        lines = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() == ":"]
+        assert len(lines) == 2 and all(np.array_equal(np.asarray(line.get_ydata()), expected) for line in lines)
+    assert NO_DISTURBANCE in {text.get_text() for text in hexmj.plot(result).legends[0].get_texts()}
+
+
+def test_candidates_stand_at_their_evaluation() -> None:
+    def drawn(search: xr.Dataset) -> list[list[tuple[float, float]]]:
+        lines = hexmj.plot(search).axes[0].lines
+        return [[*zip(*np.asarray(line.get_data()).tolist(), strict=True)] for line in lines]
+
+    search = made("search")
+    assert drawn(search)[:2] == [[(1, 0.9), (2, 0.5), (3, 0.7)], [(1, 0.9), (2, 0.5), (3, 0.5)]]
+    assert drawn(search.sortby("cost")) == drawn(search)
+
+
+def test_one_velocity_is_a_list_of_one_and_is_seen() -> None:
+    alone, listed = (hexmj.flss(hexmj.LDVS, v, n_starts=5) for v in (0.3, [0.3]))
+    assert alone.identical(listed)
+    for result in (alone, made("compare").isel(velocity=[0])):
+        lines = [line for axes in hexmj.plot(result).axes for line in axes.get_lines()]
+        assert lines and all(line.get_marker() not in ("None", "", " ", None) for line in lines)
+
+
+def test_settings_are_those_that_were_given() -> None:
+    made_with = hexmj.settings(made("compare"))
+    assert made_with["study"] == "compare" and [*made_with["controllers"]] == [NAME, "null"]
+    assert made_with["conditions"] == hexmj.Conditions(vp=200.0, ground="step", friction=0.5).settings()
+    assert made_with["acceleration"] == {"rate": 0.02, "start": 0.1}
+    assert (made_with["observation_time"], made_with["starts"], made_with["seed"]) == (20.0, 3, 0)
+    assert hexmj.settings(hexmj.flss(hexmj.LDVS, 0.5, n_starts=2, seed=2**70))["seed"] == 2**70
+
+
+def test_the_title_names_what_differs_from_the_defaults() -> None:
+    title = hexmj.plot(made("compare")).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
+    for words in ("3 starts", "seed 0", "20 time units", "200 mm/s", "friction 0.5", "ground: step", "a = 0.02"):
+        assert words in title
+    assert "step height" not in title
+    lasting = hexmj.flss(hexmj.load_controller("lasting"), 0.5, n_starts=5, stride=hexmj.Stride(aep0=9.5))
+    title = hexmj.plot(lasting).get_suptitle()
+    assert title.count("lasting") == 2 and "9.5" in title
+    shown = hexmj.plot(made("compare").sel(controller=["null"])).get_suptitle()
+    assert "null" in shown and NAME[:2] not in shown
+
+
+def test_a_notebook_shows_a_figure() -> None:
+    shown = Image.open(io.BytesIO(hexmj.plot(made("flss"))._repr_png_()))  # pyright: ignore
+    assert shown.format == "PNG" and len(shown.convert("RGB").getcolors(1 << 20) or ()) > 20
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: hexmj.plot(xr.Dataset({"x": 1.0})),
+        lambda: hexmj.plot(made("flss"), "fate"),
+        lambda: hexmj.load("no such file.nc"),
+        lambda: hexmj.save(xr.Dataset({"x": ("i", np.array([{}, {}]))}), "a.nc"),
+    ],
+)
+def test_what_cannot_be_drawn_loaded_or_saved_is_an_error(
+    draw: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError):
+        draw()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", few_of(["svg", "png", "pdf"], "png"))
+def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path) -> None:
+    words = ["compare", "--velocities", "0.5", "--starts", "2", "--observation-time", "10", "--no-video"]
+    words += ["--format", form, "--out", str(tmp_path)]
+    subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)
+    drawn = tmp_path / f"comparison.{form}"
+    assert drawn.read_bytes()[:5] == {"png": b"\x89PNG\r", "pdf": b"%PDF-", "svg": b"<?xml"}[form]
+    if form == "png":
+        hexmj.plot(hexmj.load(tmp_path / "comparison.nc")).savefig(tmp_path / "again.png", dpi=150)
+        assert (tmp_path / "again.png").read_bytes() == drawn.read_bytes()
