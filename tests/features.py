@@ -44,6 +44,9 @@ RENAMED: dict[str, str] = {
     "reading": "model_variant",
     "readings": "model_variants",
     "ReadsLegs": "SensoryFeedback",
+    "n_physical": "physical_starts",
+    "n_tried": "trial_starts",
+    "tried_at": "trial_velocity",
 }  # key, file name or text in the reference -> its new name
 IGNORED = {"settings", "replayed"}  # keys and file names that are not compared; see `walk settings`
 TOLERANCE = {"rel_tol": 1e-4, "abs_tol": 1e-6}  # of floating-point numbers
@@ -374,8 +377,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "python vector": lambda: gymnasium_environment("make_vec", num_envs=3),
     "python stable-baselines3": stable_baselines,
     "python examples": examples,
-    # These two become scripts.
-    "variants": "variants --controller ldvs own-V --velocity 0.5 --starts 20 --observation-time start",
+    # This one becomes a script.
     "model_variants": model_variants,
 }
 

@@ -21,7 +21,7 @@ from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import Chunk, drive
 from hexmj.physics.settle import Settled, settle
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbed_walks import every_case
+from hexmj.studies.disturbance import every_case
 from tiers import few_of
 
 LEG, GRAVITY = 31.0, 9810.0
