@@ -5,6 +5,7 @@ Index i of every axis `leg` is the paper's leg i + 1: 1 to 3 on the left from fr
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from hexmj.errors import InputError
@@ -44,12 +45,12 @@ class Geometry:
         if not all(map(math.isfinite, (*self.origins, *self.lateral))) or not min(self.lateral) > 0:
             raise InputError(f"{self}; expected finite origins and lateral distances above 0 mm")
 
-    @property
+    @cached_property
     def origin(self) -> tuple[float, ...]:
         """Origin O_i of each leg's axis ahead of the centre of mass, (leg,) [mm]."""
         return self.origins * 2
 
-    @property
+    @cached_property
     def y(self) -> tuple[float, ...]:
         """Signed distance of each leg's line from the body axis, (leg,) [mm]."""
         return tuple(side * y for side, y in zip(SIDE, self.lateral * 2, strict=True))

@@ -10,12 +10,11 @@ from hexmj.controllers.checked_plans import advanced, begin, check_repeats, chec
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss
-from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, feet_on_ground, measured_walk
+from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
-from hexmj.progress import Progress, shown
-from hexmj.stability import loss_time
+from hexmj.progress import Progress, progress_bar
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, copied, extent, joined, part_of
 
@@ -88,12 +87,17 @@ def physical_walk(
     """
     stride, conditions = stride or Stride(), conditions or Conditions()
     check_ground(conditions)
-    with shown(progress, "walking") as report:
-        kinematic = begin(controller, starts, velocity, stride, acceleration, threads)
-        planned = advanced(kinematic, int(steps_within(duration, stride)))
-        settled = settle(starts, conditions, stride, threads)
-        plan = begin(controller, settled.starts, velocity, stride, acceleration, threads=1)
-        return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=report)
+    if progress is True:
+        with progress_bar("walking") as report:
+            return physical_walk(
+                starts, controller, velocity, duration, conditions=conditions, stride=stride,
+                acceleration=acceleration, threads=threads, progress=report,
+            )  # fmt: skip
+    kinematic = begin(controller, starts, velocity, stride, acceleration, threads)
+    planned = advanced(kinematic, int(steps_within(duration, stride)))
+    settled = settle(starts, conditions, stride, threads)
+    plan = begin(controller, settled.starts, velocity, stride, acceleration, threads=1)
+    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress or None)
 
 
 def physical_walk_of_plan(
@@ -110,30 +114,29 @@ def physical_walk_of_plan(
     Raises:
         InputError, SimulationError: see `rollout.drive`; or a plan without feedback differs from `planned`.
     """
-    conditions, stride, m = settled.conditions, settled.stride, settled.substeps
-    so_far = OutcomesSoFar(settled, loss_time(planned, threads=threads))
-    shape = planned.stance.shape
-    (x, y, height, load), stance = np.full((4, *shape), np.nan), np.zeros(shape, dtype=bool)
-    qpos, centre = np.full((*shape[:2], settled.qpos.shape[1]), np.nan), np.full((*shape[:2], 3), np.nan)
+    stride, so_far = settled.stride, WalkSoFar(settled, planned, threads)
     followed: list[PlannedWalk] = []
     for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
         so_far.add(chunk)
         if isinstance(plan, FeedbackPlan):
             followed.append(chunk.plan)
         else:
-            first = chunk.first // m
+            first = chunk.first // settled.substeps
             same = part_of(planned, slice(first, first + len(chunk.plan.time)))
             check_same(same, chunk.plan, "the controller", first)
-        columns, seen, seen_centre = measured_walk(chunk, settled)
-        at = np.ix_((chunk.first + columns) // m - 1, chunk.ids)
-        x[at], y[at], stance[at], centre[at] = seen.x, seen.y, seen.stance, seen_centre
-        height[at], load[at] = feet_on_ground(chunk, settled, columns)
-        over = (columns[:, None] >= chunk.valid)[..., None]
-        qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
-    measured = Walk(planned.time, planned.velocity, x, y, stance, stride.geometry)
     outcomes = so_far.outcomes()
-    ordered = _until_fall(outcomes.fall, planned, followed, stride) if followed else planned
-    return PhysicalWalk(planned, ordered, measured, outcomes, qpos, centre, height, load, conditions, stride)
+    return PhysicalWalk(
+        planned=planned,
+        ordered=_until_fall(outcomes.fall, planned, followed, stride) if followed else planned,
+        measured=so_far.measured,
+        outcomes=outcomes,
+        qpos=so_far.qpos,
+        centre_of_mass=so_far.centre_of_mass,
+        height=so_far.height,
+        load=so_far.load,
+        conditions=settled.conditions,
+        stride=stride,
+    )
 
 
 def physical_outcomes(

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.kinematics import standing_tips
 from hexmj.conditions import Conditions
 from hexmj.controllers.checked_plans import advanced, check_plan
 from hexmj.controllers.protocol import Plan
@@ -93,6 +92,8 @@ class OrdersFromPlan:
 
     tips: np.ndarray
     """(start, leg, 3) current targets of the tips, in the root frame [mm]."""
+    steps: int
+    """Steps of the whole walk."""
 
     def __init__(self, settled: Settled, plan: Plan, duration: float, multiple: int = 0) -> None:
         """All feet stand, at time 0 of a plan that ends after a duration [time units].
@@ -105,15 +106,15 @@ class OrdersFromPlan:
         check_plan(plan, settled.starts, settled.stride)
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._substeps = plan, settled, settled.substeps
-        self._steps, self._done = int(steps_within(duration, settled.stride)), 0
+        self.steps, self._done = int(steps_within(duration, settled.stride)), 0
         self._chunk, self._planned = steps_in_chunk(self._substeps, multiple), list[PlannedWalk]()
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
-        self.tips = standing_tips(settled.starts, settled.conditions.standing_height, settled.stride)
+        self.tips = settled.tips.copy()
 
     def steps_ahead(self) -> int:
         """Steps of the plan in the next chunk, 0 at the end of the walk."""
-        return min(self._chunk, self._steps - self._done)
+        return min(self._chunk, self.steps - self._done)
 
     def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
         """The orders of some starts, (n,), for the next steps, by default a chunk; None at the end of the walk.
@@ -121,7 +122,7 @@ class OrdersFromPlan:
         A leg whose tip is out of reach keeps its last angles.
         """
         first, m = self._done * self._substeps, self._substeps
-        if self._done == self._steps:
+        if self._done == self.steps:
             return None
         plan = self._next_chunk() if steps is None else advanced(self._plan, steps)
         self._done += len(plan.time)
@@ -135,7 +136,7 @@ class OrdersFromPlan:
         control = joints.reshape(*joints.shape[:2], -1)
         if self._settled.conditions.grasp:
             control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
-        if self._done == self._steps:  # one more substep shows the state at the end
+        if self._done == self.steps:  # one more substep shows the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, first, ids, control, tips[:, : control.shape[1]], ~reachable)
 
@@ -143,7 +144,7 @@ class OrdersFromPlan:
         if len(self._settled.starts) > 1:
             return advanced(self._plan, self.steps_ahead())
         if not self._planned:
-            steps, size = min(AHEAD * self._chunk, self._steps - self._done), self._chunk
+            steps, size = min(AHEAD * self._chunk, self.steps - self._done), self._chunk
             planned = advanced(self._plan, steps)
             self._planned = [part_of(planned, slice(begin, begin + size)) for begin in range(0, steps, size)][::-1]
         return self._planned.pop()

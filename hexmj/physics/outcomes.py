@@ -13,7 +13,7 @@ from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled
 from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time
-from hexmj.walks import Walk
+from hexmj.walks import PlannedWalk, Walk
 
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking if no target is on the ground."""
@@ -122,7 +122,7 @@ class OutcomesSoFar:
         self._fall[ids[fell]] = ((chunk.first + last) / m * dt)[fell]
         self._fall_part[ids[fell]] = np.argmax(trunk, axis=1)[fell]
         self._unreachable[ids] += chunk.unreachable
-        self._walked[ids] = chunk.qpos[n, last, 0] - settled.qpos[ids, 0]
+        self._walked[ids] = chunk.qpos[n, last, 0] - settled.state[ids, 0]
         depth = np.where(np.arange(chunk.depth.shape[1]) < until[:, None], chunk.depth, 0.0)
         self._depth[ids] = np.maximum(self._depth[ids], depth.max(axis=1))
         share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
@@ -174,6 +174,31 @@ class OutcomesSoFar:
                 error = Diverged(start, reason, self._settled.saved(start))
                 raise walk_error(error, "walking", 0.0, self._settled.conditions)
         return found
+
+
+class WalkSoFar(OutcomesSoFar):
+    """Keeps the walks of all starts whole, chunk by chunk, and adds up their outcomes; see `PhysicalWalk`."""
+
+    def __init__(self, settled: Settled, planned: PlannedWalk, threads: int | None = None) -> None:
+        """Begin with the plan of the whole walk."""
+        super().__init__(settled, loss_time(planned, threads=threads))
+        shape = steps, starts, _ = planned.stance.shape
+        (x, y, self.height, self.load), stance = np.full((4, *shape), np.nan), np.zeros(shape, dtype=bool)
+        self.qpos = np.full((steps, starts, settled.compiled.model.nq), np.nan)
+        self.centre_of_mass = np.full((steps, starts, 3), np.nan)
+        self.measured = Walk(planned.time, planned.velocity, x, y, stance, planned.geometry)
+
+    def add(self, chunk: Chunk) -> None:
+        """Take in one chunk of `rollout.drive`."""
+        super().add(chunk)
+        columns, seen, centre = measured_walk(chunk, self._settled)
+        at = np.ix_((chunk.first + columns) // self._settled.substeps - 1, chunk.ids)
+        for name in ("x", "y", "stance"):
+            getattr(self.measured, name)[at] = getattr(seen, name)
+        self.height[at], self.load[at] = feet_on_ground(chunk, self._settled, columns)
+        over = (columns[:, None] >= chunk.valid)[..., None]
+        self.centre_of_mass[at] = centre
+        self.qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:

@@ -31,7 +31,6 @@ from hexmj.physics.settle import Settled
 from hexmj.physics.substeps import FineSteps, Shown
 from hexmj.progress import Progress
 from hexmj.rotations import heading, lean, turned
-from hexmj.timing import steps_within
 from hexmj.walks import PlannedWalk, joined
 
 RECORDED = ("qpos", "sensors", "standing", "load", "targets", "force", "torque", "depth")
@@ -102,8 +101,7 @@ def drive(
         push.check_within(duration, settled.conditions, settled.stride, len(settled.starts))
         divisor = push.divisor(settled.conditions, settled.stride)
     rollout, orders = Rollout(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
-    total = int(steps_within(duration, settled.stride)) * settled.substeps
-    reported, walking = 0.0, np.arange(len(settled.starts))
+    total, reported, walking = orders.steps * settled.substeps, 0.0, np.arange(len(settled.starts))
     chunks = _with_feedback(rollout, plan, orders) if isinstance(plan, FeedbackPlan) else _planned(rollout, orders)
     for chunk in chunks:
         yield chunk

@@ -31,7 +31,9 @@ class Settled:
     """Starts at rest in MuJoCo; the same for every controller and velocity."""
 
     starts: np.ndarray
-    """(start, leg) planned tips [mm]."""
+    """(start, leg) planned tips on their own axes [mm]."""
+    tips: np.ndarray
+    """(start, leg, 3) the same in the root frame [mm]."""
     state: np.ndarray
     """(start, state) positions, velocities and the solver's initial values; `engine.Engine.put` takes it."""
     ctrl: np.ndarray
@@ -107,7 +109,8 @@ class Settling:
         names = np.arange(len(x)) if names is None else names
         check_memory(f"{len(x)} starts that walk at once in physics", MEMORY * len(x))
         model, columns, height = compiled.model, compiled.columns, conditions.standing_height
-        joints, reachable = compiled.inverse(standing_tips(x, height, stride))
+        tips = standing_tips(x, height, stride)
+        joints, reachable = compiled.inverse(tips)
         if not reachable.all():
             start, leg = np.argwhere(~reachable)[0]
             raise OutOfReach(
@@ -129,7 +132,7 @@ class Settling:
         load = compiled.carried(batch.sensors, batch.force)
         _check_rest(batch, load, names, compiled)
         torques = batch.force[:, columns.ctrl].copy()
-        return Settled(x, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride)
+        return Settled(x, tips, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride)
 
     def _initial_batch(self, count: int) -> MujocoBatch:
         """Bodies in their initial state; the last batch is used again if it has as many."""
