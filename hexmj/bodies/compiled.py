@@ -42,8 +42,7 @@ class SensorGroup:
         """Find the sensors' columns of `sensordata`, or None if the model does not have them side by side."""
         objects = np.array([mujoco.mj_name2id(model, self.object_type, name) for name in self.objects])
         fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.object_type) & (model.sensor_refid < 0)
-        for altered in (model.sensor_cutoff, model.sensor_noise, model.sensor_delay, model.sensor_interval[:, 0]):
-            fits &= altered == 0
+        fits &= model.sensor_cutoff == 0
         if self.contact:
             fits &= (model.sensor_intprm[:, :3] == self.contact).all(axis=1)
         attached = np.where(fits, model.sensor_objid, -1)

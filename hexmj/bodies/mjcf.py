@@ -17,8 +17,9 @@ Both are rounded to the significant digits of the body's `servo`: 398728 and 1.5
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -36,8 +37,7 @@ HOME_TOLERANCE = 1e-3
 """Tolerance of the feet and the centre of mass in posture home, in lengths of the shortest leg."""
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(NamedTuple):
     """Gains of the servos, the same for all joints of a body."""
 
     torque: float

@@ -10,14 +10,11 @@ faster when the insect turns over: after a push the energy of the centre of mass
 
 import json
 import sys
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
-from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
@@ -28,9 +25,6 @@ from hexmj.physics.engine import Diverged, MujocoBatch
 from hexmj.physics.settle import Settled
 from hexmj.physics.substeps import FineSteps
 from hexmj.rotations import lean
-
-STATE = ("qpos", "qvel", "qacc_warmstart", "xfrc_applied")
-"""Arrays of a saved state that MuJoCo's data holds."""
 
 MOST_ENERGY = 2.0
 """Greatest energy of a root without V_p and pushes, as a height in lengths of the shortest leg; measured is 1.2."""
@@ -144,18 +138,8 @@ def save_state(error: SimulationError, folder: Path) -> Path:
     return path
 
 
-def replay(path: Path | str, body: Body = STICK_INSECT) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A saved state, ready to step: set ``data.ctrl`` from the file's `ctrl`, (substep, actuator).
-
-    Raises:
-        InputError: the file cannot be read, or is of another body.
-    """
-    _, compiled, data = _read(path, body)
-    return compiled.model, data
-
-
-def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
-    """Repeat the steps of a saved state with its controls.
+def replay(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
+    """Repeat the steps of a saved state with its conditions, time step, contacts, push and controls.
 
     Returns:
         Positions after each physics step, (step, position).
@@ -164,10 +148,17 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
         Diverged: it diverges again.
         InputError: the file cannot be read, or is of another body.
     """
-    saved, compiled, _ = _read(path, body)
+    try:
+        with np.load(path) as file:
+            saved = dict(file)
+        conditions = Conditions(body=body, **json.loads(str(saved["conditions"])))
+        compiled = compile_body(conditions, float(saved["timestep"]))
+        compiled.model.pair_solref[:, 0] = saved["contact"]
+        batch = MujocoBatch(compiled, 1, threads=1)
+        batch.put_back(saved)
+    except (KeyError, OSError, ValueError) as error:
+        raise InputError(f"{path} is not a saved state of body {body.name!r}: {error}") from None
     only, control = np.array([0]), saved["ctrl"][np.newaxis]
-    batch = MujocoBatch(compiled, 1, threads=1)
-    batch.put_back(saved)
     if "substeps" in saved:  # an explosion, saved from the beginning of a step of the plan
         after = FineSteps.of(batch, int(saved["substeps"]), compiled).take(only, control)["after"]
     else:
@@ -175,26 +166,10 @@ def replayed(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
     return after[0, :, : compiled.model.nq]
 
 
-def _read(path: Path | str, body: Body) -> tuple[dict[str, np.ndarray], CompiledBody, mujoco.MjData]:
-    """A saved state, the body with its conditions, time step and contacts, and MuJoCo's data in that state."""
-    try:
-        with np.load(path) as file:
-            saved = dict(file)
-        conditions: dict[str, Any] = json.loads(str(saved["conditions"]))
-        compiled = compile_body(Conditions(body=body, **conditions), float(saved["timestep"]))
-        compiled.model.pair_solref[:, 0] = saved["contact"]
-        data = mujoco.MjData(compiled.model)
-        for name in STATE:
-            getattr(data, name)[:] = saved[name]
-    except (KeyError, OSError, ValueError) as error:
-        raise InputError(f"{path} is not a saved state of body {body.name!r}: {error}") from None
-    return saved, compiled, data
-
-
 def main(path: str) -> None:
     """Print the height and tilt of the stick insect's root after each physics step of a saved state."""
     try:
-        for step, qpos in enumerate(replayed(path)):
+        for step, qpos in enumerate(replay(path)):
             print(f"step {step + 1}: {qpos[2]:.4g} mm high, tilted by {lean(qpos[3:ROOT_QPOS])[1]:.3g} rad")
     except Diverged as error:
         print(f"it diverged: {error.kinds}")
@@ -203,6 +178,4 @@ def main(path: str) -> None:
 
 
 if __name__ == "__main__":
-    parser = ArgumentParser("python -m hexmj.physics.divergence", description=main.__doc__)
-    parser.add_argument("path", help="a saved state, .npz")
-    main(parser.parse_args().path)
+    main(sys.argv[1])

@@ -201,7 +201,7 @@ class MujocoBatch:
         return Replayed(self.states(ids), self.push[ids])
 
     def saved(self, before: Replayed, i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
-        """What replays the i-th body of `before`: its state, push, controls, (step, actuator), time step, contacts."""
+        """The i-th body of `before`: its state, push, controls, (step, actuator), time step and contacts."""
         model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
         applied[self._root, 1] = before.push[i]
         state = dict(zip(STATE, np.split(before.states[i], self._ends), strict=True))

@@ -5,9 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexmj.errors import OutOfReach
+from hexmj.errors import OutOfReach, SimulationError
 from hexmj.jitted import jitted
-from hexmj.physics.engine import Diverged, walk_error
 from hexmj.physics.foot_path import steps_in_chunk
 from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled
@@ -171,8 +170,7 @@ class OutcomesSoFar:
             if (wrong := np.isnan(getattr(found, name))).any():
                 start = int(np.argmax(wrong))
                 reason = f"its {name} is NaN" + (", since no foot has stood" if name == "slip" else "")
-                error = Diverged(start, reason, self._settled.saved(start))
-                raise walk_error(error, "walking", 0.0, self._settled.conditions)
+                raise SimulationError(f"start {start}: {reason}")
         return found
 
 

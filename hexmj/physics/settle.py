@@ -13,7 +13,7 @@ from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError, OutOfReach, SimulationError
-from hexmj.physics.engine import STATE, Diverged, MujocoBatch, walk_error
+from hexmj.physics.engine import Diverged, MujocoBatch, walk_error
 from hexmj.physics.substeps import SINK
 from hexmj.starts import checked_starts, draw_starts
 from hexmj.threads import check_memory
@@ -58,18 +58,6 @@ class Settled:
     def substeps(self) -> int:
         """Physics steps in one step of a plan."""
         return self.conditions.substeps(self.stride)
-
-    def saved(self, start: int) -> dict[str, np.ndarray]:
-        """What replays one step of the plan at rest from here, see `divergence.replayed`."""
-        model = self.compiled.model
-        state = np.split(self.state[start], np.cumsum([model.nq, model.nv]))
-        return dict(zip(STATE, state, strict=True)) | {
-            "xfrc_applied": np.zeros((model.nbody, 6)),
-            "ctrl": self.ctrl[[start]].repeat(self.substeps, axis=0),
-            "contact": model.pair_solref[:, 0].copy(),
-            "timestep": np.array(model.opt.timestep),
-            "substeps": np.array(self.substeps),
-        }
 
 
 class Settling:
