@@ -274,8 +274,8 @@ class Compare(StudyCommand):
         """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
         import numpy as np
 
-        from hexmj.replay.video import render
         from hexmj.replay.recording import save_recording
+        from hexmj.replay.video import render
 
         if given.no_video:
             return []

@@ -50,8 +50,8 @@ class Render(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, results_folder, save_manifest
-        from hexmj.replay.video import missing, render
         from hexmj.replay.recording import load_recording, save_recording
+        from hexmj.replay.video import missing, render
 
         film = build(Film, given)
         film.check_format(given.format)
@@ -188,8 +188,8 @@ class View(Command):
         from hexmj.cli.options import conditions
         from hexmj.progress import progress_bar
         from hexmj.starts import draw_start
+        from hexmj.view.browser import check_port
         from hexmj.view.live import LiveWalk
-        from hexmj.view.port import check_port
         from hexmj.view.session import LiveSession
 
         def starts(number: int) -> Any:
@@ -227,7 +227,7 @@ class View(Command):
             view_recording(ReplaySession(Take.of(recording)))
         else:
             from hexmj.replay.page import page_text
-            from hexmj.view.served import page_server
+            from hexmj.view.browser import page_server
 
             with page_server(page_text([recording]), given.host, given.port) as server:
                 show(f"{given.recording} plays at http://{given.host}:{server.server_port}", END)

@@ -1,1 +1,1 @@
-"""Walks looked at while they go: one insect, a controller that may change, MuJoCo's viewer or a browser."""
+"""Views of live walks and recordings, in a browser and in MuJoCo's viewer."""

@@ -1,12 +1,13 @@
-"""A live walk in a browser, by viser: the insect, its polygon, sliders, margin and footfall."""
+"""A live walk in a browser, by viser: the insect, sliders, margin and footfall; and a server of one page."""
 
 import io
 import logging
+import socket
 from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import asdict, replace
-from itertools import takewhile
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from queue import SimpleQueue
 from typing import Any
 
@@ -15,118 +16,148 @@ import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
-from hexmj.errors import without_extra
+from hexmj.diagrams import spans
+from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.rendering.shapes import body_shape, ground_shape
-from hexmj.replay.take import support_on_ground
-from hexmj.view.charts import CHARTED, footfall, readout
+from hexmj.replay.take import margin_in_words, support_on_ground
+from hexmj.validate import whole
 from hexmj.view.live import LiveWalk, Moment
-from hexmj.view.port import check_port
 from hexmj.view.session import IMPULSE, LiveSession, ticks
 
-CHARTS = 6
-"""A chart is drawn with every so many pictures."""
+CHART_INTERVAL = 6
+"""Frames between two drawings of the charts."""
+
+CHARTED = 2.0
+"""Time that the charts show [s]."""
 
 RANGES = {
     "p1_i": (0.0, 20.0), "p1_c": (0.0, 20.0), "p31_i": (-20.0, 20.0), "p32_i": (0.0, 20.0), "p33_i": (0.0, 2.0),
     "p34_i": (-20.0, 40.0), "p31_c": (-20.0, 20.0), "p32_c": (0.0, 2.0),
 }  # fmt: skip
-"""Sliders of the symmetric weights, wide enough for both published sets; the two that are on or off have boxes."""
+"""Ranges of the sliders of symmetric weights, wide enough for both published weight sets."""
 
 SWITCHES = ("p2", "p4_i")
+"""Weights that are on or off and have check boxes."""
 
 MEASURED, PLANNED = "#c8740a", "#1b6ca8"
 
 
-def is_of_walking(record: logging.LogRecord) -> bool:
-    """Whether a complaint of the server is more than that somebody hung up, or asked for what is no page."""
-    return record.msg != "opening handshake failed"
+def check_port(host: str, port: int) -> None:
+    """Raise InputError if a server cannot listen at an address; port 0 stands for any free port."""
+    whole("port", port, 0, 65535)
+    try:
+        socket.create_server((host, port)).close()
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"host = {host}, port = {port}: {reason}; expected a free port of this machine") from None
+
+
+def page_server(text: str, host: str, port: int) -> ThreadingHTTPServer:
+    """Return a server of one HTML page; its `serve_forever` serves it.
+
+    Raises:
+        InputError: the address is not free.
+    """
+    check_port(host, port)
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            content = text.encode() if self.path == "/" else b""
+            self.send_response(200 if content else 404)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Do not log requests."""
+
+    return ThreadingHTTPServer((host, port), Handler)
 
 
 class BrowserView:
-    """A server, and what it shows."""
+    """A viser server that shows a live walk.
 
-    address: str
-    """Where a browser finds it."""
-    controls: dict[str, Any]
-    """viser's handles of the sliders and boxes that change what is walked, by their names."""
+    Attributes:
+        address: of the page.
+        controls: viser's handles of the sliders and boxes that change the walk, by name.
+        server: of viser.
+    """
 
     def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 8080) -> None:
-        """Serve; port 0 takes any.
+        """Serve; port 0 takes any free port.
 
         Raises:
-            InputError: viser is missing, or the port is taken.
+            InputError: viser is missing, or the address is not free.
         """
         try:
             import viser
         except ImportError:
-            raise without_extra("view", "viser, which shows a walk in a browser,") from None
+            raise without_extra("view", "viser") from None
         check_port(host, port)
-        self.session, self._wishes = session, SimpleQueue[Callable[[], object]]()
-        logging.getLogger("websockets.server").addFilter(is_of_walking)
-        with redirect_stdout(io.StringIO()):  # the address is told by who asked for it
+        self.session, self._changes = session, SimpleQueue[Callable[[], object]]()
+        self.controls: dict[str, Any] = {}
+        logging.getLogger("websockets.server").addFilter(lambda entry: entry.msg != "opening handshake failed")
+        with redirect_stdout(io.StringIO()):  # viser prints the address
             self.server = server = viser.ViserServer(host=host, port=port, label="hexmj", verbose=False)
         self.address = f"http://{host}:{server.get_port()}"
         server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         server.initial_camera.position, server.initial_camera.look_at = (-45.0, -85.0, 55.0), (5.0, 0.0, 0.0)
         self._recent: deque[Moment] = deque()
-        self._lay()
+        self._make_scene()
         self._make_controls()
         self._make_charts()
 
-    def run(self, go_on: Callable[[], bool] = lambda: True) -> None:
-        """Walk and show until `go_on` says no."""
+    def run(self) -> None:
+        """Walk and show until the process is interrupted."""
         try:
-            for n, passed in enumerate(takewhile(lambda _: go_on(), ticks())):
-                self.step(passed, n % CHARTS == 0)
+            for n, passed in enumerate(ticks()):
+                self.step(passed, n % CHART_INTERVAL == 0)
         finally:
             with redirect_stdout(io.StringIO()):
                 self.server.stop()
 
     def step(self, passed: float, charts: bool = True) -> None:
-        """Do what was wished for, let so many seconds pass, and show what is seen then."""
-        while not self._wishes.empty():
-            self.session.attempt(self._wishes.get())
+        """Apply the changes of the controls, advance by a time [s], and show the walk."""
+        while not self._changes.empty():
+            self.session.attempt(self._changes.get())
         moment = self.session.tick(passed)
-        if self.session.walk.conditions != self._laid:
-            self._lay()
+        if self.session.walk.conditions != self._shown_conditions:
+            self._make_scene()
         self._recent.extend(self.session.walk.trace)
         while self._recent and not moment.seconds - CHARTED <= self._recent[0].seconds <= moment.seconds:
-            self._recent.popleft()  # past, or of a walk before this one
+            self._recent.popleft()  # too old, or of a walk before this one
         with self.server.atomic():
             self._show(moment)
             if charts:
                 self._show_charts(moment)
 
-    # ---- what is done to the walk ----
-
-    def _wish(self, change: Callable[[LiveWalk], object]) -> None:
-        """Have something done to the walk between two pictures: callbacks run in threads of their own."""
-        self._wishes.put(lambda: change(self.session.walk))
+    def _change(self, change: Callable[[LiveWalk], object]) -> None:
+        """Queue a change of the walk; viser calls from threads of its own."""
+        self._changes.put(lambda: change(self.session.walk))
 
     def _make_controls(self) -> None:
         gui, walk = self.server.gui, self.session.walk
-        self.controls = {}
         self._readout = gui.add_markdown("")
         with gui.add_folder("Walk"):
-            v = walk.velocity
+            v, now = walk.velocity, walk.conditions.vp
             velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="from the next step on")
-            velocity.on_update(lambda _: self._wish(lambda walk: walk.steer(velocity=velocity.value)))
-            now = walk.conditions.vp
+            velocity.on_update(lambda _: self._change(lambda walk: walk.steer(velocity=velocity.value)))
             vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="the walk begins again")
             vp.on_update(
-                lambda _: self._wish(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
+                lambda _: self._change(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
             )
             self.controls |= {"V": velocity, "V_p": vp}
             paused = gui.add_checkbox("pause", False)
             paused.on_update(lambda _: setattr(self.session, "paused", paused.value))
             begins = {"same start": self.session.begin, "next start": self.session.begin_next}
             buttons = gui.add_button_group("", tuple(begins))
-            buttons.on_click(lambda _: self._wish(lambda _: begins[buttons.value]()))
+            buttons.on_click(lambda _: self._change(lambda _: begins[buttons.value]()))
         with gui.add_folder("Push"):
             impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, IMPULSE)
-            gui.add_button("Push").on_click(lambda _: self._wish(lambda walk: walk.push(float(impulse.value))))
+            gui.add_button("Push").on_click(lambda _: self._change(lambda walk: walk.push(float(impulse.value))))
         controller = walk.controller
         if isinstance(controller, Cruse1998) and isinstance(controller.weights, Symmetric):
             with gui.add_folder("Weights of the network, from the next step on", expand_by_default=False):
@@ -142,19 +173,17 @@ class BrowserView:
                 handles[name] = gui.add_slider(name, min(least, value), max(most, value), 0.001, value)
 
         def changed(_: Any) -> None:
-            now = Symmetric(**{name: float(handle.value) for name, handle in handles.items()})
-            self._wish(lambda walk: walk.steer(controller=replace(controller, weights=now)))
+            weights = Symmetric(**{name: float(handle.value) for name, handle in handles.items()})
+            self._change(lambda walk: walk.steer(controller=replace(controller, weights=weights)))
 
         self.controls |= handles
         for handle in handles.values():
             handle.on_update(changed)
 
-    # ---- what is seen ----
-
-    def _lay(self) -> None:
-        """Put body and ground there, under the conditions of now; the ground moves below a centre that stays."""
+    def _make_scene(self) -> None:
+        """Add body and ground under the current conditions; the ground moves below a fixed centre of mass."""
         scene, conditions = self.server.scene, self.session.walk.conditions
-        self._laid, compiled = conditions, compile_body(conditions)
+        self._shown_conditions, compiled = conditions, compile_body(conditions)
         self._model, self._data = compiled.model, mujoco.MjData(compiled.model)
         scene.reset()
         self._ground = scene.add_frame("/ground", show_axes=False)
@@ -165,15 +194,15 @@ class BrowserView:
         )
         ground, seen = ground_shape(compiled), body_shape(self._model)
         if len(ground.faces):
-            scene.add_mesh_simple("/ground/laid", ground.corners, ground.faces, color=(190, 196, 200), side="double")
+            scene.add_mesh_simple("/ground/shape", ground.corners, ground.faces, color=(190, 196, 200), side="double")
         self._frames = {}
         for body in np.unique(seen.body):
             name = f"/body_{body}"
             self._frames[body] = scene.add_frame(name, show_axes=False)
             for k, colour in enumerate(np.unique(seen.colour[seen.body == body], axis=0)):
-                here = (seen.body == body) & (seen.colour == colour).all(axis=1)
-                faces = np.cumsum(here)[seen.faces[here[seen.faces].all(axis=1)]] - 1
-                scene.add_mesh_simple(f"{name}/part_{k}", seen.corners[here], faces, color=tuple(colour), side="double")
+                part = (seen.body == body) & (seen.colour == colour).all(axis=1)
+                faces = np.cumsum(part)[seen.faces[part[seen.faces].all(axis=1)]] - 1
+                scene.add_mesh_simple(f"{name}/part_{k}", seen.corners[part], faces, color=tuple(colour), side="double")
         self._add_marks(conditions.body.marks)
 
     def _add_marks(self, marks: Any) -> None:
@@ -192,21 +221,21 @@ class BrowserView:
         self._centre = scene.add_icosphere("/centre", marks.centre[0], CENTRE)
         sphere: Any = {"subdivisions": 1, "cast_shadow": False}
         self._planned = [
-            scene.add_icosphere(f"/planned_{one}", marks.tip, TIP, wireframe=True, **sphere) for one in LEGS
+            scene.add_icosphere(f"/planned_{leg}", marks.tip, TIP, wireframe=True, **sphere) for leg in LEGS
         ]
-        self._labels = [scene.add_label(f"/label_{one}", one) for one in LEGS]
+        self._labels = [scene.add_label(f"/label_{leg}", leg) for leg in LEGS]
 
     def _show(self, moment: Moment) -> None:
-        """Put everything where it is, seen from the ground below the centre of mass."""
+        """Move everything to its place, seen from the ground below the centre of mass."""
         centre = moment.centre_of_mass
-        here = np.array([*centre[:2], 0.0])
+        origin = np.array([*centre[:2], 0.0])
         self._data.qpos[:] = moment.qpos
         mujoco.mj_kinematics(self._model, self._data)
         for body, frame in self._frames.items():
-            frame.position, frame.wxyz = self._data.xpos[body] - here, self._data.xquat[body].copy()
+            frame.position, frame.wxyz = self._data.xpos[body] - origin, self._data.xquat[body].copy()
         polygon, level = support_on_ground(self.session.walk.conditions, moment.feet[:, :2], moment.stance, centre)
-        self._ground.position = -here
-        corners = np.column_stack([polygon, np.full(len(polygon), level + 0.3)]) - here
+        self._ground.position = -origin
+        corners = np.column_stack([polygon, np.full(len(polygon), level + 0.3)]) - origin
         padded = corners[np.minimum(np.arange(6), len(corners) - 1)] if len(corners) else np.zeros((6, 3))
         edges = np.stack([padded, np.roll(padded, -1, axis=0)], axis=1)
         stable = moment.margin > 0
@@ -214,33 +243,62 @@ class BrowserView:
             fill.visible = outline.visible = shown
             fill.vertices, outline.points = padded.astype(np.float32), edges.astype(np.float32)
         foot = np.array([0.0, 0.0, level])
-        self._plumb.points = np.stack([centre - here, foot])[np.newaxis].astype(np.float32)
+        self._plumb.points = np.stack([centre - origin, foot])[np.newaxis].astype(np.float32)
         self._centre.position = foot
         for leg, name in enumerate(LEGS):
-            self._planned[leg].position = moment.planned_tips[leg] - here
-            self._labels[leg].position = moment.feet[leg] - here + (0.0, 0.0, 3.0)
+            self._planned[leg].position = moment.planned_tips[leg] - origin
+            self._labels[leg].position = moment.feet[leg] - origin + (0.0, 0.0, 3.0)
             self._labels[leg].text = name if moment.stance[leg] else f"({name})"
 
     def _make_charts(self) -> None:
         from viser import uplot
 
-        time_axis = uplot.Series(label="s")
-        empty = np.zeros(1)
-        lines = (
+        series = (
+            uplot.Series(label="s"),
             uplot.Series(label="measured", stroke=MEASURED, width=2),
             uplot.Series(label="planned", stroke=PLANNED, width=1, dash=(4, 3)),
         )
-        how: Any = {"scales": {"x": uplot.Scale(time=False)}, "aspect": 2.2}
+        options: Any = {"scales": {"x": uplot.Scale(time=False)}, "aspect": 2.2}
         gui = self.server.gui
-        self._margins = gui.add_uplot((empty,) * 3, (time_axis, *lines), title="stability margin [mm]", **how)
+        self._margins = gui.add_uplot((np.zeros(1),) * 3, series, title="stability margin [mm]", **options)
         self._footfall = gui.add_html("")
 
     def _show_charts(self, moment: Moment) -> None:
         self._readout.content = readout(self.session, moment)
         if len(self._recent) < 2:
             return
-        seen = list(self._recent)[:: max(1, len(self._recent) // 400)]
-        seconds = np.array([one.seconds for one in seen])
-        margins = (np.array([getattr(one, name) for one in seen]) for name in ("margin", "planned_margin"))
-        self._margins.data = (seconds, *(np.where(np.isfinite(one), one, np.nan) for one in margins))
-        self._footfall.content = footfall(seconds, ~np.array([one.stance for one in seen]))
+        shown = list(self._recent)[:: max(1, len(self._recent) // 400)]
+        seconds = np.array([moment.seconds for moment in shown])
+        margins = (np.array([getattr(moment, name) for moment in shown]) for name in ("margin", "planned_margin"))
+        self._margins.data = (seconds, *(np.where(np.isfinite(margin), margin, np.nan) for margin in margins))
+        self._footfall.content = footfall(seconds, ~np.array([moment.stance for moment in shown]))
+
+
+def footfall(seconds: np.ndarray, off: np.ndarray) -> str:
+    """Return a footfall diagram as SVG, with bars while a foot is off the ground, (time, leg)."""
+    end = float(seconds[-1])
+    bars = [
+        f'<rect x="{100 * (1 + (begin - end) / CHARTED):.2f}" y="{10 * leg + 2}" height="7"'
+        f' width="{100 * length / CHARTED:.2f}"/>'
+        for leg in range(6)
+        for begin, length in spans(seconds, off[:, leg])
+    ]
+    names = "".join(f'<div style="height:{100 / 6}%">{name}</div>' for name in LEGS)
+    return (
+        '<div style="text-align:center">feet off the ground, the same time</div><div style="display:flex;height:9em;'
+        f'margin:0 1.2em .6em .6em"><div style="width:2.2em">{names}</div><svg viewBox="0 0 100 60" width="100%"'
+        f' height="100%" preserveAspectRatio="none" fill="currentColor">{"".join(bars)}</svg></div>'
+    )
+
+
+def readout(session: LiveSession, moment: Moment) -> str:
+    """Return the state of a walk as Markdown."""
+    walk, stable = session.walk, moment.margin > 0
+    state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if stable else 'outside'} the polygon"
+    sign = "\N{HEAVY CHECK MARK}" if stable and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
+    lines = [
+        f"**{margin_in_words(moment.margin)}** {sign} {state}",
+        f"V = {moment.velocity:.2f}, {moment.seconds:.2f} s, start {session.start};"
+        f" {session.factor:.2f} times real time",
+    ]
+    return "\n\n".join(lines + ([f"_{session.message}_"] if session.message else []))

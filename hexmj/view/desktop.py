@@ -20,53 +20,48 @@ from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, 
 from hexmj.replay.take import margin_in_words, support_on_ground
 from hexmj.view.session import IMPULSE, LiveSession, ReplaySession, ticks
 
-SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
-"""Variables of the environment that name one."""
-
-REMEDY = "--browser shows it in a browser"
-
 PAUSE = "space pauses"
 KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
-"""What the keyboard does, while a recording plays and while an insect walks."""
+"""Keys of a recording and of a live walk."""
 
 SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
-"""Keys as GLFW numbers them."""
+"""Codes of the keys in GLFW."""
 
 
 def screen() -> bool:
-    """Whether there is a screen to open a window on."""
-    return sys.platform != "linux" or any(os.environ.get(name) for name in SCREENS)
+    """Whether there is a screen for a window."""
+    return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
 def view_live(session: LiveSession) -> None:
-    """Walk until the window is closed."""
-    walk, wishes = session.walk, SimpleQueue[int]()
-    with _window(walk.conditions, wishes.put) as window:
+    """Show a live walk until the window is closed."""
+    walk, keys = session.walk, SimpleQueue[int]()
+    with _window(walk.conditions, keys.put) as window:
         for passed in takewhile(lambda _: window.is_running(), ticks()):
-            while not wishes.empty():
-                session.attempt(partial(_obey, session, wishes.get()))
+            while not keys.empty():
+                session.attempt(partial(_press, session, keys.get()))
             moment = session.tick(passed)
             seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
             state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
             text = f"V = {walk.velocity:.2f}, {state}"
-            _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.told)
+            _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
 
 
 def view_recording(session: ReplaySession) -> None:
-    """Play until the window is closed."""
-    take, wishes = session.take, SimpleQueue[int]()
-    with _window(take.conditions, wishes.put) as window:
+    """Show a recording until the window is closed."""
+    take, keys = session.take, SimpleQueue[int]()
+    with _window(take.conditions, keys.put) as window:
         for passed in takewhile(lambda _: window.is_running(), ticks()):
-            while not wishes.empty():
-                session.paused ^= wishes.get() == SPACE
+            while not keys.empty():
+                session.paused ^= keys.get() == SPACE
             row = session.tick(passed)
             seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
             text = f"{take.title}, half speed, {margin_in_words(take.margin[row])}"
             _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
 
 
-def _obey(session: LiveSession, key: int) -> None:
-    """Do what a key stands for."""
+def _press(session: LiveSession, key: int) -> None:
+    """Do what a key means."""
     walk, faster = session.walk, {UP: 0.05, DOWN: -0.05}.get(key)
     if key == SPACE:
         session.paused = not session.paused
@@ -79,7 +74,7 @@ def _obey(session: LiveSession, key: int) -> None:
 
 
 def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
-    """MuJoCo's viewer of a body, to be closed by whoever opened it.
+    """Open MuJoCo's viewer of a body; the caller closes it.
 
     Raises:
         RenderingError: no window can be opened.
@@ -87,39 +82,41 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
     import glfw
     import mujoco.viewer
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # GLFW only warns, and MuJoCo would then end the program
-        if not glfw.init():
-            screens = " and ".join(f"{name} = {os.environ[name]}" for name in SCREENS if os.environ.get(name))
-            raise RenderingError(f"no window can be opened ({screens or 'no screen'}); {REMEDY}")
     compiled = compile_body(conditions)
     try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # GLFW only warns, and MuJoCo would then end the process
+            if not glfw.init():
+                raise RuntimeError("no display")
         window = mujoco.viewer.launch_passive(
             compiled.model, mujoco.MjData(compiled.model), key_callback=on_key, show_left_ui=False, show_right_ui=False
         )
-    except RuntimeError as error:  # as on macOS, where only mjpython may open it
-        raise RenderingError(f"no window can be opened ({error}); {REMEDY}") from None
-    size = conditions.body.lengths.shortest_leg
+    except RuntimeError as error:  # also on macOS, where only mjpython can open it
+        raise RenderingError(f"No window can be opened: {error}. Use --browser.") from None
     window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, compiled.root
-    window.cam.distance, window.cam.azimuth, window.cam.elevation = 5 * size, 60.0, -25.0
+    window.cam.distance, window.cam.azimuth, window.cam.elevation = (
+        5 * conditions.body.lengths.shortest_leg,
+        60.0,
+        -25.0,
+    )
     return window
 
 
 def _show(
-    window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str, told: str = ""
+    window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str, message: str = ""
 ) -> None:
-    """Put the body into a pose, the marks of a film beside it, and words into two corners."""
-    (feet, stance, centre, tips), body, scene = seen, conditions.body, window.user_scn
+    """Show a pose with the marks of a film, and texts in two corners."""
+    (feet, stance, centre, tips), marks, scene = seen, conditions.body.marks, window.user_scn
+    stable = bool(margin > 0.0)
     with window.lock():
         window.d.qpos[:] = qpos
         mujoco.mj_forward(window.m, window.d)
-        (polygon, level), stable = support_on_ground(conditions, feet, stance, centre), bool(margin > 0.0)
+        polygon, level = support_on_ground(conditions, feet, stance, centre)
         scene.ngeom = 0
-        mark_support(scene, body.marks, polygon, level, stable)
-        mark_centre_of_mass(scene, body.marks, centre, level, stable)
-        mark_planned_tips(scene, body.marks, tips)
-    sign = "within the polygon" if stable else "NOT within the polygon"
-    font, at = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
-    seen_above, told_below = f"{text}, {sign}", fill(told, 80)
-    window.set_texts([(font, at.mjGRID_TOPLEFT, seen_above, ""), (font, at.mjGRID_BOTTOMLEFT, told_below, "")])
+        mark_support(scene, marks, polygon, level, stable)
+        mark_centre_of_mass(scene, marks, centre, level, stable)
+        mark_planned_tips(scene, marks, tips)
+    text += ", within the polygon" if stable else ", NOT within the polygon"
+    font, corner = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
+    window.set_texts([(font, corner.mjGRID_TOPLEFT, text, ""), (font, corner.mjGRID_BOTTOMLEFT, fill(message, 80), "")])
     window.sync()

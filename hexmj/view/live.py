@@ -1,18 +1,14 @@
-"""One insect that walks on and on, by a controller and conditions that may change while it goes.
-
-Knows nothing of who looks at it, nor of the time on the wall.
-"""
+"""One insect that walks on and on, whose controller, velocity and conditions may change on the way."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexmj.body import ROOT_QPOS
-from hexmj.checks import given, numbers, typed
-from hexmj.conditions import Bound, Conditions, check_ground
-from hexmj.controllers.checked_plans import begin
-from hexmj.controllers.protocol import Controller
+from hexmj.conditions import Conditions, check_ground
+from hexmj.controllers.checked_plans import begin, begin_at_speed, said, tell
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
 from hexmj.errors import InputError
 from hexmj.legs import leg_last
 from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
@@ -23,25 +19,25 @@ from hexmj.physics.settle import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
 from hexmj.timing import MOST_STEPS, Stride
-from hexmj.view.steered import Steered
+from hexmj.validate import number, numbers
 from hexmj.walks import PlannedWalk, joined, part_of
 
 ONLY = np.array([0])
 """The index of the only insect."""
 
-AT_ONCE = Bound(0.0, 60.0, "s", closed=True)
-"""How long it walks in one go."""
+LONGEST_ADVANCE = 60.0
+"""Longest time of one call of `LiveWalk.advance` [s]."""
 
-PUSHES = Bound(-80.0, 80.0, "times m V_p", closed=True)
-"""As of `hexmj disturb`, from either side."""
+STRONGEST_PUSH = 80.0
+"""Strongest push, as of `hexmj disturb` [body mass times V_p]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What is seen of an insect at the end of a step."""
+    """State of an insect at the end of a step."""
 
     seconds: float
-    """Since the walk began [s]."""
+    """Time since the walk began [s]."""
     velocity: float
     """Commanded V_r, a fraction of V_p."""
     qpos: np.ndarray
@@ -49,7 +45,7 @@ class Moment:
     feet: np.ndarray
     """(leg, 3) in the world [mm]."""
     planned_tips: np.ndarray
-    """(leg, 3) where the tips shall be, in the world [mm]."""
+    """(leg, 3) commanded tips in the world [mm]."""
     centre_of_mass: np.ndarray
     """(3,) in the world [mm]."""
     stance: np.ndarray
@@ -59,18 +55,62 @@ class Moment:
     margin: float
     """Measured stability margin [mm]."""
     planned_margin: float
-    """Of the plan [mm]."""
+    """Stability margin of the plan [mm]."""
+
+
+class SteeredPlan:
+    """A plan of one start that another controller can take over; steps count from the first controller's begin."""
+
+    def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
+        """Begin at `starts`, (1, leg) [mm]."""
+        self.starts, self.stride, self.done = starts, stride, 0
+        self._plan: Plan = begin(controller, starts, velocity, stride, threads=1)
+
+    @property
+    def has_feedback(self) -> bool:
+        """Whether the plan is told the state of the legs before each step."""
+        return isinstance(self._plan, FeedbackPlan)
+
+    @property
+    def made_for(self) -> object:
+        """The conditions of the plan, if it depends on them; see `protocol.Plan`."""
+        return getattr(self._plan, "made_for", None)
+
+    def sense(self, sensed: Sensed) -> None:
+        """Pass the state of the legs to the plan."""
+        if isinstance(self._plan, FeedbackPlan):
+            tell(self._plan, sensed)
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """Return the next steps."""
+        walk = self._plan.advance(steps)  # the physics checks it
+        self.done += steps
+        return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
+
+    def hand_over(self, controller: Controller, velocity: float) -> bool:
+        """Let a controller continue at V_r from the current tips and stance; it knows nothing else of the last plan.
+
+        Returns:
+            Whether both the last plan and the controller can be steered; otherwise nothing has changed.
+        """
+        if not (is_steerable(controller) and isinstance(self._plan, SteerablePlan)):
+            return False
+        plan = begin_at_speed(controller, self.starts, np.array([velocity]), self.stride)
+        with said("a plan, see"):
+            plan.see(self._plan.tips.copy(), self._plan.standing.copy())
+        self._plan = plan
+        return True
 
 
 class LiveWalk:
-    """The insect, wherever its steps have brought it."""
+    """A walk of one insect, advanced in steps."""
 
     moment: Moment
-    """What is seen now."""
+    """The current state."""
     trace: list[Moment]
-    """Steps since `advance` was last called, the last one is `moment`, or since a viewer took them."""
+    """Steps of the last call of `advance`; the last one is `moment`."""
     fell_on: str
-    """Part of the trunk that has touched the ground; nothing while it walks."""
+    """Part of the trunk that has touched the ground; "" while the insect walks."""
 
     def __init__(
         self,
@@ -80,7 +120,7 @@ class LiveWalk:
         conditions: Conditions | None = None,
         stride: Stride | None = None,
     ) -> None:
-        """Settle at a start and be about to walk.
+        """Settle at a start.
 
         Args:
             controller: plans the walk.
@@ -90,57 +130,55 @@ class LiveWalk:
             stride: of the plan.
 
         Raises:
-            InputError: a value that makes no sense.
+            InputError: the insect cannot walk with these values.
         """
-        self.controller, self.velocity = controller, typed("velocity", velocity, float)
+        self.controller, self.velocity = controller, number("velocity", velocity)
         self.start = numbers("start", leg_last(start))
-        self.conditions = given("conditions", conditions, Conditions)
-        self.stride = given("stride", stride, Stride)
+        self.conditions, self.stride = conditions or Conditions(), stride or Stride()
         self.begin()
 
     def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
-        """Begin again, at another start or under other conditions where these are given.
+        """Begin again, at another start or under other conditions if these are given.
 
         Raises:
-            InputError: the insect cannot walk so; the walk goes on as it was.
+            InputError: the insect cannot walk with these values; the last walk continues.
         """
         start = self.start if start is None else numbers("start", leg_last(start))
-        wanted: Conditions = typed("conditions", self.conditions if conditions is None else conditions, Conditions)
-        check_ground(wanted)
-        settled = settle(start[np.newaxis], wanted, self.stride, threads=1)
-        plan, before = Steered(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
+        conditions = conditions or self.conditions
+        check_ground(conditions)
+        settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
+        plan, before = SteeredPlan(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
-        self._insects = Rollout(settled, self._push, threads=1)
-        self._lasts = steps_in_chunk(settled.substeps)
-        self.start, self.conditions, self.settled = start, wanted, settled
+        self._rollout = Rollout(settled, self._push, threads=1)
+        self._push_steps = steps_in_chunk(settled.substeps)
+        self.start, self.conditions, self.settled = start, conditions, settled
         self.trace, self.fell_on = [], ""
-        self._before: PlannedWalk | None = None
-        self._left = 0.0
+        self._last_step: PlannedWalk | None = None
+        self._time_left = 0.0
         try:
-            self._walk(2)  # shows the end of the first
+            self._walk(2)  # the second step shows the end of the first
         except Exception:
             vars(self).update(before)
             raise
 
     def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
-        """Change V_r, the controller, or both.
+        """Change V_r, the controller, or both, from the next step on.
 
-        They take effect from the next step on, the legs as they are (`Steered.hand_over`).  Where a controller cannot
-        go on from legs as they are, the walk begins again at its start.
+        If a controller cannot continue from the current legs, the walk begins again at its start.
 
         Returns:
-            Whether the walk went on.
+            Whether the walk continued.
 
         Raises:
-            InputError: a velocity or controller that makes no sense; the walk goes on as it was.
+            InputError: a bad velocity or controller; the last walk continues.
         """
-        wanted: float = typed("velocity", self.velocity if velocity is None else velocity, float)
+        velocity = self.velocity if velocity is None else number("velocity", velocity)
         controller = self.controller if controller is None else controller
-        begin(controller, self.start[np.newaxis], wanted, self.stride, threads=1)  # refuses what makes no sense
-        before, self.velocity, self.controller = (self.velocity, self.controller), wanted, controller
+        begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # raises for bad values
+        before, self.velocity, self.controller = (self.velocity, self.controller), velocity, controller
         try:
-            if self._plan.hand_over(controller, wanted):
+            if self._plan.hand_over(controller, velocity):
                 return True
             self.begin()
         except Exception:
@@ -149,46 +187,45 @@ class LiveWalk:
         return False
 
     def push(self, impulse: float) -> None:
-        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two, in place of an earlier push.
+        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two. It replaces an earlier push.
 
         Args:
-            impulse: to the left, in multiples of the body's mass times V_p, as of `hexmj disturb`.
+            impulse: to the left, as of `hexmj disturb` [body mass times V_p].
 
         Raises:
-            InputError: one of more than 80, or see `pushes.steps_pushed`.
+            InputError: the impulse is out of range, or the steps of the plan cannot hold a push.
         """
-        PUSHES.check("impulse", impulse := typed("impulse", impulse, float))
-        self._lasts = steps_pushed(self.conditions, self.stride)
+        impulse = number("impulse", impulse, -STRONGEST_PUSH, STRONGEST_PUSH)
+        self._push_steps = steps_pushed(self.conditions, self.stride)
         self._push.impulse[:] = impulse * self.conditions.body.mass * self.conditions.vp
-        self._push.time[:] = (self._plan.done // self._lasts + 1) * self._lasts * self.stride.dt
+        self._push.time[:] = (self._plan.done // self._push_steps + 1) * self._push_steps * self.stride.dt
 
     def advance(self, seconds: float) -> Moment:
-        """Walk on by so much time, in whole steps of the plan; what is left over is made up for by later calls.
+        """Walk for a time, in whole steps of the plan; later calls make up for the remainder.
 
         Returns:
-            What is seen then; of an insect that has fallen, what was seen last.
+            The current state; that before the fall if the insect has fallen.
 
         Raises:
-            InputError: no time or a minute at once, more than `MOST_STEPS` in all, it walks off the ground that was
-                laid, or its controller fails.
+            InputError: a bad time, more than `MOST_STEPS` in all, the end of the ground, or a failing controller.
             SimulationError: the simulation diverged.
         """
-        AT_ONCE.check("seconds", seconds := typed("seconds", seconds, float))
-        self._left += seconds
+        self._time_left += number("seconds", seconds, 0.0, LONGEST_ADVANCE)
         self.trace = []
         step = self.conditions.seconds(self.stride)
-        steps = int(self._left / step + 1e-9)
-        self._left -= steps * step
+        steps = int(self._time_left / step + 1e-9)
+        self._time_left -= steps * step
         while steps > 0 and not self.fell_on:
-            now = min(steps, steps_in_chunk(self.settled.substeps), self._lasts - self._plan.done % self._lasts)
+            until_push = self._push_steps - self._plan.done % self._push_steps
+            now = min(steps, steps_in_chunk(self.settled.substeps), until_push)
             if self._plan.done + now >= MOST_STEPS:
-                raise InputError(f"a walk of {MOST_STEPS:g} steps has come to its end; expected it to begin again")
+                raise InputError(f"the walk has {MOST_STEPS:g} steps, the most possible; begin it again")
             self._walk(now)
             steps -= now
         return self.moment
 
     def _walk(self, steps: int) -> None:
-        chunk = self._insects.carry_out(self._ordered(steps))
+        chunk = self._rollout.carry_out(self._ordered(steps))
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
             self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]
@@ -197,20 +234,20 @@ class LiveWalk:
             self.moment = self.trace[-1]
 
     def _ordered(self, steps: int) -> Iterator[Orders]:
-        """Orders for the next steps; to a plan that reads, one by one, from what the last has brought about."""
-        for part in [1] * steps if self._plan.reads else [steps]:
-            if self._plan.reads:
-                self._plan.sense(self._insects.sensed(ONLY))
+        """Orders for the next steps, one by one if the plan has feedback."""
+        for part in [1] * steps if self._plan.has_feedback else [steps]:
+            if self._plan.has_feedback:
+                self._plan.sense(self._rollout.sensed(ONLY))
             orders = self._orders.ahead(ONLY, part)
-            assert orders, "`advance` sees to it that no walk is longer"
+            assert orders, "`advance` limits the length of the walk"
             yield orders
 
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:
-        """What a chunk shows: the insect, and what was planned, as each but the first step begins, until it falls."""
+        """States of a chunk: the insect and its plan as each step but the first begins, until the insect falls."""
         columns, walk, centre = measured_walk(chunk, self.settled)
         margins = walk_margin(walk, threads=1)[:, 0]
-        plan = joined([self._before or part_of(chunk.plan, slice(1)), chunk.plan])
-        self._before = part_of(chunk.plan, slice(-1, None))
+        plan = joined([self._last_step or part_of(chunk.plan, slice(1)), chunk.plan])
+        self._last_step = part_of(chunk.plan, slice(-1, None))
         planned_margins = walk_margin(plan, threads=1)[:, 0]
         feet = chunk.sensors[0, :, self.settled.compiled.columns.foot].reshape(-1, 6, 3)
         roots = chunk.qpos[0, :, None, :ROOT_QPOS]

@@ -1,4 +1,4 @@
-"""What every viewer shows: a live walk or a recording, in the time on the wall."""
+"""A live walk or a recording in real time, for every viewer."""
 
 import time
 from collections import deque
@@ -10,60 +10,66 @@ from hexmj.errors import InputError, SimulationError
 from hexmj.replay.take import Take
 from hexmj.view.live import LiveWalk, Moment
 
-HZ = 30.0
-"""Pictures in a second."""
+FRAME_RATE = 30.0
+"""Frames per second."""
 
-LONGEST = 0.1
-"""Most time that is made up for at once [s]; who is slower than that falls behind the time on the wall."""
+LONGEST_STEP = 0.1
+"""Most simulated time per frame [s]; a slower computer falls behind real time."""
 
 IMPULSE = 8.0
-"""Of a push, unless another is asked for, in multiples of mass times V_p: it shoves the insect 20 mm aside."""
+"""Default impulse of a push [body mass times V_p]; it moves the insect 20 mm aside."""
 
-LIES = 1.5
-"""How long a fallen insect lies until it begins at the next start [s]."""
+LYING_TIME = 1.5
+"""Time between a fall and the next start [s]."""
 
 RECENT = 60
-"""Pictures over which the factor is measured."""
+"""Frames over which the real-time factor is measured."""
 
 
 def ticks() -> Iterator[float]:
-    """Seconds since the last picture, whenever one is due, for ever."""
+    """Yield the time since the last frame [s], at `FRAME_RATE`, forever."""
     last = time.perf_counter()
     while True:
-        time.sleep(max(0.0, last + 1.0 / HZ - time.perf_counter()))
+        time.sleep(max(0.0, last + 1.0 / FRAME_RATE - time.perf_counter()))
         now = time.perf_counter()
         yield now - last
         last = now
 
 
 class LiveSession:
-    """A live walk in the time on the wall; one that has fallen begins again, at the next start."""
+    """A live walk in real time; after a fall it begins again at the next start.
+
+    Attributes:
+        walk: the live walk.
+        start: number of its start.
+        paused: whether the walk stands still; viewers set it.
+        message: why the last change was refused, or "".
+    """
 
     def __init__(self, walk: LiveWalk, start: int, starts: Callable[[int], np.ndarray]) -> None:
-        """Around a walk from the start of this number; `starts` tells a start, (leg,) [mm], by its number."""
-        self.walk, self._starts, self._lies = walk, starts, 0.0
-        self.start = self._tried = start
+        """Show a walk from start number `start`; `starts` returns a start, (leg,) [mm], by its number."""
+        self.walk, self.start, self.paused, self.message = walk, start, False, ""
+        self._starts, self._tried, self._lying = starts, start, 0.0
         self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)
-        self.paused, self.told = False, ""
 
     @property
     def factor(self) -> float:
-        """Seconds walked for a second on the wall, lately."""
-        wall = sum(one for one, _ in self._recent)
-        return sum(one for _, one in self._recent) / wall if wall else 1.0
+        """Simulated time over real time of the recent frames."""
+        real = sum(passed for passed, _ in self._recent)
+        return sum(walked for _, walked in self._recent) / real if real else 1.0
 
     def tick(self, passed: float) -> Moment:
-        """Let so much time pass [s]."""
+        """Advance by a time [s]."""
         self.walk.trace = []
         if self.paused:
             return self.walk.moment
         before = self.walk.moment.seconds
         if not self.walk.fell_on:
-            if not self._done(lambda: self.walk.advance(min(passed, LONGEST))):
+            if not self._done(lambda: self.walk.advance(min(passed, LONGEST_STEP))):
                 self._done(self.begin)
             self._recent.append((passed, max(0.0, self.walk.moment.seconds - before)))
-        elif (lies := self._lies + passed) < LIES:
-            self._lies = lies
+        elif (lying := self._lying + passed) < LYING_TIME:
+            self._lying = lying
         else:
             self._done(self.begin_next)
         return self.walk.moment
@@ -73,16 +79,16 @@ class LiveSession:
         self._begin(self.start)
 
     def begin_next(self) -> None:
-        """Begin at the next start; one that cannot be walked is passed over when this is called again."""
+        """Begin at the next start; another call skips a start that cannot be walked."""
         self._begin(self._tried + 1)
 
-    def attempt(self, wish: Callable[[], object]) -> None:
-        """Do to the walk what somebody wishes, and tell why where that makes no sense."""
-        self.told = ""
-        self._done(wish)
+    def attempt(self, change: Callable[[], object]) -> None:
+        """Change the walk; if that is refused, set `message`."""
+        self.message = ""
+        self._done(change)
 
     def _begin(self, start: int) -> None:
-        self._tried, self._lies = start, 0.0
+        self._tried, self._lying = start, 0.0
         self.walk.begin(self._starts(start))
         self.start = start
         self._recent.clear()
@@ -91,20 +97,20 @@ class LiveSession:
         try:
             change()
         except (InputError, SimulationError) as error:
-            self.told = str(error)
+            self.message = str(error)
             return False
         return True
 
 
 class ReplaySession:
-    """A recording, again and again, at half the speed of the time on the wall."""
+    """A recording that repeats at half speed."""
 
     def __init__(self, take: Take) -> None:
-        """About to begin."""
+        """Begin with the first step."""
         self.take, self._seconds, self.paused = take, 0.0, False
 
     def tick(self, passed: float) -> int:
-        """Let so much time pass [s]; tells the step that is seen."""
+        """Advance by a time [s] and return the current step."""
         if not self.paused:
-            self._seconds = (self._seconds + passed / 2) % (self.take.end - self.take.begin + LIES)
+            self._seconds = (self._seconds + passed / 2) % (self.take.end - self.take.begin + LYING_TIME)
         return self.take.row(self.take.begin + self._seconds)
