@@ -30,7 +30,6 @@ FIGURES: dict[str, dict[str, str]] = {
     "biology": {"biology": "studies.biology:biology_figure"},
     "league": {"league": "studies.league_figure:league_figure", "walks": "studies.league_figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation:ablation_figure"},
-    "model_variants": {"model_variants": "paper.readings_figure:readings_figure"},
     "search": {"convergence": "search.results:convergence_figure"},
     "recording": {"walk": "replay.footfall:walk_figure"},
 }

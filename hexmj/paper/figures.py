@@ -1,9 +1,9 @@
 """Figures 2-6 in the paper's layout, the phase histograms of Section 5.3, and footfall diagrams over the velocity.
 
-Each function takes the measurements it names (`hexmj.paper.reproduce.measure`) and returns a figure and the data in it.
+Each function takes measurements by name (`reproduce.measure`), and returns a figure and the data in it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from hexmj.diagrams import spans
 from hexmj.legs import LEGS
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
-from hexmj.paper.quantities import Measured, kept_gaits, main_peak
+from hexmj.paper.quantities import kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
 from hexmj.timing import OBSERVATION_TIMES
 
@@ -22,11 +22,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Measurements = Mapping[str, "xr.Dataset"]
+"""Measurements by name, see `protocol.MEASUREMENTS`."""
+
 SAMPLES = 7
 """Samples of starts whose means and standard deviations are drawn."""
 
 BINS = 51
-"""Of a phase histogram; 0.5 is in the middle of one."""
+"""Bins of a phase histogram; 0.5 is in the middle of one."""
 
 RELATIVE = {2: "o", 3: "s"}
 """Legs whose phases relative to leg 1 are drawn, with their symbols."""
@@ -53,12 +56,14 @@ CURVES: dict[int, dict[str, tuple[str, dict[str, Any]]]] = {
         "ldvs accelerated": ("LDVS, accelerated", {"color": ACCELERATED, "marker": "*", "markersize": 9}),
     },
 }
-"""Figures of FLSS: by their numbers, the measurements drawn, each with its label and the symbols of the paper."""
+"""Number of a figure of FLSS -> its measurements, each with its label and the symbols of the paper."""
 
 
-def phase_figure(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
-    """Phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks; those of
-    Wilson's Gait II as crosses beside LDVS."""
+def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
+    """Draw the phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks.
+
+    Crosses beside LDVS are Wilson's Gait II.
+    """
     import xarray as xr
 
     gaits, colour = measured[f"{model} gaits"], MODELS[model]
@@ -93,8 +98,8 @@ def phase_figure(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
     return figure, data
 
 
-def phase_histograms(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
-    """How many starts walk with which phase: a row for each pair of legs, a column for each of five velocities."""
+def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
+    """Draw the number of starts over their phase: a row for each pair of legs, a column for each of five velocities."""
     import xarray as xr
 
     kept = list(kept_gaits(measured[f"{model} gaits"]))
@@ -125,8 +130,8 @@ def phase_histograms(measured: Measured, model: str) -> "tuple[Figure, xr.Datase
     return figure, data
 
 
-def footfall_diagrams(measured: Measured, model: str) -> "tuple[Figure, xr.Dataset]":
-    """Which legs protract (bars) in the limit regime, over three periods of a single leg, a panel a velocity."""
+def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
+    """Draw which legs protract (bars) in the steady-state gait, over three periods of a single leg."""
     data = measured[f"{model} footfall"]
     figure = _figure(7.2, 1.35 * data.sizes["velocity"] + 0.5)
     panels = figure.subplots(data.sizes["velocity"], 1, sharex=True, squeeze=False)[:, 0]
@@ -145,8 +150,8 @@ def footfall_diagrams(measured: Measured, model: str) -> "tuple[Figure, xr.Datas
     return figure, data
 
 
-def flss_figure(measured: Measured, number: int, observation_time: str) -> "tuple[Figure, xr.Dataset]":
-    """Figs. 2-4, FLSS against velocity: means of the samples of starts, bars of one standard deviation over them."""
+def flss_figure(measured: Measurements, number: int, observation_time: str) -> "tuple[Figure, xr.Dataset]":
+    """Draw FLSS against velocity (Figs. 2-4): means of the samples of starts, bars of one standard deviation."""
     import xarray as xr
 
     figure, curves = _figure(6.4, 4.6), CURVES[number]
@@ -172,7 +177,7 @@ def flss_figure(measured: Measured, number: int, observation_time: str) -> "tupl
 
 
 def _samples(lost: "xr.DataArray") -> "xr.Dataset":
-    """Mean and standard deviation over the samples of starts, (velocity,); NaN where no set is known."""
+    """Return mean and standard deviation over the samples of starts, (velocity,); NaN without a weight set."""
     import xarray as xr
 
     known = (lost.values != NO_SET).all(axis=1)
@@ -195,7 +200,7 @@ def _figure(width: float, height: float) -> "Figure":
     return picture(width, height)
 
 
-Draw = Callable[[Measured], "tuple[Figure, xr.Dataset]"]
+Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]
 
 FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{
@@ -211,4 +216,4 @@ FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{f"phases-{model}": ((f"{model} gaits",), partial(phase_histograms, model=model)) for model in MODELS},
     **{f"footfall-{model}": ((f"{model} footfall",), partial(footfall_diagrams, model=model)) for model in MODELS},
 }
-"""Name of each figure -> the measurements it needs, and what draws it."""
+"""Name of each figure -> the measurements it needs, and the function that draws it."""

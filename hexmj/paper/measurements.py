@@ -1,38 +1,41 @@
-"""What Section 5 measures at one velocity: losses of stability, limit regimes, footfalls.
+"""Measurements at one velocity: losses of stability, steady-state gaits and footfalls; losses after obstacles.
 
-The outcome of every start is kept, so that curves can be compared on the same starts and samples of 1000 can be formed
-afterwards.
+The outcome of every start is kept, so that curves can be compared on the same starts, and samples of 1000 formed later.
 """
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hexmj.controllers.checked_plans import begin
 from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.controllers.losses import planned_losses
+from hexmj.controllers.protocol import SteerableController
 from hexmj.gaits import limit_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
-from hexmj.paper.late_losses import lost_after, lost_at_periods
 from hexmj.phases import PAIRS
-from hexmj.starts import draw_starts
+from hexmj.starts import checked_starts, draw_starts
+from hexmj.studies.disturbed_walks import Disturbed, DisturbedPlan, collect_postures, disturbance_of, find_stable_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
 
 NO_SET = -1
-"""Stands for the outcome where no set has been searched yet."""
+"""Outcome if no weight set has been searched yet."""
 
 LATE_PERIODS = 5
-"""Periods of a single leg oscillator, (AEP_0 - PEP_0) (1 + 1/V), after which Section 5.2 looks again."""
-
-Looks = Literal["steps", "periods"]
-"""It is looked for a loss of static stability after every step, or after every period of a single leg."""
+"""Periods of a single leg, (AEP_0 - PEP_0) (1 + 1/V), after which Section 5.2 counts losses again."""
 
 MOMENTS = 1201
-"""Of a footfall diagram."""
+"""Moments of a footfall diagram."""
+
+Answer = Literal["none", "positions", "postures", "slow down"]
+"""Answer to an obstacle: none; legs go to the nearest of a small set of positions of undisturbed walking and all stand
+there, or they take over the states of that posture too; or a superior level lowers V, and Eq. 11 raises it again."""
 
 
 def losses(
@@ -43,37 +46,71 @@ def losses(
     stride: Stride,
     acceleration: Acceleration | None,
     late: bool,
-    looks: Looks = "steps",
-    margin: float = 0.0,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Which starts lose static stability under both observation times, (observation time, start): 1 lost, 0 not, -1 where there is no set.
+    """Return which starts lose static stability, (observation time, start): 1 lost, 0 not, `NO_SET` without a set.
 
-    Args, beside those of `WalkSettings`:
+    Args:
+        velocity: V_r, a fraction of V_p.
         sets: the network for each of `OBSERVATION_TIMES`.
-        late: look only after `LATE_PERIODS`.
-        looks: at every step, or once a period only.
-        margin: by how much S is narrower than ]PEP_0, AEP_0[ at either end [mm].
+        n_starts: number of starts.
+        seed: of the starts.
+        stride: step range and time step.
+        acceleration: Eq. 11.
+        late: count only losses after `LATE_PERIODS`.
+        threads: one per core by default.
     """
-    import xarray as xr
-
-    inner = replace(stride, pep0=stride.pep0 + margin, aep0=stride.aep0 - margin)
-    starts = draw_starts(n_starts, seed, inner)
+    starts = draw_starts(n_starts, seed, stride)
     lost = np.full((len(OBSERVATION_TIMES), n_starts), NO_SET, dtype=np.int8)
-    for one in dict.fromkeys(filter(None, sets)):
-        rows = [row for row, other in enumerate(sets) if other == one]
+    for network in dict.fromkeys(filter(None, sets)):
+        rows = [row for row, other in enumerate(sets) if other == network]
         times = [observation_duration(OBSERVATION_TIMES[row], np.array(velocity), stride, acceleration) for row in rows]
         durations = np.array(times)
-        wait = stride.periods(velocity, LATE_PERIODS) if late else 0.0
-        how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-        if looks == "periods":
-            lost[rows] = [lost_at_periods(starts, one, velocity, wait, time.item(), **how) for time in times]
-        elif late:
-            lost[rows] = lost_after(starts, one, velocity, wait, durations, stride=stride, threads=threads)
+        if late:
+            wait = stride.periods(velocity, LATE_PERIODS)
+            lost[rows] = lost_after(starts, network, velocity, wait, durations, stride=stride, threads=threads)
         else:
-            first = first_loss(starts, one, velocity, durations.max(), **how)
+            how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
+            first = first_loss(starts, network, velocity, durations.max(), **how)
             lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
+    return _lost(lost)
+
+
+def _lost(lost: np.ndarray) -> "xr.Dataset":
+    import xarray as xr
+
     return xr.Dataset({"lost": (("observation_time", "start"), lost)}, {"observation_time": list(OBSERVATION_TIMES)})
+
+
+def lost_after(
+    starts: ArrayLike,
+    controller: Cruse1998,
+    velocity: float,
+    wait: float,
+    durations: ArrayLike,
+    *,
+    stride: Stride,
+    threads: int | None = None,
+) -> np.ndarray:
+    """Return whether each start is statically unstable within `durations` after the first `wait` of its walk.
+
+    Args:
+        starts: (start, leg) tips at time 0 [mm].
+        controller: the network.
+        velocity: V_r, a fraction of V_p.
+        wait: time at the beginning that does not count, at least one step [time units].
+        durations: observation times after it, (duration,) [time units].
+        stride: step range and time step.
+        threads: one per core by default.
+
+    Returns:
+        (duration, start)
+    """
+    x = checked_starts(starts, stride)
+    plan = controller.begin(x, np.full(len(x), velocity), stride, threads=threads)
+    unseen, seen = int(steps_within(wait, stride)), steps_within(durations, stride)
+    first = plan.first_losses_after(unseen, int(seen.max()))
+    return (first > 0) & (first <= unseen + seen[:, np.newaxis])
 
 
 def limit_regimes(
@@ -85,7 +122,7 @@ def limit_regimes(
     acceleration: Acceleration | None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Phases (start, pair), periods (start, leg) and what is true of each start's limit regime."""
+    """Return phases (start, pair), periods (start, leg) and properties of each start's steady-state gait."""
     import xarray as xr
 
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
@@ -115,7 +152,10 @@ def footfalls(
     acceleration: Acceleration,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Stance (time, leg) of one start over three periods of its limit regime; time in periods of a single leg."""
+    """Return stance (time, leg) of one start over three periods of its steady-state gait.
+
+    Time is in periods of a single leg.
+    """
     import xarray as xr
 
     start, period = draw_starts(1, seed, stride), stride.periods(velocity)
@@ -129,3 +169,51 @@ def footfalls(
         {"stance": (("time", "leg"), seen[np.round(time / 3 * (len(seen) - 1)).astype(int)])},
         {"time": ("time", time, {"units": "periods of a single leg"}), "leg": list(LEGS)},
     )
+
+
+def losses_after(
+    velocity: float,
+    controller: SteerableController,
+    answer: Answer,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    acceleration: Acceleration | None,
+    threads: int | None = None,
+) -> "xr.Dataset":
+    """Return which starts lose static stability after an obstacle, (observation time, start): 1 lost, 0 not.
+
+    An obstacle is "the termination of motion. Then the motion is initiated from new leg positions" (Section 6): a halt
+    in mid-stride. The observation time begins when the walk is at its velocity again.
+
+    Args:
+        velocity: V_r, a fraction of V_p.
+        controller: a controller whose plans can be steered.
+        answer: to the obstacle.
+        n_starts: starts that reach it: the first of the seed's that are stable until then.
+        seed: of the starts and of the times of the obstacle.
+        stride: step range and time step.
+        acceleration: Eq. 11 for the answer 'slow down'; None for others.
+        threads: one per core by default.
+
+    Raises:
+        InputError: too few starts are stable so long, or none reaches a stable gait with postures.
+    """
+    stable = find_stable_starts(controller, velocity, n_starts, seed, stride, grid=1)
+    halt = disturbance_of(stable, "halt", controller, velocity, stride)
+    postures = collect_postures(controller, velocity, seed, stride) if answer in ("positions", "postures") else None
+    if postures and answer == "positions":
+        postures = replace(postures, standing=np.ones_like(postures.standing))
+    disturbed = Disturbed(controller, halt, postures, slows=acceleration is not None)
+
+    def plan() -> DisturbedPlan:
+        begun = begin(disturbed, stable.starts, velocity, stride, acceleration, threads)
+        return begun  # pyright: ignore[reportReturnType]
+
+    ahead = plan()
+    ahead.advance(int(halt.step.max()) + 1)
+    back = ahead.resumed * stride.dt + (acceleration.duration(velocity) if acceleration else 0.0)
+    steps = steps_within([back + observation_duration(time, velocity, stride) for time in OBSERVATION_TIMES], stride)
+    first = planned_losses(plan(), steps.max(axis=0), threads)
+    lost = ((first > 0) & (first <= steps)).astype(np.int8)
+    return _lost(lost)

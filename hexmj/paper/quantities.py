@@ -1,11 +1,11 @@
-"""What the paper's claims are about, looked up in measurements: one number for every start, at each velocity.
+"""Quantities of the paper's claims: one number for every start, at each velocity, from measurements.
 
 Two curves of FLSS are compared on the same starts.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -18,16 +18,22 @@ from hexmj.stats import WILSON_Z, wilson_interval
 if TYPE_CHECKING:
     import xarray as xr
 
-Measured = Mapping[str, "xr.Dataset"]
-"""Measurements of `hexmj.paper.protocol` by name, each with a leading velocity axis."""
-
 PEAK = 0.05
 """Half the width of a narrow peak of phases."""
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured under one model variant."""
+
+    data: "Mapping[str, xr.Dataset]"
+    """Measurements by name, see `protocol.MEASUREMENTS`; the first axis is the velocity."""
+    model_variant: ModelVariant = PRINTED
+
+
 @dataclass(frozen=True)
 class Point:
-    """One quantity at one velocity."""
+    """A quantity at one velocity."""
 
     velocity: float
     of: str
@@ -37,7 +43,7 @@ class Point:
 
     @property
     def estimate(self) -> tuple[float, float, float]:
-        """Mean and 95 % interval: Wilson's for frequencies, else the normal one; all NaN without a start."""
+        """Mean and 95 % interval: Wilson's for frequencies, else the normal one; NaN without starts."""
         n = len(self.values)
         if n == 0:
             return np.nan, np.nan, np.nan
@@ -49,19 +55,20 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Lost:
-    """FLSS of a curve, or its difference from a multiple of another one's."""
+class Losses:
+    """FLSS of a curve, or its difference from a multiple of another curve's."""
 
     curve: str
     minus: str | None = None
     times: float = 1.0
     at: float | None = None
-    """Velocity of the other curve, the same unless given."""
+    """Velocity of the other curve; by default the same."""
     windowed = True
+    """Whether the quantity depends on the observation time."""
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
+        """The quantity in words."""
         if self.minus is None:
             return f"FLSS({self.curve})"
         other = self.minus if self.at is None else f"{self.minus} at V = {self.at:g}"
@@ -69,12 +76,12 @@ class Lost:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Measurements."""
+        """Names of the measurements."""
         return (self.curve,) if self.minus is None else (self.curve, self.minus)
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Where all of its sets are known."""
-        curves = [measured[name].lost.sel(observation_time=observation_time) for name in self.needs]
+        """Yield a point for each velocity at which all weight sets are known."""
+        curves = [measured.data[name].lost.sel(observation_time=observation_time) for name in self.needs]
         for v in curves[0].velocity.values.tolist():
             other = v if self.at is None else self.at
             if other not in curves[-1].velocity:
@@ -85,33 +92,33 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class _OfModel:
-    """Base of the quantities of a preset's gaits, for which no observation time matters."""
+class _OfGaits:
+    """Base of the quantities of a preset's accelerated gaits, which depend on no observation time."""
 
     model: str
     windowed = False
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Measurements."""
+        """Names of the measurements."""
         return (f"{self.model} gaits",)
 
 
 @dataclass(frozen=True)
-class Phase(_OfModel):
-    """Relative phases in the main peak of the accelerated gaits that are periodic and never lost static stability."""
+class Phases(_OfGaits):
+    """Relative phases in the main peak of the gaits that are periodic and never lost static stability."""
 
     pairs: Literal["ipsilateral", "contralateral"]
     minus_wilson: bool = False
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
+        """The quantity in words."""
         return f"{self.pairs} phase({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """One for each pair."""
-        for v, one in kept_gaits(measured[self.needs[0]]):
+        """Yield a point for each velocity and pair of legs."""
+        for v, one in kept_gaits(measured.data[self.needs[0]]):
             for pair in one.pair.values[IPSILATERAL if self.pairs == "ipsilateral" else CONTRALATERAL].tolist():
                 phase = one.phase.sel(pair=pair).values
                 shift = float(wilson_phase(v)) if self.minus_wilson else 0.0
@@ -119,100 +126,95 @@ class Phase(_OfModel):
 
 
 @dataclass(frozen=True)
-class Regime(_OfModel):
-    """Part of all starts whose limit regime is not as said, without acceleration or with it."""
+class Faults(_OfGaits):
+    """Part of all starts whose steady-state gait is aperiodic or unstable, without acceleration or with it."""
 
     fault: Literal["aperiodic", "unstable"]
     accelerated: bool = False
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
+        """The quantity in words."""
         how = "with" if self.accelerated else "without"
         return f"part of starts that come {how} acceleration to an {self.fault} limit regime({self.model})"
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Measurements."""
+        """Names of the measurements."""
         return (f"{self.model} gaits" if self.accelerated else f"{self.model} regimes",)
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """One for each velocity."""
-        for v in measured[self.needs[0]].velocity.values.tolist():
-            one = measured[self.needs[0]].sel(velocity=v)
+        """Yield a point for each velocity."""
+        gaits = measured.data[self.needs[0]]
+        for v in gaits.velocity.values.tolist():
+            one = gaits.sel(velocity=v)
             yield Point(v, "", ~(one.periodic if self.fault == "aperiodic" else one.stable).values.astype(bool))
 
 
 @dataclass(frozen=True)
-class Scatter(_OfModel):
-    """Spread of the accelerated gaits: of periods over legs, of phases over ipsilateral pairs or over starts."""
+class Scatter(_OfGaits):
+    """Spread of the gaits: of periods over legs, of phases over ipsilateral pairs or over starts."""
 
     of: Literal["periods", "pairs", "phases"]
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
-        if self.of == "periods":
-            return f"(longest - shortest) / mean period of the legs({self.model})"
-        if self.of == "pairs":
-            return f"largest - smallest phase, on the circle, of the ipsilateral pairs({self.model})"
-        return f"part of starts outside the main peak of a pair({self.model})"
+        """The quantity in words."""
+        words = {
+            "periods": "(longest - shortest) / mean period of the legs",
+            "pairs": "largest - smallest phase, on the circle, of the ipsilateral pairs",
+            "phases": "part of starts outside the main peak of a pair",
+        }
+        return f"{words[self.of]}({self.model})"
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """One for each velocity, or for each pair."""
-        for v, one in kept_gaits(measured[self.needs[0]]):
+        """Yield a point for each velocity; of phases for each pair, too."""
+        for v, one in kept_gaits(measured.data[self.needs[0]]):
             if self.of == "periods":
                 yield Point(v, "", np.ptp(one.periods.values, axis=1) / one.periods.values.mean(axis=1))
-                continue
-            if self.of == "pairs":
+            elif self.of == "pairs":
                 yield Point(v, "", circular_range(one.phase.values[:, IPSILATERAL]))
-                continue
-            for pair in one.pair.values.tolist():
-                yield Point(v, pair, ~main_peak(one.phase.sel(pair=pair).values))
+            else:
+                for pair in one.pair.values.tolist():
+                    yield Point(v, pair, ~main_peak(one.phase.sel(pair=pair).values))
 
 
 @dataclass(frozen=True)
-class Named(_OfModel):
-    """Part of the accelerated gaits that have a name."""
+class Gait(_OfGaits):
+    """Part of the gaits that have a name; the phases of the left side and of the front legs decide."""
 
     name: GaitName
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
+        """The quantity in words."""
         return f"part of gaits that are {self.name}({self.model})"
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """One for each velocity; the left side and the front legs name the gait."""
-        for v, one in kept_gaits(measured[self.needs[0]]):
+        """Yield a point for each velocity."""
+        for v, one in kept_gaits(measured.data[self.needs[0]]):
             phases = one.phase.sel(pair=["1-2", "2-3", "1-4"]).values
             yield Point(v, "", np.array([classify(*three) == self.name for three in phases.tolist()], dtype=bool))
 
 
 @dataclass(frozen=True)
 class Weight:
-    """A parameter of the sets optimised for one velocity each, or the ratio of two."""
+    """A parameter of the weight sets that were found for one velocity each, or the ratio of two parameters."""
 
     parameter: str
     over: str | None = None
-    model_variant: ModelVariant = PRINTED
-    """Under which the sets were searched."""
     windowed = True
     needs: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
-        """For a rule's sentence."""
+        """The quantity in words."""
         return f"|{self.parameter} / {self.over}| of the ideal sets" if self.over else f"{self.parameter} of ideal sets"
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """One for each set."""
+        """Yield a point for each set that was found under the model variant."""
         for one in found_sets():
-            if (
-                one.observation_time == observation_time
-                and one.low == one.high
-                and one.controller.model_variant == self.model_variant
-            ):
+            if one.place == (observation_time, one.low, one.low, measured.model_variant):
                 value = getattr(one.controller.weights, self.parameter)
                 if self.over:
                     with np.errstate(divide="ignore", invalid="ignore"):
@@ -220,17 +222,27 @@ class Weight:
                 yield Point(one.low, "", np.array([value]))
 
 
-Quantity = Lost | Phase | Regime | Scatter | Named | Weight
+Quantity = Losses | Phases | Faults | Scatter | Gait | Weight
+
+QUANTITIES: dict[str, Any] = {
+    "losses": Losses,
+    "phases": Phases,
+    "faults": Faults,
+    "scatter": Scatter,
+    "gait": Gait,
+    "weight": Weight,
+}
+"""Classes by their kind in `claims.toml`."""
 
 
-def kept_gaits(gaits: "xr.Dataset") -> Iterator[tuple[float, "xr.Dataset"]]:
-    """At each velocity the starts that Section 5.3 takes: in a periodic regime, and stable all the way."""
+def kept_gaits(gaits: "xr.Dataset") -> "Iterator[tuple[float, xr.Dataset]]":
+    """Yield at each velocity the starts that Section 5.3 takes: with a periodic gait, and stable all the way."""
     for v in gaits.velocity.values.tolist():
         one = gaits.sel(velocity=v)
         yield v, one.isel(start=np.flatnonzero(one.periodic & one.stable & ~one.lost))
 
 
 def main_peak(phase: np.ndarray) -> np.ndarray:
-    """Which phases, (start,), lie within `PEAK` of the one that has most of the others this close."""
+    """Return which phases, (start,), lie within `PEAK` of the phase that has most of the others this close."""
     near = np.abs((phase[:, np.newaxis] - phase + 0.5) % 1.0 - 0.5) <= PEAK
     return near[near.sum(axis=1).argmax()] if len(phase) else np.zeros(0, dtype=bool)

@@ -1,7 +1,8 @@
-"""`hexmj reproduce`: measure, judge every claim of the paper, draw its figures; what is finished is kept."""
+"""`hexmj reproduce`: measure, judge every claim of the paper, draw its figures."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -10,107 +11,284 @@ from hexmj import io
 from hexmj.controllers.cruse1998.model_variants import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
-from hexmj.io import json_text, results_folder, save
 from hexmj.measures.tables import VELOCITY
-from hexmj.paper.claims import CLAIMS, Claim
+from hexmj.paper.claims import Claim, claims, in_physics
 from hexmj.paper.figures import FIGURES, SAMPLES
-from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, velocities_of
-from hexmj.paper.table import Row, claims_json, claims_markdown, judge
+from hexmj.paper.found_sets import found_sets
+from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, Protocol, cells
+from hexmj.paper.quantities import Measured
+from hexmj.paper.rules import Answer
 from hexmj.progress import part_of, shown
 from hexmj.sweep import Execution, over_axes, run_cells
+from hexmj.timing import OBSERVATION_TIMES
 from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
-TABLES = ("claims.md", "claims.json")
-DRAWN: dict[str, dict[str, Any]] = {".pdf": {"metadata": {"CreationDate": None}}, ".png": {"dpi": 200}}
-KEPT = "measurements"
+MEASURED = "measurements"
+"""Directory of the cached measurements, beside the results."""
+
+NOT_SEARCHED = "not yet searched"
+SAME = "same"
+"""Stands under the second observation time if a claim depends on none."""
+
+KINDS = ("held out", "calibrated")
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What `hexmj reproduce` judges."""
+
+    quick: bool = False
+    """Fewer starts and velocities, and coarser steps of gaits: under a minute. The full protocol takes several."""
+    only: tuple[str, ...] = ()
+    """Keys of the claims to judge, without figures; by default all."""
+    beside: tuple[str, ...] = ()
+    """Model variants of the network under which the claims are judged too, such as 'lasting'."""
+    seed: int = FULL.seed
+    """Seed of the random starts; the ideal sets were searched with 0 and 1."""
+
+    @property
+    def protocol(self) -> Protocol:
+        """How much is simulated."""
+        return replace(QUICK if self.quick else FULL, seed=self.seed)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A claim with our answers."""
+
+    claim: Claim
+    answers: dict[str, Answer | None]
+    """By observation time, or one under '' if the claim depends on none; None if a set has not been searched yet."""
+    beside: dict[str, dict[str, Answer | None]] = field(default_factory=dict)
+    """The answers under other model variants, by name."""
+
+    @property
+    def fits(self) -> str:
+        """The observation time that the paper's number fits, 'both' or 'neither'; empty if that is not the question."""
+        if set(self.answers) == {""} or None in self.answers.values():
+            return ""
+        agreeing = [time for time, answer in self.answers.items() if answer and answer.agrees]
+        return "both" if len(agreeing) == len(OBSERVATION_TIMES) else next(iter(agreeing), "neither")
+
+    @property
+    def why(self) -> str:
+        """The known reason, if we differ."""
+        return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
+
+    def under(self, name: str) -> "Row":
+        """Return the row with the answers under another model variant."""
+        return Row(self.claim, self.beside[name])
+
+
+def verdict(answer: Answer | None) -> str:
+    """Return 'agrees', 'differs' or that a set has not been searched yet."""
+    return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
+
+
+@dataclass(frozen=True)
+class Report:
+    """The claims with our answers, and the files that were written."""
+
+    rows: list[Row]
+    protocol: Protocol
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def variants(self) -> list[str]:
+        """Names of the other model variants."""
+        return list(self.rows[0].beside)
+
+    def tables(self) -> list[tuple[Sequence[str], Sequence[Sequence[str]]]]:
+        """Return the heads and rows of a table of our answers, and of one for each other model variant."""
+        tables: list[tuple[Sequence[str], Sequence[Sequence[str]]]]
+        tables = [(_heads(), [_cells(replace(row, beside={})) for row in self.rows])]
+        for name in self.variants:
+            heads = "section", "the paper", "its value", *(f"{name}, {time}" for time in OBSERVATION_TIMES)
+            rows = [(*_paper(row), *_answered(row.beside[name])) for row in self.rows]
+            tables.append((heads, rows))
+        return tables
+
+    @cached_property
+    def summary(self) -> list[str]:
+        """Sentences that count the verdicts, and say if the starts are those of the searches."""
+        return [*summary(self.rows), *self._searched, *self._beside]
+
+    @property
+    def _searched(self) -> list[str]:
+        seed = self.protocol.seed
+        warning = f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"
+        return [warning] if seed in {one.seed for one in found_sets()} else []
+
+    @property
+    def _beside(self) -> list[str]:
+        counts = {name: summary([row.under(name) for row in self.rows]) for name in self.variants}
+        return [f"model variant {name}, {line}" for name, lines in counts.items() for line in lines]
+
+    def markdown(self) -> str:
+        """Return the table, the rule of every row, and the command that recomputes it."""
+        p = self.protocol
+        size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
+        head = f"{size}; seed {p.seed}.  An answer is the number that strains the rule most, with its 95 % interval,"
+        lines = ["# The claims of the 1998 paper", "", f"{head} and where.", ""]
+        lines += [*(f"- {one}" for one in [*summary(self.rows), *self._searched]), ""]
+        lines += [*(f"- {one}" for one in self._beside), ""] if self.variants else []
+        rows = [[cell.replace("differs:", "**differs**:") for cell in _cells(row)] for row in self.rows]
+        lines += [*io.markdown_table(_heads(self.variants), rows), "", "## Rules and commands", ""]
+        rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]
+        lines += io.markdown_table(("the paper", "agrees if", "command"), rules)
+        lines += ["", "## Judged in physics", "", "Plans cannot answer these; docs/experiments.md does.", ""]
+        lines += [f"- {one['topic']} (Section 6): {one['text']}; `{one['command']}`" for one in in_physics()]
+        return "\n".join(lines) + "\n"
+
+    def json(self) -> dict[str, Any]:
+        """Return the same as plain numbers and texts."""
+        rows = []
+        for row in self.rows:
+            claim = row.claim
+            paper = {"key": claim.key, "section": claim.section, "paper": claim.text, "value": claim.value}
+            paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates)}
+            beside = {name: _plain(answers) for name, answers in row.beside.items()}
+            how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": self.command(row)}
+            rows.append(paper | {"ours": _plain(row.answers), "beside": beside} | how)
+        return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
+
+    def command(self, row: Row) -> str:
+        """Return the command that recomputes a row with the same starts and model variants."""
+        seed = self.protocol.seed
+        words = [row.claim.command, *(["--quick"] if self.protocol == replace(QUICK, seed=seed) else [])]
+        words += [f"--seed {seed}"] if seed != FULL.seed else []
+        words += [f"--beside {' '.join(row.beside)}"] if row.beside else []
+        return " ".join(words)
 
 
 def reproduce(
-    out: Path, protocol: Protocol = FULL, only: Sequence[str] = (), beside: Sequence[str] = (), **how: Unpack[Execution]
-) -> tuple[list[Row], list[Path]]:
-    """Measure what the claims need, judge them, draw the figures.
+    out: Path | str,
+    protocol: Protocol = FULL,
+    only: Sequence[str] = (),
+    beside: Sequence[str] = (),
+    **execution: Unpack[Execution],
+) -> Report:
+    """Measure what the claims need, judge them and draw the figures.
 
-    A stopped run goes on where it was: every measured velocity is kept in ``out/measurements``.  What lies in ``out``
-    stays until all is measured.
+    Every measured velocity is cached in `out`/measurements, so that a run that was stopped resumes.
 
     Args:
-        out: folder for ``claims.md``, ``claims.json``, figures (PDF, PNG and their data as NetCDF) and measurements.
+        out: directory for claims.md, claims.json, figures (PDF, PNG and their data as NetCDF) and measurements.
         protocol: how much is simulated.
-        only: keys of the claims to judge, all unless given; figures are drawn only with all.
-        beside: names of readings of the network under which the claims are judged, too.
-        how: see `sweeps.Execution`.
-
-    Returns:
-        The rows in the paper's order, and the files written.
+        only: keys of the claims to judge, without figures; by default all.
+        beside: names of model variants under which the claims are judged too.
+        execution: see `sweep.Execution`.
 
     Raises:
-        InputError: a key that no claim has, a name that no reading has, samples that no figure draws, a folder that
-            cannot be written to, or a damaged measurement.
+        InputError: no such claim or model variant, or a number of samples that the figures do not draw.
     """
-    if unknown := [key for key in only if key not in {claim.key for claim in CLAIMS}]:
-        raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claim.key for claim in CLAIMS)}")
+    if unknown := [key for key in only if key not in claims()]:
+        raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claims())}")
     if not only and protocol.samples != SAMPLES:
-        raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, as the figures draw, or keys of claims")
+        raise InputError(f"samples = {protocol.samples}; the figures draw {SAMPLES}")
     if beside:
-        distinct("readings beside", beside)
-    if "printed" in beside:
-        raise InputError("reading 'printed' beside itself; expected others, beside which it stands anyway")
-    model_variants = {name: named_variant(name) for name in beside}
-    results_folder(out := Path(out))
-    if not only:
-        results_folder(out / "figures")
-    claims = [claim for claim in CLAIMS if not only or claim.key in only]
-    with shown(how.get("progress"), "reproducing") as progress:
-        part = how | {"progress": part_of(progress, 1 / (1 + len(model_variants)))}
-        measured = _measurements(_needed(claims, figures=not only), protocol, out / KEPT, part)
-        rows = [judge(claim, measured) for claim in claims]
-        for name, model_variant in model_variants.items():
-            other = _measurements(
-                _needed(claims, figures=False), replace(protocol, model_variant=model_variant), out / KEPT, part
-            )
-            rows = [
-                replace(row, beside=row.beside | {name: judge(row.claim.under(model_variant), other)}) for row in rows
-            ]
-    texts = claims_markdown(rows, asdict(protocol)), json_text(claims_json(rows, asdict(protocol))) + "\n"
-    files = [write_text(out / name, text) for name, text in zip(TABLES, texts, strict=True)]
-    if not only:
-        for name, (_, draw) in FIGURES.items():
-            files += save_figure(*draw(measured), out / "figures" / name)
-    return rows, files
+        distinct("beside", ["printed", *beside])
+    variants = {name: named_variant(name) for name in beside}
+    out = io.results_folder(out)
+    judged = [claim for key, claim in claims().items() if not only or key in only]
+    needed = {name for claim in judged for name in claim.rule.quantity.needs}
+    drawn = {} if only else FIGURES
+    with shown(execution.get("progress"), "reproducing") as progress:
+        how: Execution = execution | {"progress": part_of(progress, 1 / (1 + len(variants)))}
+        names = needed | {name for needs, _ in drawn.values() for name in needs}
+        measured = measure(names, protocol, out / MEASURED, **how)
+        others = {
+            name: measure(needed, replace(protocol, model_variant=variant), out / MEASURED, **how)
+            for name, variant in variants.items()
+        }
+    rows = [
+        Row(claim, claim.answers(measured), {name: claim.answers(other) for name, other in others.items()})
+        for claim in judged
+    ]
+    report = Report(rows, protocol)
+    report.files.append(write_text(out / "claims.md", report.markdown()))
+    report.files.append(write_text(out / "claims.json", io.json_text(report.json()) + "\n"))
+    for name, (_, draw) in drawn.items():
+        figure, data = draw(measured.data)
+        path = io.results_folder(out / "figures") / name
+        report.files.extend(io.save_figure(figure, path.with_name(name + end)) for end in (".pdf", ".png"))
+        report.files.append(io.save(data, path.with_name(f"{name}.nc")))
+    return report
 
 
-def measure(name: str, protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]) -> "xr.Dataset":
-    """One measurement of `MEASUREMENTS`, (velocity, ...); folder and `how` as of `sweeps.finish`."""
-    return _over_velocities(name, protocol, run_cells(cells(name, protocol), folder, **how))
+def measure(
+    names: set[str] | Sequence[str],
+    protocol: Protocol,
+    folder: Path | str | None = None,
+    **execution: Unpack[Execution],
+) -> Measured:
+    """Take measurements of `MEASUREMENTS` in one sweep over the velocities of all; arguments as of `run_cells`."""
+    parts = {name: cells(name, protocol) for name in MEASUREMENTS if name in names}
+    results = iter(run_cells([cell for part in parts.values() for cell in part.values()], folder, **execution))
+    data: Mapping[str, xr.Dataset] = {
+        name: over_axes({"velocity": len(part)}, [*islice(results, len(part))], combine_attrs="drop").assign_coords(
+            velocity=("velocity", list(part), VELOCITY)
+        )
+        for name, part in parts.items()
+    }
+    return Measured(data, protocol.model_variant)
 
 
-def _needed(claims: Sequence[Claim], figures: bool) -> list[str]:
-    """Names of the measurements that claims, and the figures, are looked up in."""
-    needed = {name for claim in claims for name in claim.rule.quantity.needs}
-    if figures:
-        needed |= {name for needs, _ in FIGURES.values() for name in needs}
-    return [name for name in MEASUREMENTS if name in needed]
+def summary(rows: Sequence[Row]) -> list[str]:
+    """Return sentences that count the verdicts, those of calibrated claims separately."""
+    lines = []
+    for time in (*OBSERVATION_TIMES, ""):
+        judged = [row for row in rows if time in row.answers]
+        verdicts = {kind: [verdict(row.answers[time]) for row in judged if row.claim.kind == kind] for kind in KINDS}
+        counts = [f"{kind} {_counts(of_kind)}" for kind, of_kind in verdicts.items()]
+        of = f"claims on FLSS and sets, observation time {time}" if time else "claims on gaits"
+        lines.append(f"{of}: {'; '.join(counts)}")
+    fits = [row.fits for row in rows if row.fits]
+    counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *OBSERVATION_TIMES, "neither"))
+    return [*lines, f"which observation time the paper's numbers fit: {counts}"]
 
 
-def _measurements(names: Sequence[str], protocol: Protocol, folder: Path, how: Execution) -> "dict[str, xr.Dataset]":
-    """Measurements from one sweep over the velocities of all."""
-    parts = {name: cells(name, protocol) for name in names}
-    data = iter(run_cells([cell for part in parts.values() for cell in part], folder, **how))
-    return {name: _over_velocities(name, protocol, [*islice(data, len(part))]) for name, part in parts.items()}
+def _counts(verdicts: Sequence[str]) -> str:
+    counts = [f"{verdicts.count(one)} {one}" for one in ("agrees", "differs", NOT_SEARCHED) if one in verdicts]
+    return ", ".join(counts) or "none judged"
 
 
-def _over_velocities(name: str, protocol: Protocol, rows: "Sequence[xr.Dataset]") -> "xr.Dataset":
-    velocities = list(velocities_of(name, protocol))
-    return over_axes({"velocity": len(velocities)}, rows, combine_attrs="drop").assign_coords(
-        velocity=("velocity", velocities, VELOCITY)
-    )
+def _heads(variants: Sequence[str] = ()) -> tuple[str, ...]:
+    answers = (f"{name}, {time}" for name in ("ours", *variants) for time in OBSERVATION_TIMES)
+    return "section", "the paper", "its value", "kind", *answers, "fits", "why"
 
 
-def save_figure(figure: "Figure", data: "xr.Dataset", path: Path) -> list[Path]:
-    """Write a figure as PDF and PNG, and its data as NetCDF, under `path` with these endings."""
-    files = [io.save_figure(figure, path.with_name(path.name + end)) for end in DRAWN]
-    return [*files, save(data, path.with_name(path.name + ".nc"))]
+def _cells(row: Row) -> tuple[str, ...]:
+    """Return the cells of `_heads`, of the other model variants too."""
+    claim = row.claim
+    kind = f"{claim.kind}: {'; '.join(claim.calibrates)}" if claim.calibrates else claim.kind
+    answered = [cell for answers in (row.answers, *row.beside.values()) for cell in _answered(answers)]
+    return *_paper(row), kind, *answered, row.fits, row.why
+
+
+def _paper(row: Row) -> tuple[str, str, str]:
+    return row.claim.section, row.claim.text, row.claim.value
+
+
+def _answered(answers: Mapping[str, Answer | None]) -> list[str]:
+    """Return verdict and number under each observation time."""
+    cells = [verdict(answer) + (f": {_number(answer)}" if answer else "") for answer in answers.values()]
+    return cells + [SAME] * (len(OBSERVATION_TIMES) - len(cells))
+
+
+def _number(answer: Answer) -> str:
+    if answer.value != answer.value:
+        return f"no value at {answer.where}"
+    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
+    return f"{answer.value:.4f}{interval} at {answer.where}"
+
+
+def _plain(answers: Mapping[str, Answer | None]) -> dict[str, dict[str, Any]]:
+    """Return verdicts and numbers by observation time."""
+    return {
+        time or "any": {"verdict": verdict(answer)} | (asdict(answer) if answer else {})
+        for time, answer in answers.items()
+    }

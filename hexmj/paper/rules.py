@@ -1,9 +1,9 @@
-"""How a claim of the paper is judged: a quantity, velocities, and a band, a count or a trend."""
+"""Rules of the paper's claims: a quantity, velocities, and a band, a count or a trend."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ END = 0.05
 
 @dataclass(frozen=True)
 class Answer:
-    """What comes out here, at the point that strains a rule most."""
+    """Our value with its 95 % interval, at the point that strains a rule most."""
 
     value: float
     low: float
@@ -32,13 +32,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class _OverRange:
-    """Base of the rules: a quantity over a range of velocities, whose ends have to be met."""
+    """Base of the rules: a quantity over a range of velocities, whose ends must be measured."""
 
     quantity: Quantity
     velocities: tuple[float, float]
 
     def answer(self, measured: Measured, observation_time: str) -> Answer | None:
-        """None where a set has not been searched yet."""
+        """Judge the quantity; None if a weight set has not been searched yet."""
         low, high = self.velocities
         points = self.quantity.points(measured, observation_time)
         inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
@@ -48,7 +48,7 @@ class _OverRange:
         return self.judged(inside)
 
     def judged(self, points: list[Point]) -> Answer:
-        """From the points of the range."""
+        """Judge the points of the range."""
         raise NotImplementedError
 
 
@@ -59,11 +59,11 @@ class Band(_OverRange):
     least: float = -np.inf
     most: float = np.inf
     averaged: bool = False
-    """Judge the mean over the range, J_N of Eq. 10 with velocities on a grid, and not each velocity."""
+    """Judge the mean over the range, J_N of Eq. 10 with velocities on a grid, instead of each velocity."""
 
     @property
     def words(self) -> str:
-        """The rule as a sentence."""
+        """The rule in words."""
         if self.least == self.most:
             band = f"reaches {self.least:g}"
         elif np.isinf(self.least):
@@ -87,19 +87,19 @@ class Band(_OverRange):
 
 @dataclass(frozen=True)
 class Seen(_OverRange):
-    """Agrees if, at every velocity of a range, a count here and in the paper's own sample may be of one frequency.
+    """Agrees if, at every velocity of a range, our count and that of the paper's own sample may have one frequency.
 
-    Fisher's exact test, two-sided, at 5 %: it holds for rare events and small samples too.
+    Fisher's exact test, two-sided, at 5 %, holds for rare events and small samples too.
     """
 
     count: int
-    """How often the paper saw it ..."""
+    """Number of starts in which the paper saw it."""
     of: int
-    """... in so many starts."""
+    """Number of all starts of the paper."""
 
     @property
     def words(self) -> str:
-        """The rule as a sentence."""
+        """The rule in words."""
         return (
             f"at {_range(self.velocities)} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
@@ -123,7 +123,7 @@ class Trend(_OverRange):
 
     @property
     def words(self) -> str:
-        """The rule as a sentence."""
+        """The rule in words."""
         side = "above" if self.sign > 0 else "below"
         return (
             f"from each V to the next, over {_range(self.velocities)}, the 95 % interval of the change of"
@@ -131,7 +131,7 @@ class Trend(_OverRange):
         )
 
     def judged(self, points: list[Point]) -> Answer:
-        """The change shown is the one that fits least."""
+        """Judge the changes; the one that fits least is shown."""
         steps = [
             (_difference(one, following), f"{_where(one)} to {following.velocity:g}")
             for name in dict.fromkeys(point.of for point in points)
@@ -143,9 +143,12 @@ class Trend(_OverRange):
 
 Rule = Band | Seen | Trend
 
+RULES: dict[str, Any] = {"band": Band, "seen": Seen, "trend": Trend}
+"""Classes by their kind in `claims.toml`."""
+
 
 def fisher(count: int, size: int, other: int, of: int) -> float:
-    """p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without a start."""
+    """Return p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without starts."""
     from scipy.stats import fisher_exact
 
     if size == 0 or of == 0:
@@ -154,13 +157,13 @@ def fisher(count: int, size: int, other: int, of: int) -> float:
 
 
 def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], agrees: bool) -> Answer:
-    """The answer at the first of the estimates, each with its place, that strains the rule most."""
+    """Return the answer at the first estimate, each with its place, that strains the rule most."""
     (value, low, high), where = estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))]
     return Answer(value, low, high, where, agrees)
 
 
 def _difference(one: Point, other: Point) -> Estimate:
-    """Change of the mean and its 95 % interval, as of independent samples."""
+    """Return the change of the mean and its 95 % interval, as of independent samples."""
     (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
     return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))
 
