@@ -42,7 +42,6 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 RENAMED: dict[str, str] = {
     "window": "observation_time",
     "reading": "model_variant",
-    "readings": "model_variants",
     "ReadsLegs": "SensoryFeedback",
     "n_physical": "physical_starts",
     "n_tried": "trial_starts",
@@ -166,15 +165,6 @@ def reproduce() -> Any:
     few = {"sample": 5, "gait_starts": 1, "obstacle_starts": 2, "stride": COARSE, "gait_stride": COARSE}
     with patch.object(protocol, "QUICK", replace(protocol.QUICK, **few)):
         return answer("reproduce --quick")
-
-
-def model_variants() -> Any:
-    """Two readings with coarse steps, without refined constants and with a short search."""
-    import hexmj.paper.scores as scores
-
-    scoring, search = replace(scores.SCORING, stride=COARSE, gait_stride=COARSE), replace(scores.IDEAL, budget=12)
-    with patch.multiple(scores, SCORING=scoring, ROUNDS=(), IDEAL=search):
-        return answer("readings --only lasting --best 1 --starts 20 --gait-starts 2")
 
 
 @cache
@@ -378,7 +368,6 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "python stable-baselines3": stable_baselines,
     "python examples": examples,
     # This one becomes a script.
-    "model_variants": model_variants,
 }
 
 OPTIONAL = {"distributed": "flss scheduler", "stable_baselines3": "python stable-baselines3", "viser": "view live"}

@@ -21,12 +21,13 @@ class Reproduce(Command):
     """Reproduce Section 5 of the 1998 paper: every claim with our number and verdict, Figures 2 to 6, phase histograms
     and footfall diagrams. A run that was stopped resumes if it is repeated."""
 
-    sources = (ReproduceOptions, "paper.reproduce:Reproduction", Output, Workers)
+    sources = (ReproduceOptions, "paper.protocol:Reproduction", Output, Workers)
     examples = ("--quick", "--only hws-close p4 --beside lasting --json")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, save_manifest
-        from hexmj.paper.reproduce import Reproduction, reproduce
+        from hexmj.paper.protocol import Reproduction
+        from hexmj.paper.reproduce import reproduce
         from hexmj.plotting import as_shipped
 
         chosen = build(Reproduction, given)

@@ -95,6 +95,25 @@ QUICK = Protocol(
 
 
 @dataclass(frozen=True)
+class Reproduction:
+    """What `hexmj reproduce` judges."""
+
+    quick: bool = False
+    """Fewer starts and velocities, and coarser steps of gaits: under a minute. The full protocol takes several."""
+    only: tuple[str, ...] = ()
+    """Keys of the claims to judge, without figures; by default all."""
+    beside: tuple[str, ...] = ()
+    """Model variants of the network under which the claims are judged too, such as 'lasting'."""
+    seed: int = FULL.seed
+    """Seed of the random starts; the ideal sets were searched with 0 and 1."""
+
+    @property
+    def protocol(self) -> Protocol:
+        """How much is simulated."""
+        return replace(QUICK if self.quick else FULL, seed=self.seed)
+
+
+@dataclass(frozen=True)
 class Measurement:
     """A function of one velocity, and where it is measured."""
 

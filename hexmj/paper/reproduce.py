@@ -15,7 +15,7 @@ from hexmj.measures.tables import VELOCITY
 from hexmj.paper.claims import Claim, claims, in_physics
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.found_sets import found_sets
-from hexmj.paper.protocol import FULL, MEASUREMENTS, QUICK, Protocol, cells
+from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, Reproduction, cells
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
 from hexmj.progress import part_of, shown
@@ -34,25 +34,6 @@ SAME = "same"
 """Stands under the second observation time if a claim depends on none."""
 
 KINDS = ("held out", "calibrated")
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """What `hexmj reproduce` judges."""
-
-    quick: bool = False
-    """Fewer starts and velocities, and coarser steps of gaits: under a minute. The full protocol takes several."""
-    only: tuple[str, ...] = ()
-    """Keys of the claims to judge, without figures; by default all."""
-    beside: tuple[str, ...] = ()
-    """Model variants of the network under which the claims are judged too, such as 'lasting'."""
-    seed: int = FULL.seed
-    """Seed of the random starts; the ideal sets were searched with 0 and 1."""
-
-    @property
-    def protocol(self) -> Protocol:
-        """How much is simulated."""
-        return replace(QUICK if self.quick else FULL, seed=self.seed)
 
 
 @dataclass(frozen=True)
@@ -158,7 +139,8 @@ class Report:
     def command(self, row: Row) -> str:
         """Return the command that recomputes a row with the same starts and model variants."""
         seed = self.protocol.seed
-        words = [row.claim.command, *(["--quick"] if self.protocol == replace(QUICK, seed=seed) else [])]
+        quick = self.protocol == Reproduction(quick=True, seed=seed).protocol
+        words = [row.claim.command, *(["--quick"] if quick else [])]
         words += [f"--seed {seed}"] if seed != FULL.seed else []
         words += [f"--beside {' '.join(row.beside)}"] if row.beside else []
         return " ".join(words)
