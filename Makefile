@@ -1,13 +1,11 @@
 # make compare    the main job; ARGS="..." adds options
-# make test       the tests, but for those that take their time
-# make slow       others: kills at every write, the soak's sample, README and examples, whatever takes seconds
-# make thorough   those for which .ci/run has no time: longer commands of the documents, notebooks, more starts
-# make soak       a hundred thousand inputs that make no sense, an hour; ARGS="1000" tries fewer
-# make bench      every speed beside its bar and its peers, a quarter of an hour; ARGS="..." goes to pytest
+# make test       quick tests, under three minutes on two cores; ARGS="..." goes to pytest
+# make slow       the other tests: README, examples, notebooks, browser, training
+# make bench      every speed beside a peer, under ten minutes; ARGS="..." goes to pytest
 # make lint       style and types
-# make docs       the documentation, in results/site; `python3 -m http.server -d results/site` shows it
+# make docs       the documentation, in results/site; `python3 -m http.server -d results/site` serves it
 # make gallery    the documentation's films of walks, in docs/gallery
-# PYTHON=...      the Python, 3.11 or newer, that .venv is made from
+# PYTHON=...      the Python, 3.11 or newer, for .venv
 
 PYTHON ?= python3
 INSTALL = -m pip --disable-pip-version-check --quiet install --no-compile
@@ -17,34 +15,23 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
-.PHONY: compare test slow thorough soak bench lint docs gallery system browser
+.PHONY: compare test slow bench lint docs gallery system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
 	.venv/bin/hexmj compare --out results/compare $(ARGS)
 
-test slow thorough: export MUJOCO_GL ?= $(GL)
+test slow bench: export MUJOCO_GL ?= $(GL)
 test: .venv/dev system
-	.venv/bin/python -m pytest -m "not (slow or thorough)" $(TWO_AT_ONCE) $(ARGS)
+	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
 
 slow: .venv/dev system browser .venv/rl
-	.venv/bin/python -m pytest -m "slow and not thorough" $(TWO_AT_ONCE) $(ARGS)
+	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
 
-thorough: .venv/dev system
-	.venv/bin/python -m pytest -m thorough $(TWO_AT_ONCE) $(ARGS)
-
-soak: export MUJOCO_GL ?= $(GL)
-soak: .venv/dev system
-	.venv/bin/python -m tests.soak $(ARGS)
-
-bench: export MUJOCO_GL ?= $(GL)
 bench: .venv/dev system
 	mkdir -p results/bench
-	$(MAKE) .venv-flygym/ready || echo "flygym could not be installed; its rows are left out."
-	.venv/bin/python -m pytest benchmarks --override-ini "python_files=bench_*.py" \
-	    --benchmark-quiet --benchmark-json results/bench/benchmark.json $(ARGS)
-	.venv/bin/python -m benchmarks.solver_settings results/bench
-	.venv/bin/python -m benchmarks.scaling --out results/bench
+	cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR=$$cache .venv/bin/python -m pytest benchmarks \
+	    --override-ini "python_files=bench_*.py" --benchmark-quiet --benchmark-json results/bench/benchmark.json $(ARGS)
 	.venv/bin/python -m benchmarks.table results/bench
 
 lint: .venv/dev
@@ -58,7 +45,7 @@ docs: .venv/dev
 gallery: .venv/project system
 	.venv/bin/python examples/gallery.py docs/gallery
 
-# Rendering without a screen; where it cannot be installed, the rest goes on without it.
+# Libraries for rendering without a display; everything else works without them.
 system:
 	@missing=; root=; libraries=$$(PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p); \
 	for library in $(GL_LIBRARIES); do \
@@ -72,7 +59,7 @@ system:
 	    >/dev/null 2>&1 || \
 	echo "Rendering needs system packages that could not be installed here: apt-get install $(GL_PACKAGES)."
 
-# A browser for the tests of pages, which are skipped without one.
+# A browser for the tests of pages, which are skipped without it.
 browser:
 	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit; done; \
 	root=; test "$$(id -u)" = 0 || root="sudo -n"; \
@@ -91,13 +78,6 @@ browser:
 
 .venv/project: .venv/begun pyproject.toml constraints.txt
 	$(PROJECT) ".[film]"
-	touch $@
-
-# A peer with other versions of MuJoCo; its OpenCV is replaced by the one that needs no libGL.
-.venv-flygym/ready: benchmarks/flygym.txt
-	$(PYTHON) -m venv .venv-flygym
-	.venv-flygym/bin/python $(INSTALL) --requirement benchmarks/flygym.txt
-	.venv-flygym/bin/python $(INSTALL) --no-deps --force-reinstall "opencv-python-headless<5"
 	touch $@
 
 .venv/dev: .venv/begun pyproject.toml constraints.txt
