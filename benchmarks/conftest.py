@@ -1,4 +1,4 @@
-"""One figure a test: `measure` runs it by pytest-benchmark and notes what `table` needs to print it."""
+"""The fixture `measure`, which takes one figure by pytest-benchmark and notes what `table` prints."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,16 +9,16 @@ OURS = "hexmj"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--once", action="store_true", help="take every figure once, and not after a first time")
+    """Add the option `--once`."""
+    parser.addoption("--once", action="store_true", help="take every figure once, without a warm-up")
 
 
 @pytest.fixture
 def measure(benchmark: Any, pytestconfig: pytest.Config) -> Callable[..., Any]:
-    """``measure(work, what, who, ...)`` runs `work` and returns its value.
+    """Return `measure(work, what, who, ...)`, which runs `work` and returns its value.
 
-    `what` names the row, `who` is hexmj or a peer of it.  The figure is `amount` per second in `unit`, or the
-    seconds themselves without an amount; `bar` is the figure to reach, or not to exceed, `ratio` the least
-    ratio to the peers.
+    `what` names the row of the table, `who` is hexmj or a peer. The figure is `amount` per second in `unit`, or the
+    seconds themselves without an amount. `ratio` is the least ratio of hexmj to its first peer.
     """
 
     def run(
@@ -28,12 +28,11 @@ def measure(benchmark: Any, pytestconfig: pytest.Config) -> Callable[..., Any]:
         *,
         amount: float | None = None,
         unit: str = "s",
-        bar: float | None = None,
         ratio: float | None = None,
         rounds: int = 3,
         warm: bool = True,
     ) -> Any:
-        benchmark.extra_info.update(what=what, who=who, amount=amount, unit=unit, bar=bar, ratio=ratio)
+        benchmark.extra_info.update(what=what, who=who, amount=amount, unit=unit, ratio=ratio)
         once = pytestconfig.getoption("--once")
         return benchmark.pedantic(work, rounds=1 if once else rounds, warmup_rounds=int(warm and not once))
 

@@ -1,11 +1,10 @@
-"""Physical FLSS and steps/s for other solver settings: how the settings of the insect were chosen.
+"""Physical FLSS and steps per second for other solver settings, by which the insect's settings were chosen.
 
     python -m benchmarks.solver_settings [FOLDER] [STARTS]
 
-Each row changes one setting, and LDVS walks the same starts from rest at V = 0.5.  The table says whether the FLSS
-lies within the 95 % interval of the finest physics, a quarter of the shipped time step; among those slip and speed
-decide, by eye.  Rows are timed in turn, three times over, and the median counts.  Written to
-FOLDER/solver_settings.json.
+Each row changes one setting, and LDVS walks the same starts from rest at V = 0.5. The last column says whether the FLSS
+lies within the 95 % interval of the finest physics, a quarter of the shipped time step. Among those, we chose by slip
+and speed. Rows are timed in turn, three times, and the median counts. The result is FOLDER/solver_settings.json.
 """
 
 import sys
@@ -44,11 +43,11 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "solver CG": {"solver": mujoco.mjtSolver.mjSOL_CG},
     "Euler": {"integrator": mujoco.mjtIntegrator.mjINT_EULER},
 }
-"""Values of `mjOption` that differ from the shipped ones."""
+"""Setting -> values of `mjOption` that differ from the shipped ones."""
 
 
 def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
-    """Name of a setting, and the starts at rest."""
+    """Yield the name of a setting and the starts at rest."""
     settled = settle(starts)
     for name, options in OPTIONS.items():
         yield name, with_model(settled, **options)
@@ -61,14 +60,14 @@ def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
 
 @dataclass(frozen=True)
 class _Coarse(Conditions):
-    """One physics step for each step of the plan, 1.25 ms, which `Conditions` refuse."""
+    """One physics step for each step of the plan, 1.25 ms, longer than `Conditions` allows."""
 
     def substeps(self, stride: Stride) -> int:
         return 1
 
 
 def with_model(settled: Settled, searched: bool = False, **options: Any) -> Settled:
-    """The same starts with other values in `mjOption`, or with pairs of geoms that MuJoCo must search for."""
+    """Return the same starts with other values in `mjOption`, or with contact pairs that MuJoCo searches for."""
     conditions = settled.conditions
     body, model = conditions.body, compile_body(conditions, settled.compiled.model.opt.timestep, looks=False).model
     if searched:
@@ -89,7 +88,7 @@ def with_model(settled: Settled, searched: bool = False, **options: Any) -> Sett
 
 
 def measure(settled: Settled) -> dict[str, float]:
-    """FLSS with its interval, thousand physics steps/s, mean slip [mm/s], mean speed over the commanded one."""
+    """Return FLSS with its interval, thousand physics steps/s, mean slip [mm/s] and mean relative speed."""
     begin = perf_counter()
     outcomes = physical_outcomes(settled, LDVS, VELOCITY, DURATION)
     seconds = perf_counter() - begin
@@ -108,43 +107,43 @@ def measure(settled: Settled) -> dict[str, float]:
 
 
 def table(starts: np.ndarray) -> dict[str, dict[str, float] | None]:
-    """What each setting measures; none where the simulation diverged."""
+    """Measure each setting; None where the simulation diverges."""
     results: dict[str, dict[str, float] | None] = {}
     settings, rates = dict(variants(starts)), defaultdict(list)
     physical_outcomes(settings["as shipped"], LDVS, VELOCITY, 2.0)
     for _ in range(ROUNDS):
         for name, settled in settings.items():
             try:
-                results[name] = one = measure(settled)
-                rates[name].append((one["steps_per_s"], one["walks_per_s"]))
+                results[name] = row = measure(settled)
+                rates[name].append((row["steps_per_s"], row["walks_per_s"]))
             except SimulationError:
                 results[name] = None
-    for name, one in results.items():
-        if one:
-            one["steps_per_s"], one["walks_per_s"] = np.median(rates[name], axis=0).tolist()
+    for name, row in results.items():
+        if row:
+            row["steps_per_s"], row["walks_per_s"] = np.median(rates[name], axis=0).tolist()
     return results
 
 
 def rows(results: dict[str, dict[str, float] | None]) -> list[list[str]]:
-    """The table's rows as texts; a qualifying FLSS lies within the interval of the finest physics."""
+    """Return the rows of the table as texts."""
     finest = results[FINEST]
     assert finest
     lines = []
-    for name, one in results.items():
-        if one is None:
+    for name, row in results.items():
+        if row is None:
             lines.append([name, "diverges", "", "", "", "", "no"])
             continue
-        qualifies = finest["low"] <= one["flss"] <= finest["high"]
-        flss = f"{one['flss']:.3f} ({one['low']:.2f}-{one['high']:.2f})"
-        figures = [f"{one[key]:.{digits}f}" for key, digits in (("slip", 1), ("speed", 3), ("steps_per_s", 0))]
-        lines.append([name, flss, *figures, f"{one['walks_per_s']:.0f}", "yes" if qualifies else "no"])
+        qualifies = finest["low"] <= row["flss"] <= finest["high"]
+        flss = f"{row['flss']:.3f} ({row['low']:.2f}-{row['high']:.2f})"
+        figures = [f"{row[key]:.{digits}f}" for key, digits in (("slip", 1), ("speed", 3), ("steps_per_s", 0))]
+        lines.append([name, flss, *figures, f"{row['walks_per_s']:.0f}", "yes" if qualifies else "no"])
     return lines
 
 
 def main(folder: str = "results/bench", starts: str = "400") -> None:
     """Measure, print and write the table."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    with chdir(folder):  # where MuJoCo writes its log of what diverges
+    with chdir(folder):  # MuJoCo writes its log there
         results = table(draw_starts(int(starts), 0))
     columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
     print_table(columns, rows(results))
