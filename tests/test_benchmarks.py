@@ -1,95 +1,63 @@
-"""The benchmarks compare like with like, and what they print is computed as they say."""
+"""Peers of the benchmarks give hexmj's answers, and the scripts run at a small size."""
 
 import json
-import os
-import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import plain_network
-from benchmarks import solver_settings
+from benchmarks import scaling, solver_settings
 from benchmarks.peers import numba_first_loss, numpy_first_loss
-from benchmarks.table import ONE_CORE, rows
+from benchmarks.table import rows
 from hexmj import LDVS, Acceleration, Stride, draw_starts, first_loss
 from hexmj.controllers.cruse1998.weights import general
-
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.2, 0.6])
-def test_the_peers_give_our_answers(velocity):
+def test_peers_give_the_same_losses(velocity):
     starts = draw_starts(150, 3)
     ours = first_loss(starts, LDVS, velocity, 80.0)
     np.testing.assert_array_equal(numba_first_loss(starts, LDVS, velocity, 80.0), ours)
     np.testing.assert_array_equal(numpy_first_loss(starts, LDVS, velocity, 80.0), ours)
     fast = Acceleration(0.005)
-    np.testing.assert_array_equal(
-        numba_first_loss(starts, LDVS, velocity, 80.0, acceleration=fast),
-        first_loss(starts, LDVS, velocity, 80.0, acceleration=fast),
-    )
-    readable = [
-        plain_network.first_loss(list(start), general(LDVS.weights), velocity, 800, Stride()) for start in starts[:5]
-    ]
+    accelerated = first_loss(starts, LDVS, velocity, 80.0, acceleration=fast)
+    np.testing.assert_array_equal(numba_first_loss(starts, LDVS, velocity, 80.0, acceleration=fast), accelerated)
+    weights, stride = general(LDVS.weights), Stride()
+    readable = [plain_network.first_loss(list(start), weights, velocity, 800, stride) for start in starts[:5]]
     np.testing.assert_array_equal(readable, ours[:5])
 
 
-def test_a_ratio_above_one_is_in_our_favour():
-    def one(what, who, seconds, amount, unit, bar=None, **figure):
-        info = {"what": what, "who": who, "amount": amount, "unit": unit, "bar": bar, "ratio": None} | figure
+def test_a_ratio_above_one_is_in_favour_of_hexmj():
+    def figure(what, who, seconds, amount, unit, ratio, **own):
+        info = {"what": what, "who": who, "amount": amount, "unit": unit, "ratio": ratio} | own
         return {"extra_info": info, "stats": {"median": seconds}}
 
     lines = rows(
         [
-            one("walks", "hexmj", 2.0, 100.0, "walks/s", 40.0),
-            one("walks", "slow", 4.0, 100.0, "walks/s"),
-            one("start", "hexmj", 3.0, None, "s", 2.0),
-            one("start", "quick", 1.5, None, "s"),
-            one("steps", "hexmj", 1.0, 95.0, "steps/s", ratio=0.9),
-            one("steps", "bare", 1.0, 100.0, "steps/s"),
-            one("memory", "hexmj", 9.0, None, "MB", 500.0, figure=300.0),
+            figure("walks", "hexmj", 2.0, 100.0, "walks/s", 1.5),
+            figure("walks", "slow", 4.0, 100.0, "walks/s", 1.5),
+            figure("start", "hexmj", 3.0, None, "s", 0.6),
+            figure("start", "quick", 1.5, None, "s", 0.6),
+            figure("memory", "hexmj", 9.0, None, "MB", 2.0, figure=300.0),
+            figure("memory", "large", 9.0, None, "MB", 2.0, figure=900.0),
         ]
     )
     assert lines == [
-        ["walks", "50 walks/s", "40, met", "slow: 25", "2"],
-        ["start", "3 s", "2, NOT MET", "quick: 1.5", "0.5"],
-        ["steps", "95 steps/s", "ratio 0.9, met", "bare: 100", "0.95"],
-        ["memory", "300 MB", "500, met", "", ""],
+        ["walks", "50 walks/s", "ratio 1.5, met", "slow: 25", "2"],
+        ["start", "3 s", "ratio 0.6, NOT MET", "quick: 1.5", "0.5"],
+        ["memory", "300 MB", "ratio 2, met", "large: 900", "3"],
     ]
 
 
-@pytest.mark.thorough
-def test_a_small_bench_prints_its_table(tmp_path):
-    """Two of the figures, through pytest-benchmark into the table."""
-    command = [sys.executable, "-m", "pytest", "benchmarks", "--override-ini", "python_files=bench_*.py"]
-    command += ["-k", "one_core or help", "--once"]
-    command += ["--benchmark-quiet", "--benchmark-json", str(tmp_path / "benchmark.json")]
-    alone = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
-    subprocess.run(command, cwd=ROOT, check=True, env=alone)
-    subprocess.run([sys.executable, "-m", "benchmarks.table", str(tmp_path)], cwd=ROOT, check=True)
-    text = (tmp_path / "table.md").read_text(encoding="utf-8")
-    assert "| hexmj --help |" in text
-    assert f"| {ONE_CORE} |" in text
-    assert re.search(r"does \d{3} arithmetic operations for each start and step, [248] at a time", text)
-
-
-@pytest.mark.thorough
-def test_solver_settings_of_a_few_starts(tmp_path, capsys, monkeypatch):
+@pytest.mark.slow
+def test_solver_settings_and_scaling_of_a_few_starts(tmp_path, monkeypatch):
+    """Settings that only concern speed change no outcome."""
     monkeypatch.setattr(solver_settings, "ROUNDS", 1)
+    monkeypatch.setattr(solver_settings, "OPTIONS", {"as shipped": {}})
     solver_settings.main(str(tmp_path), "4")
     results = json.loads((tmp_path / "solver_settings.json").read_text(encoding="utf-8"))
-    assert results["pairs searched for"]["flss"] == results["as shipped"]["flss"]
-    assert results["pairs searched for"]["slip"] == results["as shipped"]["slip"]
-    assert results["solver CG"]["slip"] == pytest.approx(results["as shipped"]["slip"], rel=0.05)
-    assert "time step / 4" in capsys.readouterr().out
-
-
-@pytest.mark.thorough
-def test_scaling_of_a_few_starts(tmp_path):
-    command = [sys.executable, "-m", "benchmarks.scaling", "--out", str(tmp_path), "--share", "0.01"]
-    subprocess.run(command, cwd=ROOT, check=True)
+    for name in ("flss", "slip"):
+        assert results["pairs searched for"][name] == results["as shipped"][name]
+    scaling.main(["--out", str(tmp_path), "--share", "0.003"])
     assert (tmp_path / "scaling.png").stat().st_size > 10_000
