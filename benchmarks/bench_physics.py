@@ -7,9 +7,9 @@ from mujoco.batch import Batch
 from hexmj import LDVS, SensoryFeedback, draw_starts
 from hexmj.controllers.checked_plans import begin
 from hexmj.measures.physical import physical_outcomes
-from hexmj.physics.backend import STATE
+from hexmj.physics.engine import STATE
 from hexmj.physics.foot_path import TipTargets
-from hexmj.physics.settling import Settled, settle
+from hexmj.physics.settle import Settled, settle
 
 VELOCITY, DURATION = 0.1, 20.0  # no insect falls, so that both loops take the same steps
 
