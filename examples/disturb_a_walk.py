@@ -3,7 +3,7 @@
 import numpy as np
 
 import hexmj
-from hexmj.controllers.losses import planned_losses
+from hexmj.controllers.planning import planned_losses
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.settle import settle
 from hexmj.studies.disturbed_walks import Disturbed, collect_postures, disturbance_of, find_stable_starts

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import hexmj
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS
 from hexmj.legs import MIRROR
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hexmj.controllers.cruse1998 import Symmetric as Symmetric
     from hexmj.controllers.cruse1998 import Weights as Weights
     from hexmj.controllers.feedback import SensoryFeedback as SensoryFeedback
-    from hexmj.controllers.named import load_controller as load_controller
+    from hexmj.controllers.registry import load_controller as load_controller
     from hexmj.errors import InputError as InputError
     from hexmj.errors import SimulationError as SimulationError
     from hexmj.io import load as load
@@ -66,7 +66,7 @@ _MODULES = {
     "body": ("STICK_INSECT", "Body"),
     "conditions": ("Conditions",),
     "controllers.cruse1998": ("HWS", "LDVS", "PRESETS", "UNCOORDINATED", "Cruse1998", "Symmetric", "Weights"),
-    "controllers.named": ("load_controller",),
+    "controllers.registry": ("load_controller",),
     "controllers.feedback": ("SensoryFeedback",),
     "errors": ("InputError", "SimulationError"),
     "io": ("load", "save", "settings"),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexmj.controllers.checked_plans import advanced, begin
+from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import Controller
 from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError

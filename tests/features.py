@@ -186,8 +186,8 @@ def kinematic(*models: str) -> Any:
 
 
 def wrappers() -> Any:
-    from hexmj.controllers.leg_lost import LegLost
-    from hexmj.controllers.poor_senses import PoorSenses
+    from hexmj.controllers.wrappers import LegLost
+    from hexmj.controllers.wrappers import PoorSenses
 
     feedback = hexmj.SensoryFeedback(hexmj.LDVS)
     wrapped = {"feedback": feedback, "lost leg": LegLost(hexmj.LDVS, 1)}

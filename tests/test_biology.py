@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
 from hexmj.body import STICK_INSECT
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, Settling

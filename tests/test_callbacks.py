@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import cfunc
 
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.environments import dm

@@ -12,7 +12,7 @@ import pytest
 
 import hexmj
 from hexmj.cli.commands import COMMANDS, options_of
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from tiers import few_of
 
 

@@ -9,9 +9,9 @@ import pytest
 
 import hexmj
 from hexmj.controllers import named
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.protocol import settings_of
-from hexmj.controllers.searched import searched_on
+from hexmj.controllers.registry import searched_on
 from stepwise_ldvs import Own
 
 LDVS = hexmj.LDVS

@@ -14,7 +14,7 @@ from drawing import drawing
 from episodes import KINDS, ZEROS, episode, run_steps
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller

@@ -9,7 +9,7 @@ import pytest
 
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan

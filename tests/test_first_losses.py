@@ -9,7 +9,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers.cruse1998.network import NetworkPlan
-from hexmj.controllers.losses import first_losses, planned_losses
+from hexmj.controllers.planning import first_losses, planned_losses
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Own
 from tiers import few_of
@@ -38,7 +38,7 @@ def test_a_foreign_controller_has_the_same_losses_whatever_is_held_at_a_time(hel
     """Seven steps, or one, and none beyond what was asked for."""
     starts, velocity, steps = hexmj.draw_starts(50, 0), np.full(50, 0.5), np.full(50, 400)
     whole = first_losses(Own().begin(starts, velocity, STRIDE), steps)
-    monkeypatch.setattr("hexmj.controllers.losses.HELD", held)
+    monkeypatch.setattr("hexmj.controllers.planning.HELD", held)
     plan = Own().begin(starts, velocity, STRIDE)
     assert np.array_equal(first_losses(plan, steps), whole)
     assert (whole == 0).any()

@@ -13,7 +13,7 @@ import plain_network as plain
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, Weights, kernel
 from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
-from hexmj.controllers.cruse1998.model_variants import ModelVariant
+from hexmj.controllers.cruse1998 import ModelVariant
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.legs import CENTRED, FIG1, MIRROR, Geometry

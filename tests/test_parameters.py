@@ -14,7 +14,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, MODEL_VARIANTS, Cruse1998, ModelVariant, Symmetric, Weights
 from hexmj.controllers.cruse1998.presets import OWN, network_toml
 from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
-from hexmj.controllers.named import load_controller
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4, Geometry
 from hexmj.measures.kinematic import flss, walk

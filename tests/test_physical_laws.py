@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import physical_flss

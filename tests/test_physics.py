@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.errors import InputError, SimulationError

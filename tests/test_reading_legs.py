@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.losses import first_losses, planned_losses
+from hexmj.controllers.planning import first_losses, planned_losses
 from hexmj.controllers.feedback import SensedPlan
 from hexmj.environments.learned import WithOffsets
 from stepwise_ldvs import Own, same

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.checked_plans import check_velocities
-from hexmj.controllers.leg_lost import LegLost
-from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.wrappers import LegLost
+from hexmj.controllers.wrappers import PoorSenses
 from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss

@@ -7,7 +7,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers import Step, stepwise
-from hexmj.controllers.checked_plans import advanced
+from hexmj.controllers.planning import advanced
 from hexmj.measures.physical import physical_outcomes, physical_walk_of_plan
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import settle

@@ -10,7 +10,7 @@ import hexmj
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.baselines.lifted import Lifted
 from hexmj.controllers.baselines.metronomes import Metronome
-from hexmj.controllers.baselines.table import BASELINES
+from hexmj.controllers.baselines import BASELINES
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk

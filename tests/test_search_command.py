@@ -15,8 +15,8 @@ import xarray as xr
 import hexmj
 from hexmj.cli.commands import options_of
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998
-from hexmj.controllers.cruse1998.presets import network_toml
-from hexmj.controllers.searched import searched_on
+from hexmj.controllers.cruse1998 import network_toml
+from hexmj.controllers.registry import searched_on
 from tiers import few_of
 from waiting_legs import OWN
 
@@ -330,7 +330,7 @@ def test_a_search_with_ties_says_what_its_cost_is(run, tmp_path):
 
 def test_a_search_begins_with_a_set_of_another_reading_where_one_is_given(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = "import dataclasses, hexmj\nfrom hexmj.controllers.cruse1998.model_variants import Reading\n"
+    text = "import dataclasses, hexmj\nfrom hexmj.controllers.cruse1998 import Reading\n"
     text += "X = dataclasses.replace(hexmj.LDVS, reading=Reading(cap='sum'), name='x')\n"
     (tmp_path / "own.py").write_text(text)
     words = ["search", "--form", "ldvs", "--begin", "own.py:X", "--velocity", 0.5, "--starts", 4, "--budget", 10]

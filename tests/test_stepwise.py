@@ -8,7 +8,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.controllers import Step, stepwise
-from hexmj.controllers.losses import first_losses
+from hexmj.controllers.planning import first_losses
 from hexmj.controllers.protocol import FeedbackPlan
 from hexmj.legs import LEGS
 from stepwise_ldvs import plan_of, same

@@ -13,7 +13,7 @@ from hexmj.bodies.ground import depth_in_ground
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller

@@ -5,7 +5,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers.baselines.lifted import Legs
-from hexmj.controllers.baselines.table import BASELINES
+from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.tegotae import Phases, Tegotae
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk

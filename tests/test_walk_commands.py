@@ -14,7 +14,7 @@ import hexmj
 from drawing import drawing
 from film_reader import read_film
 from hexmj.cli.compare import SUMMARY
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 
 PNG = b"\x89PNG"
 

@@ -7,7 +7,7 @@ import pytest
 
 import hexmj
 from hexmj.controllers.baselines.lifted import Legs
-from hexmj.controllers.baselines.table import BASELINES
+from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.walknet import CURVE, REACOG, ModelVariant, Walknet, sent_load
 from hexmj.errors import InputError
 from hexmj.gaits import gait

@@ -17,7 +17,7 @@ import hexmj
 from hexmj import sweeps
 from hexmj.checks import typed
 from hexmj.conditions import Ground, Masses, TimeScale
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.protocol import settings_of

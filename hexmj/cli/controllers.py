@@ -266,7 +266,7 @@ class CheckController(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.controllers.conformance import findings
-        from hexmj.controllers.named import load_controller
+        from hexmj.controllers.registry import load_controller
 
         found = findings(load_controller(given.name), Stride(dt=given.dt), given.velocity)
         report_checks(found, given.json, controller=given.name)

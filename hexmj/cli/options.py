@@ -210,7 +210,7 @@ def controller(given: SimpleNamespace, name: str) -> Controller:
     """Return a controller by name, with the order, model variant and feedback that the options ask for."""
     from dataclasses import replace
 
-    from hexmj.controllers.named import load_controller
+    from hexmj.controllers.registry import load_controller
 
     found = load_controller(name)
     if rules := network_rules(given):
@@ -234,7 +234,7 @@ def network_rules(given: SimpleNamespace) -> dict[str, Any]:
     if getattr(given, "order", None):
         rules["order"] = given.order
     if getattr(given, "model_variant", None):
-        from hexmj.controllers.cruse1998.model_variants import named_variant
+        from hexmj.controllers.cruse1998 import named_variant
 
         rules["model_variant"] = named_variant(given.model_variant)
     return rules

@@ -1,60 +1,54 @@
-"""Feedback around any plan that can be steered: before each of its steps it reads the legs as they are.
+"""Sensory feedback around any steerable controller: before each step the plan reads the legs as they are.
 
-Its decisions (in the 1998 network: influences, the crossing of PEP and AEP) read
+Its decisions (in the 1998 network: influences, the crossing of PEP and AEP) use
 
 - the tips where the joint angles put them in the root frame, on each leg's axis;
-- the contacts: a leg that protracts stands as soon as its foot meets the ground again.  At an obstacle the swing
-  ends there.
+- the contacts: a leg that protracts stands as soon as its foot meets the ground again, so that a swing ends at an
+  obstacle.
 
-A leg that should stand and has no ground counts as standing.  The targets of the servos are not the tips as read: they
-go on by -V_r dt or +dt and take up what the plan makes of the tip as read only where the leg changes its state, or
-where the plan puts it elsewhere, as after a halt; a target that restarts from the lagging tip at every step never loads
-its servo.  `docs/feedback.md` tells what else was tried.
+A leg that should stand and has no ground counts as standing. The targets of the servos are not the sensed tips: they
+move by -V_r dt or +dt, and take up the plan's response to the sensed tip only where the leg changes its state, or where
+the plan puts it elsewhere, as after a halt. A target that restarts from the lagging tip at every step never loads its
+servo. `docs/feedback.md` describes the alternatives that were tried.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj.controllers.losses import first_losses
-from hexmj.controllers.protocol import (
-    Controller,
-    FeedbackPlan,
-    Sensed,
-    SteerablePlan,
-    check_controller_type,
-    claims_mirrored,
-    limits_within,
-)
+from hexmj.controllers.planning import check_velocities, first_losses
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Sensed, SteerablePlan, check_controller_type
 from hexmj.errors import InputError
 from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 SAME = 1e-9
-"""A tip moved on from where the plan saw it if it is no farther than this from there by one step's way [mm]."""
+"""Greatest distance of a tip from one step beyond its sensed place at which it counts as moved on from there [mm]."""
 
 
 @dataclass(frozen=True)
 class SensoryFeedback:
-    """A controller whose plans read the legs, made of one whose plans can be steered."""
+    """A controller with sensory feedback, made from a steerable one."""
 
     controller: Controller
-    """What plans."""
+    """Plans the steps."""
 
     def __post_init__(self) -> None:
         check_controller_type(self.controller)
 
     @property
     def name(self) -> str:
-        """That of the controller that plans, and what is different."""
-        return f"{self.controller.name}, reading the legs"
+        """The controller's name, and what is different."""
+        return f"{self.controller.name} with feedback"
 
     @property
     def mirrored(self) -> bool:
         """As the controller that plans."""
-        return claims_mirrored(self.controller)
+        return getattr(self.controller, "mirrored", False)
 
-    check_velocity = property(limits_within)
+    def check_velocity(self, velocity: float, stride: Stride) -> None:
+        """As the controller that plans."""
+        check_velocities(self.controller, [velocity], stride)
 
     def begin(
         self,
@@ -67,40 +61,36 @@ class SensoryFeedback:
         """See `protocol.Controller.begin`.
 
         Raises:
-            InputError: plans that cannot be steered.
+            InputError: the controller's plans have feedback already, or cannot be steered.
         """
         plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
-        if isinstance(plan, FeedbackPlan):
+        if isinstance(plan, FeedbackPlan) or not isinstance(plan, SteerablePlan):
             raise InputError(
-                f"feedback around {self.controller.name}; expected another: this one reads the legs already"
-            )
-        if not isinstance(plan, SteerablePlan):
-            raise InputError(
-                f"feedback around {self.controller.name}; expected a controller whose plans can go on from the legs as"
-                " they are, with tips, standing, see, restart, slow_down"
+                f"feedback around {self.controller.name}; expected a controller without feedback of its own whose plans"
+                " can be steered (tips, standing, see, restart, slow_down)"
             )
         return SensedPlan(plan)
 
 
 class SensedPlan:
-    """A `protocol.FeedbackPlan`: goes on from the tips and contacts that it senses, with targets that load the servos.
+    """A `protocol.FeedbackPlan` that continues from the sensed tips and contacts, with targets that load the servos.
 
-    Whatever is not sensed is as ordered, so that without `sense` the plan goes on as if nobody walked by it.
+    What is not sensed is taken to be as planned, so that without `sense` the walk is the kinematic one.
     """
 
     def __init__(self, plan: SteerablePlan) -> None:
-        """Around a plan at time 0, which may have been moved before."""
+        """Wrap a plan at time 0; other legs may have been given to it before."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self.made_for = plan, getattr(plan, "made_for", None)
         self._tips = self._targets = self._ordered = np.array(plan.tips)
         self._stance = np.array(plan.standing)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.FastLosses`: on paper, where nothing is read, those of the plan within."""
+        """See `protocol.FastLosses`: in a kinematic walk, those of the plan within."""
         return first_losses(self._plan, steps)
 
     def sense(self, sensed: Sensed) -> None:
-        """Take in the tips, and which feet have met the ground."""
+        """Receive the tips, and which feet have met the ground."""
         lands = np.zeros(self._stance.shape, dtype=bool)
         lands[sensed.ids] = sensed.gained
         self._tips = self._tips.copy()
@@ -109,7 +99,7 @@ class SensedPlan:
         self._stance = self._stance | lands
 
     def advance(self, steps: int) -> PlannedWalk:
-        """The next steps: where the tips shall be, and which legs shall stand."""
+        """Return the next steps: targets of the tips, and which legs stand."""
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:

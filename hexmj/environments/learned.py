@@ -15,7 +15,8 @@ from hexmj.bodies.kinematics import standing_tips
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, limits_within
+from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, check_made_for
 from hexmj.rotations import lean
@@ -84,7 +85,9 @@ class WithOffsets:
     Physical walks under other conditions are refused."""
     name: str = field(default="learned")
 
-    check_velocity = property(limits_within)
+    def check_velocity(self, velocity: float, stride: Stride) -> None:
+        """As the controller that plans."""
+        check_velocities(self.controller, [velocity], stride)
 
     def begin(
         self,

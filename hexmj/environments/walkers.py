@@ -16,7 +16,7 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
-from hexmj.controllers.checked_plans import advanced, begin, tell
+from hexmj.controllers.planning import advanced, begin, tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.environments.observing import ROUNDING, Observer, Places, Planned, judge, keep, order, scaled
 from hexmj.environments.task import Task, action_bounds, action_names

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.checked_plans import check_velocities
+from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes

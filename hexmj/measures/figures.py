@@ -92,7 +92,7 @@ def network_rules(controller: Any) -> str:
         return ""
     if "controller" in controller:
         return network_rules(controller["controller"])
-    from hexmj.controllers.cruse1998.model_variants import ModelVariant, in_words
+    from hexmj.controllers.cruse1998 import ModelVariant, in_words
 
     choices, variant = {field.name for field in fields(ModelVariant)}, controller.get("model_variant")
     if "order" not in controller or not isinstance(variant, Mapping) or not choices <= variant.keys():

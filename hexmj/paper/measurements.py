@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.losses import planned_losses
 from hexmj.controllers.protocol import SteerableController

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from hexmj import io
-from hexmj.controllers.cruse1998.model_variants import named_variant
+from hexmj.controllers.cruse1998 import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.measures.tables import VELOCITY

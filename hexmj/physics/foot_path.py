@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import advanced, check_plan
+from hexmj.controllers.planning import advanced, check_plan
 from hexmj.controllers.protocol import Plan
 from hexmj.errors import InputError
 from hexmj.jitted import jitted

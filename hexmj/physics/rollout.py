@@ -19,7 +19,7 @@ import numpy as np
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.conditions import ROUNDING
-from hexmj.controllers.checked_plans import tell
+from hexmj.controllers.planning import tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan, Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.jitted import jitted

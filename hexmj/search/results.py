@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.controllers.cruse1998 import HWS, LDVS
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.named import parameter_file
+from hexmj.controllers.registry import parameter_file
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.searched import searched_on
+from hexmj.controllers.registry import searched_on
 from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
 from hexmj.io import results_folder, save, save_figure

@@ -7,12 +7,12 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hexmj.controllers.checked_plans import begin
-from hexmj.controllers.named import known_names, load_controller
+from hexmj.controllers.planning import begin
+from hexmj.controllers.registry import known_names, load_controller
 from hexmj.controllers.protocol import Controller, FeedbackPlan, is_steerable
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.baselines.table import BASELINES
-from hexmj.controllers.varied_names import VARIED
+from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.registry import VARIED
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import draw_starts

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin, check_repeats
-from hexmj.controllers.leg_lost import LegLost
+from hexmj.controllers.planning import begin, check_repeats
+from hexmj.controllers.wrappers import LegLost
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.gaits import limit_gait

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.legs import SIDE
 from hexmj.measures.cells import WalkSettings

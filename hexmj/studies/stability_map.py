@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan
 from hexmj.errors import InputError, OutOfReach, SimulationError
 from hexmj.measures.cells import UNITS, WalkSettings

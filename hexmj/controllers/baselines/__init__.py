@@ -1,4 +1,29 @@
-"""Rivals of the 1998 network from the literature, each in a file of its own; all share what `lifted` says.
+"""Baseline controllers from the literature, each in a file of its own; all lift their legs with `lifted`."""
 
-Nothing is imported here, so that what was computed with one of them does not depend on the others; `table` lists them.
-"""
+from hexmj.controllers.baselines.evolved import EVOLVED
+from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
+from hexmj.controllers.baselines.righetti import Righetti
+from hexmj.controllers.baselines.scores import Scores
+from hexmj.controllers.baselines.tegotae import Tegotae
+from hexmj.controllers.baselines.walknet import REACOG, Walknet
+from hexmj.controllers.protocol import Controller
+
+BASELINES: dict[str, Controller] = {
+    controller.name: controller
+    for controller in (
+        Metronome("wilson", "wilson"),
+        Metronome("graham", "graham"),
+        Walknet(),
+        Walknet("walknet-reacog", REACOG),
+        Walknet("walknet-load", rules=(1, 2, 3, 5)),
+        PhaseOscillators("tripod", name="cpg-tripod"),
+        PhaseOscillators("tetrapod", name="cpg-tetrapod"),
+        PhaseOscillators("wave", name="cpg-wave"),
+        Scores(),
+        Righetti(),
+        Tegotae(),
+        EVOLVED,
+    )
+}
+"""All baselines by name."""

@@ -1,33 +1,33 @@
-"""Six legs that a rule lifts: what all rivals share, so that nothing differs between them but when legs are lifted.
+"""Six legs that a rule lifts: the common part of all baselines, which differ only in when legs are lifted.
 
-A standing tip recedes at V_r and a swinging one goes ahead at V_p.  A swing ends at AEP_0; it begins when the rule says
-so, and at PEP_min at the latest, beyond which no leg reaches.  So V, V_p, AEP_0 and PEP_min mean what they mean for the
-1998 network, and every rival meets the same random starts.
+A standing tip recedes at V_r and a swinging one moves ahead at V_p. A swing ends at AEP_0; it begins when the rule says
+so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 and PEP_min mean the same as for the 1998
+network, and every baseline walks from the same random starts.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from hexmj.checks import check_types, short
 from hexmj.controllers.protocol import Sensed
-from hexmj.errors import InputError
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
+from hexmj.validate import choice, number
 from hexmj.walks import PlannedWalk
 
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """What a rule knows of the legs at the end of a step."""
+    """The legs at the end of a step, as a rule knows them."""
 
     x: np.ndarray
     """(start, leg) tips on their own axes [mm]."""
     stands: np.ndarray
     """(start, leg) which legs stand."""
     load: np.ndarray
-    """(start, leg) share of the weight on each foot: on paper equal parts on all that stand, in physics as felt."""
+    """(start, leg) share of the weight on each foot: equal on all standing feet in a kinematic walk, measured in a physical
+    one."""
     v: np.ndarray
     """(start, 1) V_r."""
     stride: Stride
@@ -35,51 +35,47 @@ class Legs:
 
     @property
     def travel(self) -> np.ndarray:
-        """(start, leg) how far the tips are behind AEP_0, in ranges AEP_0 - PEP_0: 1 at PEP_0."""
+        """(start, leg) distance of the tips behind AEP_0, as a fraction of AEP_0 - PEP_0: 1 at PEP_0."""
         return (self.stride.aep0 - self.x) / (self.stride.aep0 - self.stride.pep0)
 
     def copied(self) -> "Legs":
-        """The same, in arrays of which a rule may make what it likes."""
+        """Return a copy that a rule may change."""
         return replace(self, x=self.x.copy(), stands=self.stands.copy(), v=self.v.copy())
 
     @property
     def stance_part(self) -> np.ndarray:
-        """(start, 1) part of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
+        """(start, 1) fraction of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
         return 1.0 / (1.0 + self.v)
 
 
 def check_numbers(rule: Any) -> None:
-    """Refuse a rule, a frozen dataclass, with a field of another type or a number that is not finite; its
-    `__post_init__`.
-
-    Raises:
-        InputError: such a field.
-    """
-    check_types(rule)
-    for one in fields(rule):
-        if isinstance(value := getattr(rule, one.name), float) and not np.isfinite(value):
-            raise InputError(f"{rule.name}: {one.name} = {value}; expected a finite number")
+    """Raise InputError if a float of a frozen dataclass is not finite, or a `Literal` invalid. Use as `__post_init__`."""
+    hints = get_type_hints(type(rule))
+    for name in (field.name for field in fields(rule)):
+        if hints[name] is float:
+            object.__setattr__(rule, name, number(name, getattr(rule, name), -MOST, MOST))
+        elif get_origin(hints[name]) is Literal:
+            choice(name, getattr(rule, name), get_args(hints[name]))
 
 
-State = tuple[np.ndarray, ...]
-"""What a rule remembers, a named tuple of arrays whose first axis is the start."""
+MOST = 1.7e308
+"""Greatest finite number that a field may have."""
 
 
 class LiftingRule(Protocol):
-    """A controller that only says which legs are lifted.  Both methods do every start by itself."""
+    """A controller that only decides which legs are lifted. Both methods treat every start independently."""
 
     def at_start(self, legs: Legs) -> Any:
-        """The `State` at time 0, when all legs stand."""
+        """Return the state at time 0, when all legs stand: a named tuple of arrays whose first axis is the start."""
         ...
 
     def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
-        """The state after a step in which the tips came to where they are, and which legs are lifted, (start, leg) of
-        bool."""
+        """Return the state after the step that moved the legs, and which legs are lifted now, (start, leg) of bool."""
         ...
 
 
 class LiftedPlan:
-    """A `protocol.SteerablePlan` of legs that a rule lifts."""
+    """A `protocol.SteerablePlan` whose legs a rule lifts."""
 
     def __init__(
         self,
@@ -90,16 +86,16 @@ class LiftedPlan:
         acceleration: Acceleration | None,
         age: int = 0,
     ) -> None:
-        """At time 0; an acceleration has been going on for `age` steps."""
+        """Begin at time 0; an acceleration began `age` steps earlier."""
         self.starts, self.stride, self.done = checked_starts(starts, stride), stride, 0
         self._rule, self._acceleration = rule, acceleration
         self._final = checked_velocities(velocity, len(self.starts), acceleration)
         self._age = np.full(len(self.starts), age)
         self._legs = self._at_rest(self.starts)
-        self._state: Any = _checked("at_start", rule.at_start(self._legs.copied()), len(self.starts))
+        self._state: Any = rule.at_start(self._legs.copied())
 
     def advance(self, steps: int) -> PlannedWalk:
-        """The next `steps` steps."""
+        """Return the next `steps` steps."""
         stride, shape = self.stride, (steps, *self.starts.shape)
         velocity = np.array(commanded_velocities(self._final, self._age, steps, stride, self._acceleration))
         x, stance = np.empty(shape), np.empty(shape, dtype=bool)
@@ -109,7 +105,7 @@ class LiftedPlan:
         self.done += steps
         self._age = self._age + steps
         time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
-        y, aep, height = (np.broadcast_to(one, shape) for one in (stride.geometry.y, stride.aep0, np.nan))
+        y, aep, height = (np.broadcast_to(value, shape) for value in (stride.geometry.y, stride.aep0, np.nan))
         return PlannedWalk(time, velocity, x, y, stance, stride.geometry, aep=aep, height=height)
 
     @property
@@ -130,7 +126,7 @@ class LiftedPlan:
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        fresh = _checked("at_start", self._rule.at_start(rest.copied()), len(tips))
+        fresh = self._rule.at_start(rest.copied())
         self._state = type(self._state)(*(_chosen(which, a, b) for a, b in zip(fresh, self._state, strict=True)))
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
@@ -139,7 +135,7 @@ class LiftedPlan:
         self._age = np.where(which, 0, self._age)
 
     def _at_rest(self, tips: np.ndarray) -> Legs:
-        """All legs stand, and carry equal parts."""
+        """Return legs that all stand and carry equal parts of the weight."""
         v = commanded_velocities(self._final, self._age, 1, self.stride, self._acceleration)[0]
         stands = np.ones(tips.shape, dtype=bool)
         return Legs(tips, stands, _equal_parts(stands), v[:, None], self.stride)
@@ -149,31 +145,26 @@ class LiftedPlan:
         x = legs.x + np.where(legs.stands, -v * dt, dt)
         stands = legs.stands | (x > self.stride.aep0 - dt / 2)
         moved = Legs(x, stands, self._load(stands), v, self.stride)
-        state, lifted = self._rule.lifts(self._state, moved.copied())
-        self._state = _checked("lifts", state, len(x))
-        if not (type(lifted) is np.ndarray and lifted.dtype == bool and lifted.shape == x.shape):
-            raise InputError(
-                f"lifts gave {short(lifted)} as lifted legs; expected True and False, (start, leg), {x.shape}"
-            )
+        self._state, lifted = self._rule.lifts(self._state, moved.copied())
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
 
     def _load(self, stands: np.ndarray) -> np.ndarray:
-        """Share of the weight on each foot, as planned."""
+        """Return the share of the weight on each foot, as planned."""
         return _equal_parts(stands)
 
 
 class LoadedPlan(LiftedPlan):
-    """The same as a `protocol.FeedbackPlan`, whose rule knows how the weight is spread; nothing else is read."""
+    """The same with the measured load as sensory feedback, a `protocol.FeedbackPlan`; nothing else is sensed."""
 
     _felt: np.ndarray | None = None
 
     def sense(self, sensed: Sensed) -> None:
-        """Take in the loads; a start whose feet all hang in the air has none."""
+        """Receive the loads; a start whose feet are all in the air has none."""
         if self._felt is None:
             self._felt = np.full(self.starts.shape, np.nan)
-        pressed = np.maximum(sensed.load, 0.0)  # where adhesion holds a foot that pulls there is no weight on it
-        whole = pressed.sum(axis=1, keepdims=True)
-        self._felt[sensed.ids] = np.divide(pressed, whole, out=np.zeros_like(pressed), where=whole > 0)
+        pressed = np.maximum(sensed.load, 0.0)  # a foot that pulls and is held by adhesion carries no weight
+        total = pressed.sum(axis=1, keepdims=True)
+        self._felt[sensed.ids] = np.divide(pressed, total, out=np.zeros_like(pressed), where=total > 0)
 
     def _load(self, stands: np.ndarray) -> np.ndarray:
         planned = _equal_parts(stands)
@@ -181,10 +172,10 @@ class LoadedPlan(LiftedPlan):
 
 
 class Lifted:
-    """What a `LiftingRule` needs to be a `protocol.SteerableController`."""
+    """Base class that makes a `LiftingRule` a `protocol.SteerableController`."""
 
     reads_load = False
-    """Whether the rule asks for the load."""
+    """Whether the rule uses the load."""
 
     def begin(
         self,
@@ -208,40 +199,30 @@ class Lifted:
         """See `protocol.SteerableController.begin_at_speed`."""
         return self._plan(starts, velocity, stride, acceleration, AT_SPEED)
 
-    def _plan(self, *asked: Any) -> LiftedPlan:
+    def _plan(self, *arguments: Any) -> LiftedPlan:
         kind = LoadedPlan if self.reads_load else LiftedPlan
-        return kind(self, *asked)  # pyright: ignore[reportArgumentType]
+        return kind(self, *arguments)  # pyright: ignore[reportArgumentType]
 
 
 def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np.ndarray:
-    """(start, leg) the value of each leg's only neighbour in a table, `legs.N2` or `legs.N4`; 0 without one."""
-    heard = np.zeros(values.shape)
+    """Return the value of each leg's only neighbour in a table, `legs.N2` or `legs.N4`, (start, leg); 0 without one."""
+    received = np.zeros(values.shape)
     for leg, near in enumerate(table):
         for neighbour in near:
-            heard[:, leg] = values[:, neighbour]
-    return heard
+            received[:, leg] = values[:, neighbour]
+    return received
 
 
 def sum_of_legs(values: np.ndarray) -> np.ndarray:
-    """Sum over (..., leg), (...); each side by itself, so that mirrored starts give mirrored bits."""
+    """Return the sum over legs, (..., leg) to (...): each side by itself, so that mirrored starts give mirrored bits."""
     return (values[..., 0] + values[..., 1] + values[..., 2]) + (values[..., 3] + values[..., 4] + values[..., 5])
 
 
 def _equal_parts(stands: np.ndarray) -> np.ndarray:
-    """Share of the weight on each foot if all that stand carry the same; none where none stands."""
+    """Return the share of the weight on each foot if all standing feet carry the same; 0 where none stands."""
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
 
 
-def _checked(method: str, state: Any, count: int) -> Any:
-    """What a rule's method gave as its state if it is a `State` of so many starts."""
-    named = isinstance(state, tuple) and hasattr(state, "_fields")
-    if not (named and all(isinstance(one, np.ndarray) and one.shape[:1] == (count,) for one in state)):
-        raise InputError(
-            f"{method} gave {short(state)}; expected a named tuple of arrays whose first axis is the start, {count}"
-        )
-    return state
-
-
-def _chosen(which: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Arrays of starts: `one` where `which`, (start,), says so, `other` elsewhere."""
-    return np.where(which.reshape(-1, *[1] * (one.ndim - 1)), one, other)
+def _chosen(which: np.ndarray, chosen: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return `chosen` for the starts in `which`, (start,), and `other` elsewhere."""
+    return np.where(which.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, other)

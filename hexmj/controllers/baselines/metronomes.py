@@ -1,12 +1,12 @@
-"""Metronomes: legs lifted by a clock that senses nothing, in two gaits of insects (paper, Section 5.3).
+"""Metronomes: a clock without sensory feedback lifts the legs, in two gaits of insects (paper, Section 5.3).
 
 Wilson's metachronal wave: on each side swings follow each other from hind to front without delay, and last as long at
 every velocity, so that each leg lags V / (1 + V) of a period behind the one behind it; the two sides move in
 anti-phase.  Graham's Gait I: the tripod at every velocity.
 
-How they map: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p.  Fitted by us:
-nothing.  Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg that should be swinging
-then is lifted at once.  From `ideal_start` every leg is where the clock has it.
+Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us: nothing.
+Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg whose swing is due then is lifted
+at once. From `ideal_start` every leg is in phase with the clock.
 """
 
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ RIGHT = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.5])
 
 
 class Clock(NamedTuple):
-    """What a metronome remembers."""
+    """State of a metronome."""
 
     time: np.ndarray
     """(start, 1) [periods]."""
     swings: np.ndarray
-    """(start, leg) number of the last swing that has begun."""
+    """(start, leg) number of the last swing that began."""
 
 
 @dataclass(frozen=True)
 class Metronome(Lifted):
-    """A clock, and how far each leg lags behind it."""
+    """A clock, and the lag of each leg behind it."""
 
     wave: Literal["wilson", "graham"] = "wilson"
     """Swings run from hind to front, or in two tripods."""
@@ -57,18 +57,18 @@ class Metronome(Lifted):
         return Clock(time, np.maximum(swings, state.swings)), swings > state.swings
 
     def ideal_start(self, velocity: float, stride: Stride) -> np.ndarray:
-        """Tips, (1, leg) [mm], where the clock has them at time 0; a leg that swings is on the ground there."""
+        """Return tips, (1, leg) [mm], in phase with the clock at time 0; a swinging leg is on the ground there."""
         v = np.array([[velocity]])
         phase, swing = -self._lag(v) % 1.0, _swing_part(v)
         part = np.where(phase < swing, phase / swing, (1.0 - phase) / (1.0 - swing))  # of the way from PEP_0 to AEP_0
         return stride.pep0 + (stride.aep0 - stride.pep0) * part
 
     def _lag(self, v: np.ndarray) -> np.ndarray:
-        """(start, leg) behind the clock [periods]."""
+        """Return the lag of each leg behind the clock, (start, leg) [periods]."""
         behind = np.full_like(v, 0.5) if self.wave == "graham" else _swing_part(v)
         return BEHIND * behind + RIGHT
 
 
 def _swing_part(v: np.ndarray) -> np.ndarray:
-    """Part of the period for which a leg swings."""
+    """Return the fraction of the period for which a leg swings."""
     return v / (1.0 + v)

@@ -1,14 +1,14 @@
-"""Coupled phase oscillators, one a leg, that hear of no leg: flygym's central pattern generator (CPG).
+"""Coupled phase oscillators, one per leg, without sensory feedback: flygym's central pattern generator (CPG).
 
 Source: flygym 1.2.1, examples/locomotion/cpg_controller.py (`calculate_ddt`) and preprogrammed.py (`get_cpg_biases`):
     d theta_i / dt = 2 pi nu + sum_j r_j w_ij sin(theta_j - theta_i - phi_ij)     (1)
     d r_i / dt = alpha (R - r_i)                                                  (2)
 
-How it maps: nu is one period (AEP_0 - PEP_0) (1 + 1/V) of a leg, and w and alpha keep their ratio to nu.  The swing is
-the first V / (1 + V) of the phase, so that at the phase's own rate it lasts (AEP_0 - PEP_0) / V_p and a stance
-(AEP_0 - PEP_0) / V_r; a leg is lifted as its phase gets there.  In the source r is the size of the step too; here legs
-step the whole range, and r only scales the coupling.  Fitted by us: nothing.  Sensed: the tips at time 0, which set the
-phases (in the source they are drawn); nothing afterwards.
+Mapping: 1 / nu is one period (AEP_0 - PEP_0) (1 + 1/V) of a leg, and w and alpha keep their ratio to nu. The swing is the
+first V / (1 + V) of the phase, so that at the phase's own rate it lasts (AEP_0 - PEP_0) / V_p and a stance
+(AEP_0 - PEP_0) / V_r; a leg is lifted when its phase reaches the swing. In the source r is the size of the step too; here
+legs step the whole range, and r only scales the coupling. Fitted by us: nothing. Sensed: the tips at time 0, which set
+the phases (in the source they are drawn); nothing afterwards.
 """
 
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
 
 AHEAD = {"tripod": (2, (0, 1, 0, 1, 0, 1)), "tetrapod": (3, (0, 1, 2, 2, 0, 1)), "wave": (6, (0, 1, 2, 3, 4, 5))}
-"""Into how many parts a gait divides its period, and how many of them each leg is to be ahead of leg 1."""
+"""Number of parts into which a gait divides its period, and the lead of each leg over leg 1 in these parts."""
 
 BIASES = {gait: -np.subtract.outer(ahead, ahead) % parts / parts for gait, (parts, ahead) in AHEAD.items()}
-"""phi_ij / 2 pi, how far leg j is to be ahead of leg i [periods], (leg i, leg j)."""
+"""phi_ij / 2 pi, the lead of leg j over leg i [periods], (leg i, leg j)."""
 
 
 class Oscillators(NamedTuple):
-    """What the network remembers."""
+    """State of the network."""
 
     phase: np.ndarray
     """(start, leg) theta / 2 pi [periods]; a swing begins at each whole number."""
     amplitude: np.ndarray
-    """(start, 1) r, the same of all legs since they begin alike."""
+    """(start, 1) r, the same for all legs since they begin alike."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class PhaseOscillators(Lifted):
     """Eqs. 1 and 2 with the source's constants."""
 
     gait: Literal["tripod", "tetrapod", "wave"] = "tripod"
-    """Which table of `BIASES`."""
+    """Table of `BIASES`."""
     coupling: float = 10.0
     """w_ij [1/s at `NU`] where phi_ij > 0, and 0 elsewhere; source."""
     convergence: float = 20.0
@@ -77,7 +77,7 @@ class PhaseOscillators(Lifted):
         return Oscillators(after, r), np.ceil(after) > np.ceil(phase)
 
     def _pulls(self, phase: np.ndarray) -> np.ndarray:
-        """(start, leg) sum of the sines of Eq. 1."""
+        """Return the sum of the sines of Eq. 1, (start, leg)."""
         bias = BIASES[self.gait]
         ahead = phase[:, None, :] - phase[:, :, None] - bias  # (start, leg i, leg j)
         return sum_of_legs(np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0))

@@ -1,18 +1,18 @@
-"""Hopf oscillators, one a leg, whose transitions wait for the load: Righetti & Ijspeert.
+"""Hopf oscillators, one per leg, whose transitions depend on the load: Righetti & Ijspeert.
 
 Source: L. Righetti, A. J. Ijspeert, Pattern generators with sensory feedback for the control of quadruped locomotion,
-ICRA 2008, pp. 819-824.  The paper could not be had; equations and constants are those of a public re-implementation
-that names it:
+ICRA 2008, pp. 819-824. The paper was not available; equations and constants are those of a public re-implementation that
+cites it:
     dx_i/dt = alpha (mu - r_i^2) x_i - omega_i y_i                                 (1)
     dy_i/dt = beta (mu - r_i^2) y_i + omega_i x_i + sum_j k_ij y_j + u_i           (2)
     omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1)    (3)
     u_i = -omega_i x_i - sum_j k_ij y_j  stops a transition, -sign(y_i) F hastens one, else 0    (4)
-A leg stands while y > 0 and x falls, and swings while y < 0.  That code has no load; that Eq. 4 stops the end of
-a stance while the foot is loaded, and hastens transitions otherwise, is from memory.
+A leg stands while y > 0 and x falls, and swings while y < 0. That code has no load; that Eq. 4 stops the end of a stance
+while the foot is loaded, and hastens transitions otherwise, is from memory.
 
-How it maps: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where
-the tip is between PEP_0 and AEP_0; a leg is lifted as y becomes negative.  Ours, since the source is about quadrupeds
-and its marks of load were not found: a period lasts 1 s of the source's time; all legs are coupled, k_ij = 1 within a
+Mapping: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where
+the tip is between PEP_0 and AEP_0; a leg is lifted when y becomes negative. Ours, since the source is about quadrupeds
+and its thresholds of load were not found: a period lasts 1 s of the source's time; all legs are coupled, k_ij = 1 within a
 tripod and -1 between the two, after the source's trot; a leg at the end of its stance waits while it carries more
 than a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three, and at the
 end of its swing while its foot carries nothing; a transition is hastened in the second half of a stance when a foot
@@ -36,11 +36,11 @@ TRIPOD = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """(leg,) k_ij is the product of two legs' signs."""
 
 N_TRIED, TRIED = 64, 400
-"""Starts and steps after which oscillators that will diverge have; of eight starts they had after 120."""
+"""Starts and steps in which oscillators that diverge at all have diverged; eight starts took 120 steps."""
 
 
 class Hopf(NamedTuple):
-    """What the network remembers."""
+    """State of the network."""
 
     x: np.ndarray
     """(start, leg) 1 at AEP_0 and -1 at PEP_0."""
@@ -53,13 +53,13 @@ class Righetti(Lifted):
     """Eqs. 1 to 4."""
 
     alpha: float = 5.0
-    """How fast x comes back to the limit cycle [1/s]; source."""
+    """Rate at which x returns to the limit cycle [1/s]; source."""
     beta: float = 50.0
-    """How fast y does [1/s]; source."""
+    """Rate at which y does [1/s]; source."""
     mu: float = 1.0
     """Square of the amplitude; source."""
     sharpness: float = 10.0
-    """b, how suddenly the two frequencies change; source."""
+    """b, steepness of the change between the two frequencies; source."""
     push: float = 300.0
     """F [1/s]; source."""
     coupling: float = 1.0
@@ -76,12 +76,10 @@ class Righetti(Lifted):
     mirrored = True
 
     def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """See `KnowsItsLimits`: a time step that is too long shows within `TRIED` steps of a few starts.
-
-        Shorter walks are refused, too: their oscillators are on the way.
+        """See `protocol.KnowsItsLimits`: a time step that is too long shows within `TRIED` steps of a few starts.
 
         Raises:
-            Refused: the oscillators diverge.
+            Refused: the oscillators diverge, even if the walk itself is shorter.
         """
         starts = draw_starts(N_TRIED, 0, stride)
         self.begin(starts, np.full(N_TRIED, velocity), stride).advance(TRIED)
@@ -95,14 +93,14 @@ class Righetti(Lifted):
         """See `LiftingRule`.
 
         Raises:
-            Refused: a time step at which the oscillators diverge.
+            Refused: the oscillators diverge at this time step.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             after = self._step(state, legs)
         if not (known := np.isfinite(after.y).all(axis=1)).all():
             v = legs.v[np.argmin(known), 0]
             raise Refused(
-                f"{self.name}: its oscillators diverge at dt = {legs.stride.dt:g} and V_r = {v:.3g}; expected a shorter"
+                f"{self.name}: the oscillators diverge at dt = {legs.stride.dt:g} and V_r = {v:.3g}; expected a shorter"
                 " time step"
             )
         return after, (state.y >= 0) & (after.y < 0)
@@ -123,7 +121,7 @@ class Righetti(Lifted):
         )
 
     def feedback(self, state: Hopf, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(start, leg) whose transition is stopped, and whose is hastened, given the share of the weight on each."""
+        """Return which transitions stop and which are hastened, (start, leg), given each foot's share of the weight."""
         x, y = state
         close = np.abs(y) < self.near * np.sqrt(x * x + y * y)
         ends_stance, ends_swing = (y > 0) & (x < 0), (y < 0) & (x > 0)

@@ -5,13 +5,13 @@ stance and then waits until it is selected; one leg at most is selected in a tim
 the one behind it swings.  Rule 2: it is urged on by the one behind it and the one across early in their stance.
 Rule 3: and by the one in front of it and the one across late in their stance.
 
-How it maps: a stance goes from AEP_0 to PEP_0, and beyond PEP_0 a leg waits; waiting and swinging legs count for no
-rule but the first, as in the source.  Fitted by us: nothing.  Two things differ: of equal scores the rearmost tip
-steps, and not one drawn by lot; the source's first step of a front or middle leg, drawn by lot because all its legs
-wait at time 0, falls away because ours stand anywhere.  Sensed: where the tips are and which legs stand.
+Mapping: a stance goes from AEP_0 to PEP_0, and beyond PEP_0 a leg waits; waiting and swinging legs count only for the
+first rule, as in the source. Fitted by us: nothing. Two things differ: of equal scores the rearmost tip steps, and not
+one drawn by lot; the source's first step of a front or middle leg, drawn by lot because all its legs wait at time 0, is
+left out because ours stand anywhere. Sensed: the tips, and which legs stand.
 
-The source's waiting legs hold still, as long as need be; ours recede.  They wait so long that from about V = 0.5 on
-most of them come to PEP_min, where they swing without being selected and the rules lose their hold on the gait.
+The source's waiting legs stand still; ours recede. They wait so long that from about V = 0.5 on most of them reach
+PEP_min, where they swing without being selected, so that the rules no longer determine the gait.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from hexmj.legs import MIRROR, N2, N4
 
 
 class Nothing(NamedTuple):
-    """What the rules remember from step to step: the legs' own states say all."""
+    """State of the rules: none, since the legs' states suffice."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Scores(Lifted):
     rule3_contralateral: float = 2.0
     """The same of the leg across; source."""
     margin: float = 0.001
-    """Part of the highest score by which a score may be lower and still count as equal; source."""
+    """Fraction of the highest score by which a score may be lower and still count as equal; source."""
     name: str = "flygym-rules"
 
     __post_init__ = check_numbers
@@ -60,7 +60,7 @@ class Scores(Lifted):
         return state, eligible & (np.arange(6) == rearmost[:, None])
 
     def scores(self, legs: Legs) -> np.ndarray:
-        """(start, leg) what all rules together give each leg."""
+        """Return the score of each leg by all rules, (start, leg)."""
         in_stance = legs.stands & (legs.travel > 0.0) & (legs.travel < 1.0)
         late = np.where(in_stance, legs.travel, 0.0)
         early = np.where(in_stance, 1.0 - legs.travel, 0.0)

@@ -1,29 +1,3 @@
-"""All rivals by name."""
+"""Deprecated name, until all areas have moved."""
 
-from hexmj.controllers.baselines.evolved import EVOLVED
-from hexmj.controllers.baselines.metronomes import Metronome
-from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
-from hexmj.controllers.baselines.righetti import Righetti
-from hexmj.controllers.baselines.scores import Scores
-from hexmj.controllers.baselines.tegotae import Tegotae
-from hexmj.controllers.baselines.walknet import REACOG, Walknet
-from hexmj.controllers.protocol import Controller
-
-BASELINES: dict[str, Controller] = {
-    one.name: one
-    for one in (
-        Metronome("wilson", "wilson"),
-        Metronome("graham", "graham"),
-        Walknet(),
-        Walknet("walknet-reacog", REACOG),
-        Walknet("walknet-load", rules=(1, 2, 3, 5)),
-        PhaseOscillators("tripod", name="cpg-tripod"),
-        PhaseOscillators("tetrapod", name="cpg-tetrapod"),
-        PhaseOscillators("wave", name="cpg-wave"),
-        Scores(),
-        Righetti(),
-        Tegotae(),
-        EVOLVED,
-    )
-}
-"""By the names under which they are found."""
+from hexmj.controllers.baselines import *  # noqa: F403

@@ -3,11 +3,11 @@
 Source: D. Owaki, M. Goda, S. Miyazawa, A. Ishiguro, A minimal model describing hexapedal interlimb coordination: the
 Tegotae-based approach, Front. Neurorobot. 11:29, 2017:
     d phi_i / dt = omega - sigma_1 N_i cos phi_i + sigma_2 (1 / n_i sum_j K_ij N_j) cos phi_i      (1)
-with the swing at 0 < phi < pi, and N the load on a foot.  The paper could not be had.  The first feedback, with its
+with the swing at 0 < phi < pi, and N the load on a foot. The paper was not available. The first feedback, with its
 sign, is that of its first author's public code; that the second has the opposite sign, and neighbours for j, is from
 memory, and without it hardly any start (at most 13 %) ends in a stable regime; values of sigma and K were not found.
 
-How it maps: a leg's own rate is pi V_p / (AEP_0 - PEP_0) while it swings and pi V_r / (AEP_0 - PEP_0) while it stands,
+Mapping: a leg's own rate is pi V_p / (AEP_0 - PEP_0) while it swings and pi V_r / (AEP_0 - PEP_0) while it stands,
 and a phase does not run backward.  The tips at time 0 set the phases; a leg is lifted as its phase passes 2 pi.  Ours:
 the neighbours are the legs in front, behind and across, K_ij = 1; sigma_1 = sigma_2, so that six legs that carry equal
 parts do not hold each other; sigma W / 6 is half of omega, at which a leg that carries a third of the weight, and its
@@ -27,7 +27,7 @@ from hexmj.legs import MIRROR, N2, N4
 
 
 class Phases(NamedTuple):
-    """What the oscillators remember."""
+    """State of the oscillators."""
 
     phase: np.ndarray
     """(start, leg) phi / 2 pi [periods]; a swing begins at each whole number."""
@@ -64,6 +64,6 @@ class Tegotae(Lifted):
 
 
 def _mean_of_neighbours(load: np.ndarray) -> np.ndarray:
-    """(start, leg) of the legs in front, behind and across."""
+    """Return the mean over the legs in front, behind and across, (start, leg)."""
     total = from_neighbour(N2, load) + from_neighbour(N4, load) + load[:, MIRROR]
     return total / np.array(2 * [2.0, 3.0, 2.0])

@@ -1,4 +1,4 @@
-"""Walknet: six leg controllers that shift each other's PEP (rules of Cruse 1990), in two published readings.
+"""Walknet: six leg controllers that shift each other's PEP (rules of Cruse 1990), in two published versions.
 
 A leg is lifted when x < PEP_i, PEP_i = PEP_0 + the sum of what its neighbours send it, and at least `least_step` behind
 AEP_0.  Rule 1: while a leg swings, and for a while after its touchdown, its neighbours swing later.  Rule 2: some time
@@ -10,12 +10,12 @@ Sources, of which only equations and constants are taken: `CURVE` is github.com/
 original Walknet; `REACOG` is github.com/malteschilling/cognitiveWalker (WalknetSettings.py, CoordinationRules.py);
 rule 5's weights are those of github.com/hcruse/neuro_walknet (NeuroWNSettings.py), since neither of the two has it.
 
-How they map: the step length is AEP_0 - PEP_0, the swing velocity V_p; so v = V * `swing_speed`, and a second is as
+Mapping: the step length is AEP_0 - PEP_0, the swing velocity V_p; so v = V * `swing_speed`, and a second is as
 long as a swing of `swing_speed` / `step_length` step lengths.  Sensed: the own tip, and of the neighbours the tip,
 whether they swing, and for rule 5 their load.  Every leg acts on what all did at the same step; `CURVE` asks its legs
 one after the other.
 
-Chosen by us, since the sources leave it open: the `swing_speed` of `CURVE`, and how rule 5 shifts PEP, see `sent_load`.
+Chosen by us, since the sources do not say: the `swing_speed` of `CURVE`, and how rule 5 shifts PEP, see `sent_load`.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.checks import check_types, whole
 from hexmj.controllers.baselines.lifted import Legs, Lifted
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
@@ -47,8 +46,8 @@ class Links:
     """From the contralateral leg."""
 
     def shift(self, sent: np.ndarray) -> np.ndarray:
-        """What all receive, (start, leg) [step lengths], when they send `sent`, (start, leg), 1 in full."""
-        behind, ahead, across = (np.array(2 * one) for one in (self.behind, self.ahead, self.across))
+        """Return the shift that each leg receives, (start, leg) [step lengths], from `sent`, (start, leg), at most 1."""
+        behind, ahead, across = (np.array(2 * values) for values in (self.behind, self.ahead, self.across))
         return sent[:, BEHIND] * behind + sent[:, AHEAD] * ahead + sent[:, MIRROR] * across
 
 
@@ -62,7 +61,7 @@ class Lines:
     """At the knots."""
 
     def at(self, v: np.ndarray) -> np.ndarray:
-        """The value at v [m/s]."""
+        """Return the value at v [m/s]."""
         return np.interp(v, self.v, self.value)
 
 
@@ -76,12 +75,12 @@ class Logistic:
     """[m/s]."""
 
     def at(self, v: np.ndarray) -> np.ndarray:
-        """The value at v [m/s]."""
+        """Return the value at v [m/s]."""
         return 1.0 / (1.0 + np.exp(self.steepness * (v - self.middle)))
 
 
 @dataclass(frozen=True)
-class Reading:
+class Constants:
     """The constants of a published Walknet."""
 
     step_length: float
@@ -114,7 +113,7 @@ class Reading:
     """How far behind AEP every PEP stays [step lengths]."""
 
 
-CURVE = Reading(
+CURVE = Constants(
     step_length=0.08,
     swing_speed=0.142,
     rule1=Links(behind=(-0.7, -0.7, 0.0), across=(0.0, 0.0, -0.7)),
@@ -139,7 +138,7 @@ is the speed at which rule 1 has no delay left, the fastest that its rules know.
 M = 1.0 / 0.16
 """A metre in step lengths of `REACOG`."""
 
-REACOG = Reading(
+REACOG = Constants(
     step_length=0.16,
     swing_speed=0.151,
     rule1=Links(
@@ -168,7 +167,7 @@ RULE5 = Links(behind=(-0.2, -0.2, 0.0), ahead=(0.0, -0.2, -0.2), across=(-0.1, -
 
 
 def sent_load(load: np.ndarray) -> np.ndarray:
-    """What a leg sends by rule 5, 0 to 0.6, when it carries a part `load` of the weight.
+    """Return what a leg sends by rule 5, 0 to 0.6, when it carries a fraction `load` of the weight.
 
     In neuro_walknet the effort of the leg's retractor, 0 to 50 mV, less a threshold of 20 mV, strengthens the
     retractors of its neighbours that stand.  Here a third of the weight, a leg's part in a tripod, is an effort of
@@ -178,7 +177,7 @@ def sent_load(load: np.ndarray) -> np.ndarray:
 
 
 class Stances(NamedTuple):
-    """What Walknet remembers."""
+    """State of Walknet."""
 
     age: np.ndarray
     """(start, leg) time since touchdown [time units]; infinite where there was none."""
@@ -189,16 +188,15 @@ class Walknet(Lifted):
     """Legs that shift each other's PEP."""
 
     name: str = "walknet"
-    reading: Reading = CURVE
+    constants: Constants = CURVE
     rules: tuple[int, ...] = (1, 2, 3)
-    """Those that act, of 1, 2, 3 and 5."""
+    """Rules that act, of 1, 2, 3 and 5."""
     veto: bool = False
-    """Whether no leg is lifted while three or more swing, as in `CURVE`; of those lifted at one step all are."""
+    """Whether no leg is lifted while three or more swing, as in `CURVE`; several may be lifted in one step."""
 
     mirrored = True
 
     def __post_init__(self) -> None:
-        check_types(self)
         if not set(self.rules) <= {1, 2, 3, 5}:
             raise InputError(f"rules = {self.rules}; expected some of 1, 2, 3 and 5")
 
@@ -208,15 +206,14 @@ class Walknet(Lifted):
         return 5 in self.rules
 
     def without(self, rule: int) -> "Walknet":
-        """The same without a rule, and named so.
+        """Return the controller without a rule, with a name that says so.
 
         Raises:
-            InputError: a rule that does not act.
+            InputError: the rule does not act.
         """
-        rule = whole("rule", rule, 0)
         if rule not in self.rules:
             raise InputError(f"{self.name} without rule {rule}; expected one of {', '.join(map(str, self.rules))}")
-        return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(one for one in self.rules if one != rule))
+        return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(r for r in self.rules if r != rule))
 
     def at_start(self, legs: Legs) -> Stances:
         """See `LiftingRule`."""
@@ -227,15 +224,15 @@ class Walknet(Lifted):
         dt, span = legs.stride.dt, legs.stride.aep0 - legs.stride.pep0
         age = np.where(legs.stands, state.age + dt, -dt)  # 0 at the step of touchdown
         shift = sum((self.shift(rule, legs, age) for rule in self.rules), np.zeros(legs.x.shape))
-        pep = np.minimum(legs.stride.pep0 + span * shift, legs.stride.aep0 - span * self.reading.least_step)
+        pep = np.minimum(legs.stride.pep0 + span * shift, legs.stride.aep0 - span * self.constants.least_step)
         lifted = legs.stands & (legs.x < pep)
         if self.veto:
             lifted &= (~legs.stands).sum(axis=1, keepdims=True) < 3
         return Stances(age), lifted
 
     def shift(self, rule: int, legs: Legs, age: np.ndarray) -> np.ndarray:
-        """By how much a rule shifts each leg's PEP, (start, leg) [step lengths]; `age` is that of the stances."""
-        own, v = self.reading, legs.v * self.reading.swing_speed
+        """Return the shift of each leg's PEP by a rule, (start, leg) [step lengths]; `age` is that of the stances."""
+        own, v = self.constants, legs.v * self.constants.swing_speed
         second = own.swing_speed / own.step_length * (legs.stride.aep0 - legs.stride.pep0)  # [time units]
         match rule:
             case 1:
@@ -253,5 +250,5 @@ class Walknet(Lifted):
 
 
 def _within(legs: Legs, begin: np.ndarray, length: float) -> np.ndarray:
-    """Which legs stand within a stretch that begins so far behind AEP_0, (start, leg)."""
+    """Return which legs stand within a stretch of the stance, by its begin behind AEP_0 and its length, (start, leg)."""
     return legs.stands & (legs.travel > begin) & (legs.travel < begin + length)

@@ -1,8 +1,23 @@
 """The coordination network of Cymbalyuk, Borisyuk, Mueller-Wilm and Cruse (1998)."""
 
-from hexmj.controllers.cruse1998.model_variants import MODEL_VARIANTS, ModelVariant
-from hexmj.controllers.cruse1998.network import Cruse1998, Order
-from hexmj.controllers.cruse1998.presets import HWS, LDVS, PRESETS, UNCOORDINATED
+from hexmj.controllers.cruse1998.network import (
+    MODEL_VARIANTS,
+    Cruse1998,
+    ModelVariant,
+    Order,
+    in_words,
+    named_variant,
+    variant_name,
+)
+from hexmj.controllers.cruse1998.presets import (
+    HWS,
+    LDVS,
+    PRESETS,
+    UNCOORDINATED,
+    network_toml,
+    own_tables,
+    read_network,
+)
 from hexmj.controllers.cruse1998.weights import Symmetric, Weights
 
 __all__ = [
@@ -16,4 +31,10 @@ __all__ = [
     "Order",
     "Symmetric",
     "Weights",
+    "in_words",
+    "named_variant",
+    "network_toml",
+    "own_tables",
+    "read_network",
+    "variant_name",
 ]

@@ -1,40 +1,93 @@
 """The coordination network of 1998 as a controller: Eq. 1-6 and 11 of the paper, for many starts at once.
 
-One step goes from the states at t to those at t + dt with V_r(t).  A walk begins with Delta(0) = 0,
-AEP(0) = AEP_0 and s(-dt) = s(0): conventions of ours, where the paper is silent.  The equations are in
-`kernel`, compiled; ``tests/plain_network.py`` holds them in their readable form.
+One step leads from the states at t to those at t + dt with V_r(t). A walk begins with Delta(0) = 0, AEP(0) = AEP_0 and
+s(-dt) = s(0): our conventions, where the paper is silent. The equations are in `kernel`, compiled;
+``tests/plain_network.py`` has them in a readable form.
 """
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 
-from hexmj.checks import check_types, whole
-from hexmj.controllers.cruse1998 import kernel
-from hexmj.controllers.cruse1998.model_variants import ModelVariant
+import hexmj.controllers.cruse1998.kernel as kernel
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
-from hexmj.controllers.losses import planned_losses
+from hexmj.controllers.planning import planned_losses
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import choice, short, whole
 from hexmj.walks import PlannedWalk
 
 Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
 
 Rules = tuple[tuple[int, ...], ...]
-"""The order of updates and the choices of a reading, each as a tuple as long as its number among its names."""
+"""The order of updates and the choices of a model variant, each as a tuple whose length is the choice's number."""
 
 Constants = tuple[tuple[float, ...], tuple[float, ...], Rules]
 """Weights, constants and rules, as the kernel reads them."""
 
 AT_ONCE = 200_000_000
-"""Steps of a start in one call of the kernel, at most, as far as it can be divided: about two seconds, in which a
-program hears no Ctrl-C."""
+"""Most steps times starts in one call of the kernel: about two seconds, during which Ctrl-C has no effect."""
+
+
+@dataclass(frozen=True)
+class ModelVariant:
+    """How Section 2 is interpreted where its sentences and its equations allow more than one network.
+
+    The order of updates, a lag between legs, is `Cruse1998.order`.
+    """
+
+    ipsilateral: Literal["standing", "lasting"] = "standing"
+    """When the anterior leg acts on the PEP (Eq. 4): while it stands, as the factor s_e(t) has it, or all the time:
+    'the value of the influence depends on the position of the distal point of the influencing leg'."""
+    contralateral: Literal["standing", "lasting"] = "standing"
+    """When the contralateral leg acts by mechanism 3, likewise."""
+    cap: Literal["above", "both", "sum"] = "above"
+    """What the 4 mm of Eq. 4 bound: each influence from above, as printed; each between -4 and 4; or the sum over N^3
+    ('the influences of the anterior and contralateral legs') from above."""
+    rear: Literal["sum", "strongest"] = "sum"
+    """What mechanism 1 amounts to where two legs act ('the effects ... come from the ipsilateral rear leg (if it
+    exists) and the contralateral one'): the sum, as Eq. 6 has it, or the strongest."""
+    neutral: Literal["present", "final"] = "present"
+    """Which V_r moves the neutral position P^nr while the insect accelerates: that of Eq. 6, or the desired V_r*."""
+
+    def __post_init__(self) -> None:
+        for name, hint in get_type_hints(ModelVariant).items():
+            choice(name, getattr(self, name), get_args(hint))
+
+
+MODEL_VARIANTS = {"printed": ModelVariant(), "lasting": ModelVariant(ipsilateral="lasting")}
+"""Model variants by name: as printed, and with the anterior leg's influence lasting while that leg protracts."""
+
+
+def named_variant(name: str) -> ModelVariant:
+    """Return a model variant by its name."""
+    return MODEL_VARIANTS[choice("model_variant", name, MODEL_VARIANTS)]
+
+
+def variant_name(model_variant: ModelVariant) -> str:
+    """Return the name of a model variant.
+
+    Raises:
+        InputError: it has no name.
+    """
+    for name, named in MODEL_VARIANTS.items():
+        if named == model_variant:
+            return name
+    raise InputError(f"{model_variant} has no name; expected one of {', '.join(MODEL_VARIANTS)}")
+
+
+def in_words(model_variant: ModelVariant) -> str:
+    """Return the name of a model variant, or its choices that are not as printed, such as 'cap sum, neutral final'."""
+    if model_variant in MODEL_VARIANTS.values():
+        return variant_name(model_variant)
+    chosen = [(field.name, getattr(model_variant, field.name)) for field in fields(ModelVariant)]
+    return ", ".join(f"{name} {value}" for name, value in chosen if value != getattr(ModelVariant, name))
 
 
 @dataclass(frozen=True)
@@ -47,50 +100,51 @@ class Cruse1998:
     """Order of updates: 'printed', all legs at once, PEP(t+dt) from Delta(t) as Eq. 6 has it; 'undelayed', from
     Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
     name: str = "cruse1998"
-    """Of the set of weights."""
+    """Name of the weight set."""
     model_variant: ModelVariant = field(default_factory=ModelVariant)
-    """Of what the paper's sentences leave open."""
+    """Choices that the paper's sentences leave open."""
 
-    __post_init__ = check_types
+    def __post_init__(self) -> None:
+        choice("order", self.order, get_args(Order))
+        if not isinstance(self.weights, AnyWeights):
+            raise InputError(f"weights = {short(self.weights)}; expected Symmetric or Weights")
 
     @property
     def mirrored(self) -> bool:
         """Whether mirrored starts give mirrored walks: the legs move at once, and both sides weigh the same."""
-        w = general(self.weights)
-        matrices = [getattr(w, kind) for kind in NEIGHBOURS]
-        return self.order != "sequential" and all(np.array_equal(one, one[MIRROR, :][:, MIRROR]) for one in matrices)
+        matrices = [getattr(general(self.weights), kind) for kind in NEIGHBOURS]
+        return self.order != "sequential" and all(np.array_equal(w, w[MIRROR, :][:, MIRROR]) for w in matrices)
 
     def without(self, mechanism: int) -> "Cruse1998":
-        """The same set without one of the mechanisms 1 to 4, and named so.
+        """Return the network without one of the mechanisms 1 to 4, with a name that says so.
 
         Raises:
-            InputError: no such mechanism, or one that the set has not got.
+            InputError: there is no such mechanism, or the weight set does not use it.
         """
         mechanism = whole("mechanism", mechanism, 1, 4)
         return self._having(mechanism, 0.0, f"{self.name}-without-{mechanism}")
 
     def having(self, mechanism: int) -> "Cruse1998":
-        """The same set with mechanism 2 or 4, which are on or off, and named so.
+        """Return the network with mechanism 2 or 4 switched on, with a name that says so.
 
         Raises:
-            InputError: another mechanism, or one that the set has already.
+            InputError: another mechanism, or one that is on already.
         """
-        mechanism = whole("mechanism", mechanism, 1, 4)
         if mechanism not in (2, 4):
-            raise InputError(f"{self.name} with mechanism {mechanism}; expected 2 or 4, which are on or off")
+            raise InputError(f"mechanism = {mechanism}; expected 2 or 4, which are on or off")
         return self._having(mechanism, 1.0, f"{self.name}-with-{mechanism}")
 
     def _having(self, mechanism: int, value: float, name: str) -> "Cruse1998":
-        """Every weight of a mechanism set to a value."""
+        """Return the network with every weight of a mechanism set to a value."""
         kinds = [kind for kind in NEIGHBOURS if kind[1] == str(mechanism)]
-        one: Any = self.weights
-        if isinstance(one, Symmetric):
-            changed = replace(one, **{key: value for key in asdict(one) if key.partition("_")[0] in kinds})
+        old: Any = self.weights
+        if isinstance(old, Symmetric):
+            changed = replace(old, **{key: value for key in asdict(old) if key.partition("_")[0] in kinds})
         else:
-            given = {(kind, pair): getattr(one, kind)[pair] for kind in NEIGHBOURS for pair in pairs(kind)}
-            changed = Weights.of({key: value if key[0] in kinds else old for key, old in given.items()})
-        if np.array_equal(general(changed).to_vector(), general(one).to_vector()):
-            raise InputError(f"{name} is {self.name}: expected a mechanism that makes a difference")
+            given = {(kind, pair): getattr(old, kind)[pair] for kind in NEIGHBOURS for pair in pairs(kind)}
+            changed = Weights.of({key: value if key[0] in kinds else weight for key, weight in given.items()})
+        if np.array_equal(general(changed).to_vector(), general(old).to_vector()):
+            raise InputError(f"{name} equals {self.name}; expected a mechanism that changes the weights")
         return replace(self, weights=changed, name=name)
 
     def begin(
@@ -121,13 +175,13 @@ class Cruse1998:
 
     @property
     def _rules(self) -> Rules:
-        """As the kernel reads them."""
+        """Rules, as the kernel reads them."""
         chosen: list[tuple[Any, str]] = [(Order, self.order)]
         chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
-        return tuple((0,) * get_args(names).index(one) for names, one in chosen)
+        return tuple((0,) * get_args(names).index(value) for names, value in chosen)
 
     def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:
-        """As the kernel reads them."""
+        """Return weights, constants and rules, as the kernel reads them."""
         w, d, g = general(self.weights), np.arange(6), stride.geometry
         span = stride.aep0 - stride.pep_min
         table = [(w.p1, kernel.REAR), (w.p1, kernel.CONTRA), (span * w.p2, kernel.REAR), (w.p4, kernel.FRONT)]
@@ -147,7 +201,7 @@ class NetworkPlan:
     stride: Stride
     """Step range, lines of the tips and time step."""
     constants: Constants
-    """Of the network."""
+    """Constants of the network, as the kernel reads them."""
     first: np.ndarray
     """(start,) V_r at time 0."""
     slow: np.ndarray
@@ -155,7 +209,7 @@ class NetworkPlan:
     final: np.ndarray
     """(start,) V_r that is accelerated to."""
     threads: int | None = None
-    """One per core unless given."""
+    """By default one per core."""
     done: int = 0
     """Steps planned so far."""
 
@@ -167,7 +221,7 @@ class NetworkPlan:
         return blocks
 
     def advance(self, steps: int) -> PlannedWalk:
-        """The next `steps` steps of the walk."""
+        """Return the next `steps` steps of the walk."""
         shape = (steps, len(self.starts))
         velocity, x, stance = np.empty(shape), np.empty((*shape, 6)), np.empty((*shape, 6), dtype=bool)
 
@@ -178,11 +232,11 @@ class NetworkPlan:
         self.done += steps
         time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
         geometry = self.stride.geometry
-        y, aep, height = (np.broadcast_to(one, x.shape) for one in (geometry.y, self.stride.aep0, np.nan))
+        y, aep, height = (np.broadcast_to(value, x.shape) for value in (geometry.y, self.stride.aep0, np.nan))
         return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.FastLosses`; only the present state of a walk is kept, if it begins at `starts`."""
+        """See `protocol.FastLosses`; only the present state of each walk is kept in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
         lost, size = np.empty(len(steps), dtype=int), len(steps)
@@ -198,7 +252,7 @@ class NetworkPlan:
         return lost
 
     def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
-        """Begin with `unseen` steps and go on by `seen` more.
+        """Advance by `unseen` steps and by `seen` more, without keeping them.
 
         Returns:
             The first of the latter that is statically unstable, counted from time 0, (start,); 0 where none is.
@@ -239,7 +293,7 @@ class NetworkPlan:
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 
     def _read(self, row: int | np.integer, rows: int = 6) -> np.ndarray:
-        """A variable of every start, (start, leg), or (start, 1) with one row."""
+        """Return a variable of every start, (start, leg), or (start, 1) with one row."""
         return self._rows(row, rows).transpose(0, 2, 1).reshape(-1, rows)[: len(self.starts)]
 
     def _write(self, row: int | np.integer, values: np.ndarray, rows: int = 6) -> None:

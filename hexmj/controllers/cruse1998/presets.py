@@ -1,14 +1,13 @@
-"""Networks by name: the paper's sets of weights and our own, and parameter files (TOML)."""
+"""Networks by name: the paper's weight sets and our own, and parameter files (TOML)."""
 
+import math
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import asdict, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexmj.controllers.cruse1998.model_variants import named_variant, variant_name
-from hexmj.controllers.cruse1998.network import Cruse1998
+from hexmj.controllers.cruse1998.network import Cruse1998, named_variant, variant_name
 from hexmj.controllers.cruse1998.weights import (
     HWS_WEIGHTS,
     LDVS_WEIGHTS,
@@ -23,63 +22,35 @@ from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
 
 OWN = Path(__file__).with_name("own.toml")
-"""Sets of our own, with the commands that found or built them."""
+"""Our own weight sets, with the commands that found or built them."""
 
 
 def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
-    """A network from the tables of a file.
+    """Return a network from the tables of a file.
 
     Args:
         table: either ``[symmetric]`` with fields of `Symmetric`, or ``[weights.p1]`` ... ``[weights.p4]`` with keys
-            ``"d,e"`` (the paper's leg numbers); ``order`` and ``model_variant`` before it, where they are not the printed.
-        where: the file, for a sentence.
-        name: of the set.
+            ``"d,e"`` (the paper's leg numbers); before it ``order`` and ``model_variant``, by default as printed.
+        where: the file, for error messages.
+        name: name of the weight set.
 
     Raises:
-        InputError: a key, type or value that makes no sense.
+        InputError: a key or value is invalid.
     """
     rules = {key: table[key] for key in ("order", "model_variant") if key in table}
-    weights = _weights({key: value for key, value in table.items() if key not in rules}, where)
-    with _of(where):
+    try:
+        weights = _weights({key: value for key, value in table.items() if key not in rules})
         model_variant = named_variant(rules.get("model_variant", "printed"))
         return Cruse1998(weights, rules.get("order", "printed"), name, model_variant)
-
-
-@contextmanager
-def _of(where: str) -> Iterator[None]:
-    """Say of which file a sentence is."""
-    try:
-        yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
-def _weights(table: dict[str, Any], where: str) -> AnyWeights:
-    if list(table) == ["symmetric"]:
-        told = _numbers(table["symmetric"], [f.name for f in fields(Symmetric)], where := f"{where} [symmetric]")
-        with _of(where):
-            return Symmetric(**told)
-    if list(table) != ["weights"] or not isinstance(weights := table["weights"], dict):
-        raise InputError(
-            f"{where} holds {', '.join(table) or 'nothing'}; expected one table, [symmetric] or [weights.*],"
-            " and before it order and reading where they are not the printed ones"
-        )
-    if unknown := set(weights) - set(NEIGHBOURS):
-        raise InputError(f"{where}: unknown table [weights.{min(unknown)}]; valid names: {', '.join(NEIGHBOURS)}")
-    numbers = {}
-    for kind, entries in weights.items():
-        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
-        given = _numbers(entries, list(keys), f"{where} [weights.{kind}]")
-        numbers |= {(kind, keys[key]): value for key, value in given.items()}
-    with _of(where):
-        return Weights.of(numbers)
-
-
 def network_toml(network: Cruse1998) -> str:
-    """The text of a TOML file that `read_network` reads to the same bits; general weights that are 0 are left out.
+    """Return the text of a TOML file that `read_network` reads to the same bits; weights that are 0 are left out.
 
     Raises:
-        InputError: a reading without a name.
+        InputError: the model variant has no name.
     """
     rules, weights = {"order": network.order, "model_variant": variant_name(network.model_variant)}, network.weights
     lines = [f'{key} = "{value}"' for key, value in rules.items() if value != "printed"]
@@ -93,15 +64,30 @@ def network_toml(network: Cruse1998) -> str:
     return "\n".join(lines).lstrip() + "\n"
 
 
-def _numbers(table: object, valid: list[str], where: str) -> dict[str, float]:
-    """The entries of a TOML table, all of which must be numbers with valid keys."""
-    if not isinstance(table, dict):
-        raise InputError(f"{where} is {table!r}; expected a table with the keys {', '.join(valid)}")
+def _weights(table: dict[str, Any]) -> AnyWeights:
+    if list(table) == ["symmetric"]:
+        return Symmetric(**_numbers("symmetric", table["symmetric"], [field.name for field in fields(Symmetric)]))
+    if list(table) != ["weights"] or not isinstance(table["weights"], dict) or table["weights"].keys() - NEIGHBOURS:
+        kinds = ", ".join(NEIGHBOURS)
+        raise InputError(
+            f"tables {', '.join(table) or 'none'}; expected [symmetric], or [weights.*] with {kinds}, and before them"
+            " order and model_variant"
+        )
+    numbers = {}
+    for kind, entries in table["weights"].items():
+        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
+        given = _numbers(f"weights.{kind}", entries, list(keys))
+        numbers |= {(kind, keys[key]): value for key, value in given.items()}
+    return Weights.of(numbers)
+
+
+def _numbers(name: str, table: Any, valid: list[str]) -> dict[str, float]:
+    """Return the entries of a table if all are finite numbers with valid keys."""
+    if not isinstance(table, dict) or table.keys() - set(valid):
+        raise InputError(f"[{name}] is {table!r:.80}; valid keys: {', '.join(valid)}")
     for key, value in table.items():
-        if key not in valid:
-            raise InputError(f"{where}: unknown key {key!r}; valid keys: {', '.join(map(repr, valid))}")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e100:
-            raise InputError(f"{where}: {key} = {value!r:.40}; expected a number, finite and below 1e100")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"[{name}] {key} = {value!r}; expected a finite number")
     return {key: float(value) for key, value in table.items()}
 
 
@@ -111,11 +97,11 @@ _PAPER = {
 }
 
 HWS, LDVS, UNCOORDINATED = _PAPER.values()
-"""The paper's hard-wired and linearly velocity-dependent systems, and none (Section 5.1)."""
+"""The paper's hard-wired and linearly velocity-dependent systems, and no coordination (Section 5.1)."""
 
 
 class _Presets(Mapping[str, Cruse1998]):
-    """Sets by name; the file of our own is read when one of them is asked for, not by every command."""
+    """Weight sets by name; the file of our own sets is read when one of them is used, not by every command."""
 
     def __getitem__(self, name: str) -> Cruse1998:
         return _PAPER[name] if name in _PAPER else _own()[name]
@@ -132,18 +118,19 @@ class _Presets(Mapping[str, Cruse1998]):
 
 
 PRESETS: Mapping[str, Cruse1998] = _Presets()
-"""The paper's sets, none, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to 0.5 at once;
-`robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ... `lasting-0.9` and
-`lasting`, which were searched under that reading and walk by it."""
+"""The paper's weight sets, no coordination, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to
+0.5 at once; `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ...
+`lasting-0.9` and `lasting`, which were searched under that model variant and use it."""
 
 
 @cache
 def _own() -> dict[str, Cruse1998]:
-    tables = {name: {key: one[key] for key in one.keys() - {"command", SEARCHED}} for name, one in own_tables().items()}
+    origin = {"command", SEARCHED}
+    tables = {name: {key: table[key] for key in table.keys() - origin} for name, table in own_tables().items()}
     return {name: read_network(table, f"{OWN.name} [{name}]", name) for name, table in tables.items()}
 
 
 @cache
 def own_tables() -> dict[str, Any]:
-    """What the file tells of each set of our own: its command, on which starts it was searched, and its weights."""
+    """Return the table of each of our own sets: its command, the starts on which it was searched, and its weights."""
     return read_toml(OWN)

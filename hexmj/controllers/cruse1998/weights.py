@@ -1,4 +1,4 @@
-"""Coupling weights of the 1998 network (paper, Section 2 and Appendix A), and the published sets.
+"""Coupling weights of the 1998 network (paper, Section 2 and Appendix A), and the published weight sets.
 
 Letters follow the paper: ``p1`` is P^1 up to ``p4`` for P^4, ``p31`` ... ``p34`` are
 P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
@@ -7,14 +7,13 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from itertools import product
 from typing import Literal
 
 import numpy as np
 
-from hexmj.checks import check_types, numbers, short, typed, whole
 from hexmj.errors import InputError
 from hexmj.legs import LEGS, N1, N2, N3, N4
+from hexmj.validate import numbers
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
@@ -23,20 +22,17 @@ BINARY = ("p2", "p4")
 
 
 def pairs(kind: str) -> list[tuple[int, int]]:
-    """All (destination, source) pairs of one kind of weight, in the paper's order."""
+    """Return all (destination, source) pairs of one kind of weight, in the paper's order."""
     return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
 
 
 def _in_vector(size: int) -> list[tuple[str, tuple[int, int]]]:
-    """Kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
+    """Return kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
     return [(kind, pair) for kind in NEIGHBOURS if kind != "p34" or size == 58 for pair in pairs(kind)]
 
 
-_PLACES = {(kind, pair) for kind in NEIGHBOURS for pair in product(range(6), repeat=2)}
-
-
 def names_of(places: Sequence[tuple[str, tuple[int, int]]]) -> tuple[str, ...]:
-    """Names of weights, ``p1 1,2`` of a kind and a pair: the paper counts legs from 1."""
+    """Return names of weights, such as ``p1 1,2`` for a kind and a pair: the paper counts legs from 1."""
     return tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in places)
 
 
@@ -66,59 +62,46 @@ class Weights:
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
             matrix = numbers(kind, getattr(self, kind))
-            if matrix.shape != (6, 6):
-                raise InputError(f"{kind} has shape {matrix.shape}; expected (6, 6): destination, source leg")
-            if not np.isfinite(matrix).all():
-                raise InputError(f"{kind} holds a number that is not finite; expected finite weights")
+            if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
+                raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
             allowed = np.zeros((6, 6), dtype=bool)
             allowed[tuple(np.transpose(pairs(kind)))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
                 d, e = (LEGS[leg] for leg in stray[0])
-                raise InputError(f"{kind} of leg {d} from leg {e} is not 0, but leg {e} is no neighbour there")
+                raise InputError(f"{kind} of leg {d} from leg {e} is not 0; expected 0, since {e} is no neighbour there")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
-                raise InputError(f"{kind} is binary in the paper: expected only 0 or 1")
+                raise InputError(f"{kind} is binary in the paper; expected only 0 or 1")
             matrix.setflags(write=False)
             object.__setattr__(self, kind, matrix)
 
     @classmethod
     def of(cls, numbers: Mapping[tuple[str, tuple[int, int]], float]) -> "Weights":
-        """From numbers by kind and (destination, source) leg, each from 0 to 5; what is not given is 0.
-
-        Raises:
-            InputError: other keys, or numbers that make no sense.
-        """
+        """Return weights from numbers by kind and (destination, source) leg, each from 0 to 5; the others are 0."""
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-        for key, value in typed("numbers", numbers, Mapping).items():
-            kind, pair = typed("a weight's key", key, tuple[str, tuple[int, int]])
-            if (kind, pair) not in _PLACES:
-                raise InputError(
-                    f"{short(key)} has no weight; expected one of {', '.join(NEIGHBOURS)}, and two legs from 0 to 5"
-                )
-            matrices[kind][pair] = typed(f"{kind} {pair}", value, float)
+        for (kind, pair), value in numbers.items():
+            matrices[kind][pair] = value
         return cls(**matrices)
 
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
-        """Read 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d.
+        """Return weights from 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d.
 
         Raises:
-            InputError: other numbers of them, labels in another order, or weights that make no sense.
+            InputError: another number of them, or an invalid weight.
         """
-        numbered = numbers("weights", vector)
-        if (size := numbered.size) not in (48, 58):
-            raise InputError(f"a vector of {size} weights was given; expected 58 (LDVS form) or 48 (HWS form)")
-        return cls.of(dict(zip(_in_vector(size), numbered.ravel(), strict=True)))
+        values = numbers("weights", vector).ravel()
+        if values.size not in (48, 58):
+            raise InputError(f"{values.size} weights; expected 58 (LDVS form) or 48 (HWS form)")
+        return cls.of(dict(zip(_in_vector(values.size), values, strict=True)))
 
     def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
-        """The inverse of `from_vector`.
+        """Return the inverse of `from_vector`.
 
         Raises:
             InputError: another size, or 48 where p34 is not 0.
         """
-        if whole("size", size, 0) not in (48, 58):
-            raise InputError(f"size = {short(size)}; expected 48 or 58")
-        if size == 48 and self.p34.any():
-            raise InputError("p34 is not 0; expected 58 weights, of which 48 lack it")
+        if size not in (48, 58) or (size == 48 and self.p34.any()):
+            raise InputError(f"size = {size}; expected 58, or 48 if p34 is 0")
         return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
 
 
@@ -148,42 +131,38 @@ class Symmetric:
     """P_i^4: mechanism 4 off (0) or on (1)."""
 
     def __post_init__(self) -> None:
-        check_types(self)
         for key, value in asdict(self).items():
-            if not math.isfinite(value):
-                raise InputError(f"{key} = {value}; expected a finite number")
-            if key in ("p2", "p4_i") and value not in (0, 1):
-                raise InputError(f"{key} = {value}; it is binary in the paper: expected 0 or 1")
+            if not math.isfinite(value) or (key in ("p2", "p4_i") and value not in (0, 1)):
+                allowed = "0 or 1, since it is binary in the paper" if key in ("p2", "p4_i") else "a finite number"
+                raise InputError(f"{key} = {value}; expected {allowed}")
+            object.__setattr__(self, key, float(value))
 
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
-        """Read ten numbers in the order of the fields, or nine without p34_i.
+        """Return weights from ten numbers in the order of the fields, or from nine without p34_i.
 
         Raises:
-            InputError: other numbers of them, labels in another order, or weights that make no sense.
+            InputError: another number of them, or an invalid weight.
         """
-        names = [f.name for f in fields(cls)]
-        values = numbers("weights", vector).ravel().tolist()
+        values, names = numbers("weights", vector).ravel().tolist(), [field.name for field in fields(cls)]
+        if len(values) not in (9, 10):
+            raise InputError(f"{len(values)} weights; expected 10 (LDVS form) or 9 (HWS form)")
         if len(values) == 9:
             names.remove("p34_i")
-        elif len(values) != 10:
-            raise InputError(f"{len(values)} parameters were given; expected 10 (LDVS form) or 9 (HWS form)")
         return cls(**dict(zip(names, values, strict=True)))
 
     def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
-        """The inverse of `from_vector`.
+        """Return the inverse of `from_vector`.
 
         Raises:
             InputError: another size, or 9 where p34_i is not 0.
         """
-        if whole("size", size, 0) not in (9, 10):
-            raise InputError(f"size = {short(size)}; expected 9 or 10")
-        if size == 9 and self.p34_i:
-            raise InputError(f"p34_i = {self.p34_i}; expected 10 parameters, of which 9 lack it")
-        return np.array([v for key, v in asdict(self).items() if key != "p34_i" or size == 10])
+        if size not in (9, 10) or (size == 9 and self.p34_i):
+            raise InputError(f"size = {size}; expected 10, or 9 if p34_i is 0")
+        return np.array([value for key, value in asdict(self).items() if key != "p34_i" or size == 10])
 
     def expand(self) -> Weights:
-        """Appendix A: the general weights, equal on both sides and along each side."""
+        """Return the general weights of Appendix A, equal on both sides and along each side."""
         sides = {  # ipsilateral, contralateral
             "p1": (self.p1_i, self.p1_c),
             "p2": (self.p2, 0.0),
@@ -214,5 +193,5 @@ NO_WEIGHTS = Symmetric()
 
 
 def general(weights: AnyWeights) -> Weights:
-    """The general weights of either form."""
+    """Return the general weights of either form."""
     return weights.expand() if isinstance(weights, Symmetric) else weights

@@ -1,0 +1,199 @@
+"""Plans for everyone who walks: begun with valid arguments, advanced, checked once, and searched for first losses."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexmj.controllers.protocol import (
+    Controller,
+    FastLosses,
+    KnowsItsLimits,
+    Plan,
+    SteerableController,
+    SteerablePlan,
+    check_controller_type,
+)
+from hexmj.errors import InputError, Refused
+from hexmj.legs import LEGS
+from hexmj.stability import walk_margin
+from hexmj.starts import checked_starts, checked_velocities
+from hexmj.threads import check_memory
+from hexmj.timing import Acceleration, Stride, check_reached
+from hexmj.validate import short
+from hexmj.walks import PLANNED, PlannedWalk, copied
+
+STEP_MEMORY = 400
+"""Memory that one step of one start takes while it is planned [bytes]."""
+
+REPEATED = 20
+"""Steps in which two plans are compared: every leg that lifts within two time units shows."""
+
+HELD = 400_000
+"""Steps times starts of a plan that are held in memory while its losses are searched for."""
+
+MOST_AT_ONCE = 200
+"""Most steps at once in that search, so that few starts that are lost early do not walk on for long."""
+
+
+def begin(
+    controller: Controller,
+    starts: ArrayLike,
+    velocity: ArrayLike,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+) -> Plan:
+    """Return a controller's plan for starts, (start, leg) [mm], and V_r, one number or (start,).
+
+    Raises:
+        InputError: a start, velocity or plan is out of range; `Refused` if the controller refuses.
+    """
+    check_controller_type(controller)
+    x = checked_starts(starts, stride)
+    v = checked_velocities(velocity, len(x), acceleration)
+    check_reached(v, stride, acceleration)
+    try:
+        plan = controller.begin(x.copy(), v, stride, acceleration, threads)
+    except InputError as error:
+        if type(error) is not InputError:
+            raise
+        raise Refused(*error.args) from error
+    check_plan(plan, x, stride)
+    return plan
+
+
+def begin_at_speed(
+    controller: SteerableController,
+    starts: np.ndarray,
+    velocity: np.ndarray,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+) -> SteerablePlan:
+    """Return a plan that walks at its final velocity from time 0.
+
+    Raises:
+        InputError: the plan cannot be steered, or does not fit its arguments.
+    """
+    plan = controller.begin_at_speed(starts.copy(), velocity.copy(), stride, acceleration, threads)
+    if not isinstance(plan, SteerablePlan):
+        raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a steerable plan")
+    check_plan(plan, starts, stride)
+    return plan
+
+
+def check_velocities(
+    controller: Controller, velocities: Iterable[float], stride: Stride, acceleration: Acceleration | None = None
+) -> None:
+    """Raise InputError if a controller refuses one of some V_r with this time step, see `protocol.KnowsItsLimits`.
+
+    Walks that accelerate are refused later, if they reach such a V_r.
+    """
+    if isinstance(controller, KnowsItsLimits) and not acceleration:
+        for velocity in velocities:
+            controller.check_velocity(velocity, stride)
+
+
+def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
+    """Raise InputError unless a plan is at time 0 of these starts, (start, leg) [mm], with this stride."""
+    if not isinstance(plan, Plan):
+        raise InputError(f"begin returned {short(plan)}; expected a plan with starts, stride, done and advance")
+    if plan.done != 0:
+        raise InputError(f"the plan is at step {plan.done}; expected a plan at time 0")
+    if plan.stride != stride:
+        raise InputError(f"the plan's stride is {plan.stride}; expected {stride}")
+    if not np.array_equal(plan.starts, starts):
+        raise InputError(f"the plan's starts, {np.shape(plan.starts)}, are not those of the walk, {starts.shape}")
+
+
+def advanced(plan: Plan, steps: int) -> PlannedWalk:
+    """Return the plan's next steps in new arrays.
+
+    Raises:
+        InputError: another number of steps or starts, or a number that is not finite.
+    """
+    starts = len(plan.starts)
+    check_memory(f"{steps} steps of {starts} starts", STEP_MEMORY * steps * starts)
+    before = plan.done
+    walk = copied(plan.advance(steps))
+    if walk.stance.shape != (steps, starts, len(LEGS)) or plan.done != before + steps:
+        raise InputError(
+            f"advance({steps}) at step {before} returned {walk.stance.shape} and ended at step {plan.done}; expected"
+            f" {(steps, starts, len(LEGS))} and step {before + steps}"
+        )
+    for name in ("time", "velocity", "x", "y", "aep", "height"):
+        values = getattr(walk, name)
+        bad = np.isinf(values) if name in ("aep", "height") else ~np.isfinite(values)
+        if bad.any():
+            at = np.argwhere(bad)[0]
+            raise InputError(f"{name} of the plan is {values[tuple(at)]} in {place(walk, at, before)}")
+    if walk.geometry != plan.stride.geometry:
+        raise InputError(f"geometry of the plan is {walk.geometry}; expected {plan.stride.geometry}")
+    return walk
+
+
+def check_repeats(
+    controller: Controller,
+    starts: np.ndarray,
+    velocity: ArrayLike,
+    steps: int,
+    stride: Stride,
+    acceleration: Acceleration | None = None,
+) -> None:
+    """Raise InputError if a second plan differs from the first, as with random numbers without a seed.
+
+    The first `REPEATED` of the `steps` of a walk are compared, for starts (start, leg) [mm] and V_r, one or (start,).
+    """
+    plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
+    first, second = (advanced(plan, min(steps, REPEATED)) for plan in plans)
+    check_same(first, second, controller.name)
+
+
+def check_same(first: PlannedWalk, second: PlannedWalk, name: str, before: int = 0) -> None:
+    """Raise InputError if two plans of the controller `name` differ in steps that follow the first `before` ones."""
+    if differs := difference(first, second, before):
+        raise InputError(f"{name} plans another walk when it begins again: {differs}; expected the same numbers")
+
+
+def difference(first: PlannedWalk, second: PlannedWalk, before: int = 0) -> str:
+    """Describe the first number that differs between two walks of the same starts; empty if there is none."""
+    for name in (*PLANNED, "velocity"):
+        a, b = getattr(first, name), getattr(second, name)
+        if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
+            at = tuple(bad[0])
+            return f"{name} is {a[at]!s} and {b[at]!s} in {place(first, at, before)}"
+    return ""
+
+
+def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:
+    """Describe a place in a walk by step, start and leg; `before` steps precede the walk."""
+    names = [f"step {before + at[0]}", *(f"start {start} (V = {walk.velocity[at[0], start]:.3g})" for start in at[1:2])]
+    return ", ".join(names + [f"leg {LEGS[leg]}" for leg in at[2:]])
+
+
+def first_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None) -> np.ndarray:
+    """Return the first of each start's steps that is statically unstable (Eq. 7), (start,), from 1; 0 where none is.
+
+    Args:
+        plan: at time 0; the call consumes it.
+        steps: how far to look, (start,), or one number for all.
+        threads: by default one per core; the result does not depend on it.
+    """
+    if isinstance(plan, FastLosses):
+        return plan.first_losses(np.broadcast_to(steps, len(plan.starts)).copy())
+    return planned_losses(plan, steps, threads)
+
+
+def planned_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None) -> np.ndarray:
+    """Find the losses of `first_losses` by advancing the plan."""
+    steps = np.broadcast_to(steps, len(plan.starts))
+    lost = np.zeros(len(steps), dtype=int)
+    at_a_time = min(MOST_AT_ONCE, max(1, HELD // len(steps)))
+    while plan.done < (end := steps[lost == 0].max(initial=0)):
+        first = plan.done + 1
+        unstable = walk_margin(advanced(plan, int(min(at_a_time, end - plan.done))), threads) <= 0.0
+        unstable &= (first + np.arange(len(unstable)))[:, np.newaxis] <= steps
+        new = (lost == 0) & unstable.any(axis=0)
+        lost[new] = first + np.argmax(unstable, axis=0)[new]
+    return lost
