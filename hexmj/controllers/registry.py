@@ -177,7 +177,9 @@ def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
     hints: dict[str, Any] = {}
     with suppress(NameError):  # of an annotation that only type checkers know
         hints = get_type_hints(kind)
-    changed = {name: _converted(name, value, hints.get(name), getattr(usual, name, None)) for name, value in values.items()}
+    changed = {
+        name: _converted(name, value, hints.get(name), getattr(usual, name, None)) for name, value in values.items()
+    }
     try:
         return replace(usual, **changed) if isinstance(usual, kind) else kind(**changed)
     except TypeError as error:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.planning import advanced, begin, check_velocities
-from hexmj.controllers.planning import first_losses
+from hexmj.controllers.planning import advanced, begin, check_velocities, first_losses
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.controllers.registry import load_controller
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.figures import caption

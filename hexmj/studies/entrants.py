@@ -7,12 +7,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hexmj.controllers.planning import begin
-from hexmj.controllers.registry import known_names, load_controller
-from hexmj.controllers.protocol import Controller, FeedbackPlan, is_steerable
-from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.baselines import BASELINES
-from hexmj.controllers.registry import VARIED
+from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.planning import begin
+from hexmj.controllers.protocol import Controller, FeedbackPlan, is_steerable
+from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.starts import draw_starts

@@ -9,8 +9,8 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.planning import begin, check_repeats
-from hexmj.controllers.wrappers import LegLost
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.wrappers import LegLost
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.gaits import limit_gait
 from hexmj.measures.cells import UNITS
