@@ -11,12 +11,8 @@ from hexmj.cli.commands import options_of
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.gaits import gait
-<<<<<<< HEAD
-from hexmj.search.problems import Sample
-=======
-from hexmj.search.problems import Sample
 from hexmj.files import read_toml
->>>>>>> a504e1a (Join the search into five modules; move its command's logic there)
+from hexmj.search.problems import Sample
 from hexmj.timing import Stride
 
 L2 = 1

@@ -8,7 +8,7 @@ import pytest
 import hexmj
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines import BASELINES
-from hexmj.controllers.baselines.walknet import CURVE, REACOG, ModelVariant, Walknet, sent_load
+from hexmj.controllers.baselines.walknet import CURVE, REACOG, Constants, Walknet, sent_load
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
@@ -45,46 +45,46 @@ DOES = {
 """Time since touchdown [s] and travel since AEP [step lengths], at these velocities."""
 
 
-def shifts(model_variant: ModelVariant, rule: int, leg: int, v: float, age: float = 9.0, travel: float = 0.0) -> np.ndarray:
+def shifts(constants: Constants, rule: int, leg: int, v: float, age: float = 9.0, travel: float = 0.0) -> np.ndarray:
     """What one leg does to all [step lengths]: it swings at `age` below 0, or has stood so long [s] and gone so far."""
     stride, alone = Stride(), np.arange(6) == leg
     x = np.where(alone, stride.aep0 - travel * (stride.aep0 - stride.pep0), stride.aep0)[None]
     stands = ~alone[None] | (age >= 0)
-    second = model_variant.swing_speed / model_variant.step_length * (stride.aep0 - stride.pep0)
+    second = constants.swing_speed / constants.step_length * (stride.aep0 - stride.pep0)
     ages = np.where(alone, age * second, np.inf)[None]
-    legs = Legs(x, stands, np.zeros(x.shape), np.array([[v / model_variant.swing_speed]]), stride)
-    return Walknet(model_variant=model_variant).shift(rule, legs, ages)[0]
+    legs = Legs(x, stands, np.zeros(x.shape), np.array([[v / constants.swing_speed]]), stride)
+    return Walknet(constants=constants).shift(rule, legs, ages)[0]
 
 
 @pytest.mark.parametrize(
-    ("name", "model_variant", "sends"), [("curve", CURVE, CURVE_SENDS), ("reacog", REACOG, REACOG_SENDS)]
+    ("name", "constants", "sends"), [("curve", CURVE, CURVE_SENDS), ("reacog", REACOG, REACOG_SENDS)]
 )
-def test_each_rule_shifts_the_pep_of_the_legs_and_by_as_much_as_its_source_prints(name, model_variant, sends) -> None:
-    unit = 1.0 if name == "curve" else model_variant.step_length
+def test_each_rule_shifts_the_pep_of_the_legs_and_by_as_much_as_its_source_prints(name, constants, sends) -> None:
+    unit = 1.0 if name == "curve" else constants.step_length
     for (rule, what), table in sends.items():
         age, travel = DOES[name].get(what, (-1.0, 0.5))
         for leg, received in table.items():
             expected = np.array([received.get(other, 0.0) for other in range(6)]) / unit
-            assert np.allclose(shifts(model_variant, rule, leg, V[name], age, travel), expected), (rule, what, leg)
-            mirrored = shifts(model_variant, rule, (leg + 3) % 6, V[name], age, travel)
-            assert np.array_equal(np.roll(mirrored, 3), shifts(model_variant, rule, leg, V[name], age, travel))
+            assert np.allclose(shifts(constants, rule, leg, V[name], age, travel), expected), (rule, what, leg)
+            mirrored = shifts(constants, rule, (leg + 3) % 6, V[name], age, travel)
+            assert np.array_equal(np.roll(mirrored, 3), shifts(constants, rule, leg, V[name], age, travel))
 
 
 @pytest.mark.parametrize(
-    ("model_variant", "v", "delay"), [(CURVE, 0.05, 0.27), (CURVE, 0.107, 0.2), (REACOG, 0.02, 0.26), (REACOG, 0.035, 0.11)]
+    ("constants", "v", "delay"), [(CURVE, 0.05, 0.27), (CURVE, 0.107, 0.2), (REACOG, 0.02, 0.26), (REACOG, 0.035, 0.11)]
 )
-def test_rule_1_lasts_after_touchdown_for_a_time_that_falls_with_velocity(model_variant, v, delay) -> None:
-    assert shifts(model_variant, 1, L2, v, delay - 0.005)[L1] < 0 == shifts(model_variant, 1, L2, v, delay + 0.005)[L1]
+def test_rule_1_lasts_after_touchdown_for_a_time_that_falls_with_velocity(constants, v, delay) -> None:
+    assert shifts(constants, 1, L2, v, delay - 0.005)[L1] < 0 == shifts(constants, 1, L2, v, delay + 0.005)[L1]
 
 
-@pytest.mark.parametrize(("model_variant", "begin", "end"), [(CURVE, 0.27, 0.32), (REACOG, 0.37, 0.42)])
-def test_rule_2_acts_within_its_window_of_time(model_variant, begin, end) -> None:
-    found = [shifts(model_variant, 2, L2, 0.02, age)[L1] > 0 for age in (begin - 0.01, begin + 0.01, end - 0.01, end + 0.01)]
+@pytest.mark.parametrize(("constants", "begin", "end"), [(CURVE, 0.27, 0.32), (REACOG, 0.37, 0.42)])
+def test_rule_2_acts_within_its_window_of_time(constants, begin, end) -> None:
+    found = [shifts(constants, 2, L2, 0.02, age)[L1] > 0 for age in (begin - 0.01, begin + 0.01, end - 0.01, end + 0.01)]
     assert found == [False, True, True, False]
 
 
 @pytest.mark.parametrize(
-    ("model_variant", "v", "ipsilateral", "contralateral"),
+    ("constants", "v", "ipsilateral", "contralateral"),
     [
         (CURVE, 0.02, (0.9627, 1.0627), (0.47, 0.57)),
         (CURVE, 0.085, (0.5, 0.6), (0.3725, 0.4725)),
@@ -92,10 +92,10 @@ def test_rule_2_acts_within_its_window_of_time(model_variant, begin, end) -> Non
         (REACOG, 0.005, (0.901, 1.2135), (0.47, 0.6575)),
     ],
 )
-def test_rule_3_acts_within_its_window_of_travel(model_variant, v, ipsilateral, contralateral) -> None:
+def test_rule_3_acts_within_its_window_of_travel(constants, v, ipsilateral, contralateral) -> None:
     for receiver, (begin, end) in ((L2, ipsilateral), (R1, contralateral)):
         at = (begin - 0.01, begin + 0.01, end - 0.01, end + 0.01)
-        found = [shifts(model_variant, 3, L1, v, 9.0, travel)[receiver] > 0 for travel in at]
+        found = [shifts(constants, 3, L1, v, 9.0, travel)[receiver] > 0 for travel in at]
         assert found == [False, True, True, False]
 
 
@@ -127,10 +127,10 @@ def test_swings_run_from_hind_to_front_when_slow_and_in_tripods_when_faster(v: f
 
 def test_no_step_is_shorter_than_the_least() -> None:
     starts, stride = hexmj.draw_starts(20, 2), Stride()
-    for model_variant in (CURVE, REACOG):
-        found = walk(starts, Walknet(model_variant=model_variant), 0.8, 3 * stride.periods(0.8))
+    for constants in (CURVE, REACOG):
+        found = walk(starts, Walknet(constants=constants), 0.8, 3 * stride.periods(0.8))
         lifted = found.stance[:-1] & ~found.stance[1:]
-        assert found.x[:-1][lifted].max() < stride.aep0 - 20 * model_variant.least_step
+        assert found.x[:-1][lifted].max() < stride.aep0 - 20 * constants.least_step
 
 
 def test_the_veto_lifts_no_leg_while_three_swing() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
-from hexmj.controllers.planning import advanced, begin, tell
+from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import FeedbackPlan, Plan
 from hexmj.environments.observing import ROUNDING, Observer, Places, Planned, judge, keep, order, scaled
 from hexmj.environments.task import Task, action_bounds, action_names
@@ -229,7 +229,7 @@ class Walkers:
         ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
         if group.feedback:
             state = self.places.qpos[ids], self.places.qvel[ids]
-            tell(group.feedback, replace(self._senses.sensed(ids, *state), ids=rows.copy()))
+            group.feedback.sense(replace(self._senses.sensed(ids, *state), ids=rows.copy()))
             steps = 1
         walk = advanced(group.plan, steps)
         tips = group.targets.follow(walk, rows)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.checked_plans import advanced, begin, check_repeats, check_same
+from hexmj.controllers.planning import advanced, begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.diagrams import footfall_html
 from hexmj.measures.kinematic import first_loss

@@ -19,7 +19,6 @@ import numpy as np
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.conditions import ROUNDING
-from hexmj.controllers.planning import tell
 from hexmj.controllers.protocol import FeedbackPlan, Plan, Sensed
 from hexmj.errors import InputError, SimulationError
 from hexmj.jitted import jitted
@@ -132,7 +131,7 @@ def _with_feedback(rollout: "Rollout", plan: FeedbackPlan, orders: OrdersFromPla
 
     def step_by_step(steps: int) -> Iterator[Orders]:
         for _ in range(steps):
-            tell(plan, rollout.sensed(ids))
+            plan.sense(rollout.sensed(ids))
             if now := orders.ahead(ids, steps=1):
                 yield now
 

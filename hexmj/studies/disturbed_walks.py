@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.checked_plans import REPEATED, advanced, begin, begin_at_speed, check_repeats
+from hexmj.controllers.planning import REPEATED, advanced, begin, begin_at_speed, check_repeats
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.losses import planned_losses
+from hexmj.controllers.planning import planned_losses
 from hexmj.controllers.protocol import (
     Controller,
     FeedbackPlan,

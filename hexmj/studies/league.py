@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.leg_lost import LegLost
-from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.wrappers import LegLost
+from hexmj.controllers.wrappers import PoorSenses
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
@@ -111,7 +111,7 @@ class League(Study):
 
     def cells(self) -> list[Cell]:
         """Return every cell."""
-        from hexmj.controllers.checked_plans import check_velocities
+        from hexmj.controllers.planning import check_velocities
         from hexmj.physics.settle import check_adhesion
 
         for entrant in self.controllers.values():
