@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import hexmj
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss

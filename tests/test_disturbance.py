@@ -23,8 +23,8 @@ from hexmj import (
     physical_walk,
     walk,
 )
-from hexmj.controllers.baselines.table import BASELINES
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.feedback import SensedPlan
 from hexmj.controllers.protocol import Sensed

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import hexmj
 from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import settings_of
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown

@@ -10,8 +10,8 @@ from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.leg_lost import RISE, LegLost
-from hexmj.controllers.poor_senses import PoorSenses
+from hexmj.controllers.wrappers import RISE, LegLost
+from hexmj.controllers.wrappers import PoorSenses
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
