@@ -5,7 +5,7 @@ import pytest
 from mujoco.batch import Batch
 
 from hexmj import LDVS, SensoryFeedback, draw_starts
-from hexmj.controllers.checked_plans import begin
+from hexmj.controllers.planning import begin
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.engine import STATE
 from hexmj.physics.foot_path import TipTargets

@@ -11,7 +11,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.named import load_controller
+from hexmj.controllers.registry import load_controller
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk

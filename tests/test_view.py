@@ -18,7 +18,7 @@ import pytest
 from chromium import tab
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.named import load_controller
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.measures.physical import physical_walk
 from hexmj.replay.recording import record, save_recording

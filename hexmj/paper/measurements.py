@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.controllers.losses import planned_losses
+from hexmj.controllers.planning import planned_losses
 from hexmj.controllers.protocol import SteerableController
 from hexmj.gaits import limit_gait
 from hexmj.legs import LEGS

@@ -7,7 +7,7 @@ import numpy as np
 
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.checked_plans import begin, begin_at_speed, said, tell
+from hexmj.controllers.planning import begin, begin_at_speed, said, tell
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
 from hexmj.errors import InputError
 from hexmj.legs import leg_last
