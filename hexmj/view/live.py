@@ -7,7 +7,7 @@ import numpy as np
 
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import begin, begin_at_speed, said, tell
+from hexmj.controllers.planning import begin, begin_at_speed
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
 from hexmj.errors import InputError
 from hexmj.legs import leg_last
@@ -79,7 +79,7 @@ class SteeredPlan:
     def sense(self, sensed: Sensed) -> None:
         """Pass the state of the legs to the plan."""
         if isinstance(self._plan, FeedbackPlan):
-            tell(self._plan, sensed)
+            self._plan.sense(sensed)
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps."""
@@ -96,8 +96,7 @@ class SteeredPlan:
         if not (is_steerable(controller) and isinstance(self._plan, SteerablePlan)):
             return False
         plan = begin_at_speed(controller, self.starts, np.array([velocity]), self.stride)
-        with said("a plan, see"):
-            plan.see(self._plan.tips.copy(), self._plan.standing.copy())
+        plan.see(self._plan.tips.copy(), self._plan.standing.copy())
         self._plan = plan
         return True
 
