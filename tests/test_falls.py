@@ -17,7 +17,7 @@ def compared():
 
 
 def test_who_falls_has_toppled_before(compared):
-    """On flat ground: of 71 falls the first tilted by 6 degrees as the trunk touched, see `docs/falls.md`."""
+    """On flat ground: of 71 falls the first tilted by 6 degrees as the trunk touched."""
     fell, toppled = compared.fall < np.inf, compared.topple < np.inf
     assert fell.sum() > 10
     assert (compared.topple < compared.fall).values[fell].all()
@@ -25,6 +25,7 @@ def test_who_falls_has_toppled_before(compared):
 
 
 def test_to_topple_is_to_tilt_by_so_much_in_any_direction(compared):
+    assert TOPPLED == 0.1
     assert ((compared.tilt > TOPPLED) == (compared.topple < np.inf)).all()
     assert (compared.toppled == (compared.tilt > TOPPLED).mean("start")).all()
     assert ((compared.toppled_low <= compared.toppled) & (compared.toppled <= compared.toppled_high)).all()

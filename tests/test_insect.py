@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import compile_body
-from hexmj.body import JOINTS, PARTS, ROOT_QPOS, STICK_INSECT
+from hexmj.body import JOINTS, PARTS, STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.legs import FIG1, LEGS, MIRROR
 
@@ -87,19 +87,6 @@ def test_centre_of_mass_is_the_papers(home: mujoco.MjData):
     assert np.abs(offset[:2]).max() < 0.01
 
 
-def test_home_puts_the_tips_on_the_lines_of_fig_1(home: mujoco.MjData):
-    tips = np.array([home.site(foot).xpos for foot in STICK_INSECT.feet])
-    assert_allclose(tips, np.stack([FIG1.origin, FIG1.y, 6 * [0.4]], axis=-1), atol=1e-6)
-    assert home.qpos[2] == pytest.approx(STICK_INSECT.standing_height + 0.4)
-
-
-def test_home_keeps_its_posture_and_is_symmetric(model: mujoco.MjModel):
-    key = model.key("home")
-    joints = key.qpos[ROOT_QPOS:].reshape(6, 3)
-    assert_array_equal(key.ctrl.reshape(6, 3), joints)
-    assert_array_equal(joints[list(MIRROR)], joints)
-
-
 def test_left_and_right_are_mirror_images(model: mujoco.MjModel):
     for left, right in zip(LEGS[:3], LEGS[3:], strict=True):
         for part in PARTS:
@@ -112,37 +99,6 @@ def test_left_and_right_are_mirror_images(model: mujoco.MjModel):
             assert_array_equal(a.range, b.range)
     for name in TRUNK:
         assert model.body(name).ipos[1] == pytest.approx(0, abs=1e-12)
-
-
-def test_mirrored_postures_have_a_mirrored_centre_of_mass(model: mujoco.MjModel):
-    data = mujoco.MjData(model)
-    low, high = model.jnt_range[1:].T
-    joints = np.random.default_rng(1).uniform(low, high)
-    centres = []
-    for posture in (joints, joints.reshape(6, 3)[list(MIRROR)].ravel()):
-        data.qpos[ROOT_QPOS:] = posture
-        mujoco.mj_forward(model, data)
-        centres.append(data.body("mesothorax").subtree_com.copy())
-    assert_allclose(centres[0], centres[1] * [1, -1, 1], atol=1e-12)
-
-
-def test_every_element_is_named(model: mujoco.MjModel):
-    counts = {
-        mujoco.mjtObj.mjOBJ_BODY: model.nbody,
-        mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
-        mujoco.mjtObj.mjOBJ_GEOM: model.ngeom,
-        mujoco.mjtObj.mjOBJ_SITE: model.nsite,
-        mujoco.mjtObj.mjOBJ_CAMERA: model.ncam,
-        mujoco.mjtObj.mjOBJ_LIGHT: model.nlight,
-        mujoco.mjtObj.mjOBJ_MESH: model.nmesh,
-        mujoco.mjtObj.mjOBJ_TEXTURE: model.ntex,
-        mujoco.mjtObj.mjOBJ_MATERIAL: model.nmat,
-        mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
-        mujoco.mjtObj.mjOBJ_SENSOR: model.nsensor,
-        mujoco.mjtObj.mjOBJ_KEY: model.nkey,
-    }
-    for kind, count in counts.items():
-        assert all(mujoco.mj_id2name(model, kind, i) for i in range(count)), kind
 
 
 def test_joints_actuators_and_sensors_come_in_the_stated_order(model: mujoco.MjModel):
@@ -162,13 +118,7 @@ def test_the_part_of_the_trunk_that_touches_the_ground_is_known(insect: Compiled
     home.qpos[2] = 3.0  # abdomen and the metathorax's rear end: axes 1 mm above the ground
     mujoco.mj_forward(insect.model, home)
     touching = home.sensordata[insect.columns.trunk] > 0
-    assert dict(zip(TRUNK, touching, strict=True)) == {
-        "head": False,
-        "prothorax": False,
-        "mesothorax": False,
-        "metathorax": True,
-        "abdomen": True,
-    }
+    assert touching.tolist() == [False, False, False, True, True]
 
 
 def test_only_the_ground_is_touched(model: mujoco.MjModel):
@@ -193,23 +143,12 @@ def test_joint_ranges_are_the_measured_ones_widened_only_as_needed(insect: Compi
     assert_allclose(found, np.stack([low, high], axis=-1), atol=1e-9)
 
 
-def test_targets_are_limited_to_the_joint_ranges(model: mujoco.MjModel):
-    assert_allclose(model.actuator_ctrlrange, model.jnt_range[1:], rtol=1e-12)
-    assert model.actuator_ctrllimited.all()
-    assert model.jnt_limited[1:].all()
-
-
 def test_lengths_in_the_solvers_settings_are_in_mm(model: mujoco.MjModel):
     assert (model.pair_solimp[:, 2] == 0.1).all()
     assert (model.pair_solref[:, 0] >= 2 * STICK_INSECT.longest_step).all()
     assert model.opt.gravity.tolist() == [0, 0, -9810]
     assert model.opt.tolerance == 1e-5
     assert model.opt.ccd_tolerance == 1e-3
-
-
-def test_standing_raises_no_warning(standing: mujoco.MjData):
-    assert standing.warning.number.sum() == 0
-    assert np.abs(standing.qvel).max() < 1
 
 
 def test_the_feet_carry_the_weight(insect: CompiledBody, standing: mujoco.MjData):
@@ -220,16 +159,11 @@ def test_the_feet_carry_the_weight(insect: CompiledBody, standing: mujoco.MjData
 
 
 def test_feet_do_not_sink_in_and_the_body_does_not_sag(standing: mujoco.MjData, home: mujoco.MjData):
+    assert standing.warning.number.sum() == 0
+    assert np.abs(standing.qvel).max() < 1
     assert standing.ncon == 6
     assert -0.2 < standing.contact.dist.min() < 0
     assert -1 < standing.qpos[2] - home.qpos[2] < 0
-
-
-def test_standing_does_not_depend_on_the_time_step(standing: mujoco.MjData):
-    model = compile_body(Conditions(), 0.00025).model
-    data = at_home(model)
-    mujoco.mj_step(model, data, nstep=4000)
-    assert data.qpos[2] == pytest.approx(standing.qpos[2], abs=0.001)
 
 
 def test_looks_change_no_bit_of_a_walk(model: mujoco.MjModel):

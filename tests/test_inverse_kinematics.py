@@ -74,19 +74,6 @@ def test_it_reaches_what_the_closed_form_reaches(closed: ThreeHinges, numeric: H
         assert (off[:, 0] * np.sin(protraction) + side * off[:, 1] * np.cos(protraction) < 0).all()
 
 
-@pytest.mark.thorough
-def test_limits_of_joints_are_reached_and_not_passed(closed: ThreeHinges, numeric: HingeChains):
-    middle = closed.joint_range.mean(axis=-1)
-    for joint in range(3):
-        for bound in range(2):
-            for beyond, reachable in ((-1e-8, True), (0.0, True), (1e-8, False)):
-                joints = middle.copy()
-                joints[:, joint] = closed.joint_range[:, joint, bound] + (beyond if bound else -beyond)
-                found, reached = numeric.inverse(closed.forward(joints))
-                assert (reached == reachable).all()
-                assert_allclose(found, joints if reachable else np.nan, atol=1e-9)
-
-
 def test_the_result_depends_on_nothing_but_the_tip(numeric: HingeChains):
     tips = ORIGIN + np.random.default_rng(1).uniform([-20, -3, -12], [10, 3, 5], (200, 6, 3))
     joints, reachable = numeric.inverse(tips)
@@ -121,17 +108,6 @@ def test_mirrored_tips_have_equal_angles(closed: ThreeHinges):
         assert_array_equal(other, one[:, MIRROR])
 
 
-def test_joint_ranges_bound_what_is_reachable(closed: ThreeHinges):
-    home = ORIGIN - [0, 0, 10.0]
-    angles, _ = closed.inverse(home)
-    for joint in range(3):
-        for bound, outside in ((0, 1e-6), (1, -1e-6)):
-            joint_range = closed.joint_range.copy()
-            joint_range[3, joint, bound] = angles[3, joint] + outside
-            _, reachable = closed._replace(joint_range=joint_range).inverse(home)
-            assert reachable.tolist() == [True, True, True, False, True, True]
-
-
 def test_the_closed_form_s_inverse_and_forward_are_each_others(closed: ThreeHinges, numeric: HingeChains):
     joints = random_joints(numeric, 10_000)
     tips = closed.forward(joints)
@@ -144,7 +120,7 @@ def test_the_closed_form_s_inverse_and_forward_are_each_others(closed: ThreeHing
     assert_allclose(back[outward], joints[outward], atol=1e-9)
 
 
-@pytest.mark.parametrize("shape", [(), (4,), (2, 3), (0,)])
+@pytest.mark.parametrize("shape", [(), (2, 3)])
 def test_leading_axes_are_free_and_the_input_stays(legs: ThreeHinges | HingeChains, shape: tuple[int, ...]):
     tips = np.broadcast_to(ORIGIN - [0, 0, 10.0], (*shape, 6, 3)).copy()
     before = tips.copy()
@@ -193,13 +169,6 @@ def test_any_chain_reaches_its_tips(made: Body):
         assert reachable.mean() >= reached_at_least
         assert_allclose(chains.forward(joints)[reachable], tips[reachable], rtol=0, atol=1e-9)
         assert ((chains.low <= joints) & (joints <= chains.high))[reachable].all()
-
-
-def test_home_is_where_it_begins(made: Body):
-    chains = hinge_chains(plain_model(made), made)
-    joints, reachable = chains.inverse(chains.forward(chains.home))
-    assert reachable.all()
-    assert_allclose(joints, chains.home, atol=1e-9)
 
 
 def test_more_than_three_hinges_stay_near_home(tmp_path: Path):

@@ -1,15 +1,12 @@
 """Feet never sink in: steps in which one strikes the ground are taken finely, and no others."""
 
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
 import pytest
-from dm_control.rl.control import PhysicsError
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj.bodies.ground import depth_in_ground
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
@@ -19,7 +16,6 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics
-from hexmj.environments.walkers import Alone
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import substeps as fine_steps
 from hexmj.physics.engine import Diverged, Engine, Rolled
@@ -74,11 +70,6 @@ def never_finely(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fine_steps, "SINK", np.inf)
 
 
-def measured(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
-    """Depth of feet in the world in the ground of some conditions [mm]."""
-    return depth_in_ground(conditions.ground, conditions.body.lengths, feet, radius)
-
-
 @pytest.mark.parametrize("ground", OBSTACLES)
 def test_depth_is_that_of_mujocos_contacts(ground):
     """The insect in random postures among the obstacles, turned and tilted; a foot without contact is above ground."""
@@ -97,7 +88,7 @@ def test_depth_is_that_of_mujocos_contacts(ground):
             for leg in (geoms.index(geom) for geom in contact.geom if geom in geoms):
                 found[leg] = max(found[leg], -contact.dist)
         in_contact += (found > 0).sum()
-        depth = np.maximum(measured(compiled.conditions, data.geom_xpos[geoms], compiled.foot_radius), 0.0)
+        depth = np.maximum(compiled.depth(data.geom_xpos[geoms]), 0.0)
         far = (depth > FAR) & (found > FAR)
         assert_allclose(depth[~far], found[~far], atol=1e-6)
     assert in_contact > 200
@@ -171,7 +162,7 @@ def test_nobody_else_takes_fine_steps(monkeypatch):
     for start in np.intersect1d(fine[-1].ids, usual[-1].ids):
         one, other = (np.concatenate([x.qpos[x.ids == start][0] for x in walk]) for walk in (fine, usual))
         feet = np.concatenate([x.sensors[x.ids == start][0][:, columns.foot] for x in usual]).reshape(-1, 6, 3)
-        depth = measured(settled.conditions, feet, settled.compiled.foot_radius)
+        depth = settled.compiled.depth(feet)
         struck = strikes(depth[np.newaxis], m, allowed(settled))[0]
         first = np.argmax(struck) // m * m + 1 if struck.any() else len(one)
         assert_array_equal(one[:first], other[:first])
@@ -227,44 +218,10 @@ def test_a_copy_of_the_environments_physics_goes_on_the_same_way(copied, monkeyp
     assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
 
 
-def test_copies_that_share_a_model_go_on_the_same_way_at_once():
-    """As planners step them, each in a thread of its own: a fine step of one is none of another."""
-    physics = thrown()
-    timestep, hardness = physics.timestep(), physics.model.pair_solref.copy()
-    copies = [physics.copy(share_model=True) for _ in range(8)]
-
-    def step(one: InsectPhysics) -> np.ndarray:
-        for _ in range(40):
-            one.step(2)
-        return one.position()
-
-    with ThreadPoolExecutor(8) as pool:
-        ends = list(pool.map(step, copies))
-    assert_array_equal(ends, 8 * [step(physics)])
-    assert physics.timestep() == timestep
-    assert_array_equal(physics.model.pair_solref, hardness)
-
-
 def test_fine_steps_of_the_environment_last_no_longer():
     physics = thrown()
     physics.step(2)
     assert physics.time() == pytest.approx(2 * physics.timestep(), rel=1e-12)
-
-
-def test_an_error_in_a_fine_step_leaves_the_model_as_it_was(monkeypatch):
-    physics, roll = thrown(), Alone._roll
-    usual = physics.timestep(), physics.model.pair_solref.copy()
-
-    def diverge(self: Alone, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if len(control) > 2:
-            raise Diverged(0, "diverged", {})
-        return roll(self, control, model)
-
-    monkeypatch.setattr(Alone, "_roll", diverge)
-    with pytest.raises(PhysicsError):
-        physics.step(2)
-    assert physics.timestep() == usual[0]
-    assert_array_equal(physics.model.pair_solref, usual[1])
 
 
 class PointMasses:
