@@ -47,7 +47,7 @@ RENAMED: dict[str, str] = {
     "n_tried": "trial_starts",
     "tried_at": "trial_velocity",
 }  # key, file name or text in the reference -> its new name
-IGNORED = {"settings", "replayed"}  # keys and file names that are not compared; see `walk settings`
+IGNORED = {"settings", "replayed", "looks", "margin"}  # keys and file names that are not compared; see `walk settings`
 TOLERANCE = {"rel_tol": 1e-4, "abs_tol": 1e-6}  # of floating-point numbers
 LONGEST = 12  # longer arrays of numbers are stored as a summary
 COARSE = hexmj.Stride(dt=0.5)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj.paper.claims import CLAIMS, INFERRED_FROM, Claim
-from hexmj.paper.quantities import Lost, Measured, Phase, Regime, Scatter, main_peak
+from hexmj.paper.claims import Claim, claims
+from hexmj.paper.quantities import Faults, Losses, Measured, Phases, Scatter, main_peak
+from hexmj.paper.reproduce import Row, summary, verdict
 from hexmj.paper.rules import Answer, Band, Rule, Seen, Trend, fisher
-from hexmj.paper.table import judge, summary
 
 
 def losses(*rates: float, starts: int = 1000, velocities: tuple[float, ...] = (0.1, 0.2, 0.3)) -> xr.Dataset:
@@ -35,34 +35,34 @@ def gaits(phases: np.ndarray) -> xr.Dataset:
     )  # fmt: skip
 
 
-def answer_of(rule: Rule, measured: Measured, observation_time: str) -> Answer:
-    """Of a rule that can be judged."""
-    answer = rule.answer(measured, observation_time)
+def answer_of(rule: Rule, data: dict[str, xr.Dataset], observation_time: str) -> Answer:
+    """Return the answer of a rule that can be judged."""
+    answer = rule.answer(Measured(data), observation_time)
     assert answer is not None
     return answer
 
 
 def test_rules_agree_if_every_interval_reaches_the_band():
     measured = {"hws": losses(0.01, 0.2, 0.31), "ldvs": losses(0.02, 0.1, 0.5)}
-    below = Band(Lost("hws"), (0.1, 0.3), most=0.3)
+    below = Band(Losses("hws"), (0.1, 0.3), most=0.3)
     answer = answer_of(below, measured, "walk")
     assert answer.agrees and answer.where == "V = 0.3" and answer.low < 0.3 < answer.value
-    assert not answer_of(Band(Lost("hws"), (0.1, 0.3), most=0.25), measured, "walk").agrees
-    assert not answer_of(Band(Lost("hws"), (0.1, 0.3), least=0.1), measured, "walk").agrees
-    apart = answer_of(Band(Lost("ldvs", "hws"), (0.1, 0.3), most=0.0), measured, "walk")
+    assert not answer_of(Band(Losses("hws"), (0.1, 0.3), most=0.25), measured, "walk").agrees
+    assert not answer_of(Band(Losses("hws"), (0.1, 0.3), least=0.1), measured, "walk").agrees
+    apart = answer_of(Band(Losses("ldvs", "hws"), (0.1, 0.3), most=0.0), measured, "walk")
     assert not apart.agrees and apart.value == pytest.approx(0.19) and apart.where == "V = 0.3"
-    assert answer_of(Band(Lost("hws", "ldvs", 2.0), (0.1, 0.3), most=0.0), measured, "walk").agrees
-    assert answer_of(Trend(Lost("hws"), (0.1, 0.3), 1), measured, "walk").agrees
-    assert not answer_of(Trend(Lost("hws"), (0.1, 0.3), -1), measured, "walk").agrees
+    assert answer_of(Band(Losses("hws", "ldvs", 2.0), (0.1, 0.3), most=0.0), measured, "walk").agrees
+    assert answer_of(Trend(Losses("hws"), (0.1, 0.3), 1), measured, "walk").agrees
+    assert not answer_of(Trend(Losses("hws"), (0.1, 0.3), -1), measured, "walk").agrees
 
 
 def test_a_range_whose_ends_are_not_met_is_not_judged():
     measured = {"hws": losses(0.01, 0.2, 0.3)}
-    assert answer_of(Band(Lost("hws"), (0.1, 0.35), most=0.3), measured, "walk")
-    assert Band(Lost("hws"), (0.1, 0.4), most=0.3).answer(measured, "walk") is None
+    assert answer_of(Band(Losses("hws"), (0.1, 0.35), most=0.3), measured, "walk")
+    assert Band(Losses("hws"), (0.1, 0.4), most=0.3).answer(Measured(measured), "walk") is None
     unknown = losses(0.01, 0.2, 0.3)
     unknown.lost[:] = -1
-    assert Band(Lost("hws"), (0.1, 0.3), most=0.3).answer({"hws": unknown}, "walk") is None
+    assert Band(Losses("hws"), (0.1, 0.3), most=0.3).answer(Measured({"hws": unknown}), "walk") is None
 
 
 def test_phases_are_judged_in_the_main_peak_and_the_others_counted():
@@ -70,16 +70,16 @@ def test_phases_are_judged_in_the_main_peak_and_the_others_counted():
     assert main_peak(phases).tolist() == [True, True, True, True, False]
     assert main_peak(np.array([0.99, 0.01, 0.02, 0.5])).tolist() == [True, True, True, False]
     measured = {"hws gaits": gaits(phases)}
-    answer = answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), 0.66, 0.68), measured, "")
+    answer = answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), 0.66, 0.68), measured, "")
     assert answer.agrees and answer.value == pytest.approx(0.67)
-    assert not answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
+    assert not answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
     outside = answer_of(Band(Scatter("hws", "phases"), (0.5, 0.5), 0.0, 0.0), measured, "")
     assert outside.value == pytest.approx(0.2) and not outside.agrees
 
 
 def test_phases_near_0_are_judged_on_the_circle():
     measured = {"hws gaits": gaits(np.array([0.98, 0.99, 0.01, 0.02]))}
-    assert abs(answer_of(Band(Phase("hws", "ipsilateral"), (0.5, 0.5), most=0.1), measured, "").value) < 1e-9
+    assert abs(answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), most=0.1), measured, "").value) < 1e-9
     measured["hws gaits"].phase[:, :, :4] = [0.98, 0.01, 0.02, 0.99]
     spread = answer_of(Band(Scatter("hws", "pairs"), (0.5, 0.5), most=0.1), measured, "")
     assert spread.agrees and spread.value == pytest.approx(0.04)
@@ -90,12 +90,12 @@ def test_an_unstable_regime_need_not_be_periodic():
     measured["hws regimes"].stable[:] = [[True, True, False, False]]
     measured["hws regimes"].periodic[:] = [[True, False, True, False]]
     for fault in ("unstable", "aperiodic"):
-        assert answer_of(Band(Regime("hws", fault), (0.5, 0.5), most=0.5), measured, "").value == 0.5
+        assert answer_of(Band(Faults("hws", fault), (0.5, 0.5), most=0.5), measured, "").value == 0.5
 
 
 def test_a_mean_over_velocities_is_judged_on_the_same_starts():
     measured = {"hws": losses(0.1, 0.1, 0.4), "ldvs": losses(0.2, 0.2, 0.1)}
-    rule = Band(Lost("hws", "ldvs"), (0.1, 0.3), most=0.0, averaged=True)
+    rule = Band(Losses("hws", "ldvs"), (0.1, 0.3), most=0.0, averaged=True)
     answer = answer_of(rule, measured, "walk")
     assert answer.value == pytest.approx(0.1 / 3) and not answer.agrees and answer.where == "V = 0.1, mean to 0.3"
     assert not answer_of(replace(rule, averaged=False), measured, "walk").agrees
@@ -104,9 +104,9 @@ def test_a_mean_over_velocities_is_judged_on_the_same_starts():
 
 def test_a_curve_is_compared_with_another_at_one_velocity():
     measured = {"hws accelerated": losses(0.01, 0.02, 0.05), "hws": losses(0.01, 0.9, 1.0)}
-    answer = answer_of(Band(Lost("hws accelerated", "hws", at=0.1), (0.1, 0.3), -0.02, 0.02), measured, "walk")
+    answer = answer_of(Band(Losses("hws accelerated", "hws", at=0.1), (0.1, 0.3), -0.02, 0.02), measured, "walk")
     assert answer.value == pytest.approx(0.04) and answer.where == "V = 0.3" and not answer.agrees
-    assert Band(Lost("hws", "hws", at=0.05), (0.1, 0.3)).answer(measured, "walk") is None
+    assert Band(Losses("hws", "hws", at=0.05), (0.1, 0.3)).answer(Measured(measured), "walk") is None
 
 
 def test_rare_events_are_compared_with_the_papers_own_sample():
@@ -114,26 +114,28 @@ def test_rare_events_are_compared_with_the_papers_own_sample():
     assert fisher(3, 3, 0, 3) == pytest.approx(0.1)
     assert fisher(1, 100, 0, 100) == fisher(0, 100, 1, 100) == 1.0
     assert fisher(0, 0, 0, 100) == 0.0
-    rule = Seen(Lost("hws"), (0.1, 0.3), 0, 100)
+    rule = Seen(Losses("hws"), (0.1, 0.3), 0, 100)
     assert answer_of(rule, {"hws": losses(0.0, 0.05, 0.0, starts=100)}, "walk").agrees
     answer = answer_of(rule, {"hws": losses(0.0, 0.06, 0.0, starts=100)}, "walk")
     assert not answer.agrees and answer.where == "V = 0.2" and answer.value == pytest.approx(0.06)
 
 
-def test_windows_are_judged_apart():
+def test_observation_times_are_judged_separately():
     lost = losses(0.1, 0.1, 0.1)
     lost.lost.loc[{"observation_time": "start"}] = 0
-    row = judge(Claim("a", "5", "slow", "< 0.05", Band(Lost("hws"), (0.1, 0.3), most=0.05), "why"), {"hws": lost})
-    assert row.verdicts == {"walk": "differs", "start": "agrees"}
-    assert row.fits == "start"
-    assert row.cells[-1] == "why"
+    claim = Claim("a", "5", "slow", "< 0.05", Band(Losses("hws"), (0.1, 0.3), most=0.05), why="why")
+    row = Row(claim, claim.answers(Measured({"hws": lost})))
+    assert {time: verdict(answer) for time, answer in row.answers.items()} == {"walk": "differs", "start": "agrees"}
+    assert (row.fits, row.why) == ("start", "why")
     assert "start 1" in summary([row])[-1]
 
 
-def test_calibrated_claims_are_counted_apart():
-    assert {key for keys in INFERRED_FROM.values() for key in keys} <= {claim.key for claim in CLAIMS}
-    measured, rule = {"hws": losses(0.1, 0.1, 0.1)}, Band(Lost("hws"), (0.1, 0.3), most=0.2)
-    rows = [judge(Claim(key, "5", "slow", "", rule), measured) for key in ("hws-0.4", "hws-slow")]
-    assert [row.kind for row in rows] == ["calibrated", "held out"]
-    assert rows[0].cells[3] == "calibrated: PEP_min; observation time"
-    assert summary(rows)[0].endswith("observation time walk: held out 1 agrees; calibrated 1 agrees")
+def test_calibrated_claims_are_counted_separately():
+    measured, rule = Measured({"hws": losses(0.1, 0.1, 0.1)}), Band(Losses("hws"), (0.1, 0.3), most=0.2)
+    rows = [replace(claims()[key], rule=rule) for key in ("hws-0.4", "hws-slow")]
+    assert [(claim.kind, claim.calibrates) for claim in rows] == [
+        ("calibrated", ("PEP_min", "observation time")),
+        ("held out", ()),
+    ]
+    line = summary([Row(claim, claim.answers(measured)) for claim in rows])[0]
+    assert line.endswith("observation time walk: held out 1 agrees; calibrated 1 agrees")

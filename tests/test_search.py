@@ -1,32 +1,40 @@
-"""A search: it lowers the cost, goes on to the same bits where it was stopped, and believes no damaged file."""
+"""A search lowers the cost, resumes with the same bits, and writes a controller with a verdict on fresh starts."""
 
-import math
-import sys
+import json
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import hexmj
-from hexmj import FieldsForm, NetworkForm, Problem
+from hexmj import Effort, FieldsForm, NetworkForm, Problem
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998
+from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.searched import searched_on
 from hexmj.errors import InputError
+from hexmj.search.forms import named_form
 from hexmj.search.problems import Sample
-from hexmj.search.stages import Effort, search
+from hexmj.search.results import run_search
+from hexmj.search.stages import search
+from hexmj.sweep import CachedValues, Cell
 from pace import Pace
-from tiers import few_of
 
-HWS, LDVS = NetworkForm("hws"), NetworkForm("ldvs")
+HWS = NetworkForm("hws")
 PROBLEM = Problem(HWS, 0.5, 0.5, observation_time="start")
 EFFORT = Effort(budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
+FEW = Effort(budget=30, starts=20, refine_budget=0)
+SMALL: dict[str, Any] = {"budget": 10, "starts": 10, "refine_budget": 0, "verdict_starts": 20}
 
 
-def test_a_search_lowers_the_cost_and_says_what_it_did():
+def test_a_search_lowers_the_cost():
     found = search(PROBLEM, EFFORT)
     history = found.history
     assert set(history.stage.values.tolist()) == {0, 1}
     assert int((history.stage == 0).sum()) == 100
-    sample = Sample(PROBLEM, EFFORT.refine_starts, EFFORT.seed)
-    assert sample.costs(found.vector[None]) == [found.cost]
+    assert Sample(PROBLEM, 200, EFFORT.seed).costs(found.vector[None]) == [found.cost]
     uncoordinated = history.cost.values[0]
     first = history.isel(evaluation=np.argmax(history.stage.values == 1)).cost.item()
     assert found.cost <= first < uncoordinated
@@ -35,137 +43,193 @@ def test_a_search_lowers_the_cost_and_says_what_it_did():
     assert hexmj.plot(history).axes[0].get_lines()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
-@pytest.mark.parametrize("stop", few_of([0.05, 0.3, 0.7], 0.3))
-def test_a_stopped_search_goes_on_to_the_same_bits(tmp_path, algorithm, stop):
-    effort = Effort(algorithm, budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
-    whole = search(PROBLEM, effort)
-    gone = 0.0
+def test_a_stopped_search_resumes_with_the_same_bits(tmp_path: Path, algorithm: Any):
+    effort = replace(EFFORT, algorithm=algorithm)
+    whole, done = search(PROBLEM, effort), 0.0
 
-    def power_cut(done: float) -> None:
-        nonlocal gone
-        gone += done
-        if gone > stop:
+    def stop(fraction: float) -> None:
+        nonlocal done
+        done += fraction
+        if done > 0.3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        search(PROBLEM, effort, folder=tmp_path, progress=power_cut)
+        search(PROBLEM, effort, folder=tmp_path, progress=stop)
     resumed = search(PROBLEM, effort, folder=tmp_path, threads=1)
     assert 0 < resumed.replayed < whole.history.sizes["evaluation"]
-    assert resumed.vector.tobytes() == whole.vector.tobytes()
-    assert resumed.cost == whole.cost
+    assert resumed.vector.tobytes() == whole.vector.tobytes() and resumed.cost == whole.cost
     assert resumed.history.identical(whole.history)
 
 
-def test_a_finished_search_is_reported_without_an_evaluation(tmp_path, monkeypatch):
-    whole = search(PROBLEM, EFFORT, folder=tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-
-    def never(*_: object) -> None:
-        raise AssertionError("walked again")
-
-    monkeypatch.setattr(Sample, "_times", never)
-    again = search(PROBLEM, EFFORT, folder=tmp_path)
-    assert again.history.identical(whole.history)
-    assert again.replayed > 0
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+def test_no_candidate_is_evaluated_twice_unless_the_search_is_fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    whole = search(PROBLEM, FEW, folder=tmp_path)
+    assert whole.replayed == 0
+    longer = search(PROBLEM, replace(FEW, budget=40), folder=tmp_path)
+    assert longer.replayed == len(np.unique(whole.history.candidate.values, axis=0))
+    assert search(PROBLEM, FEW, folder=tmp_path, fresh=True).replayed == 0
+    monkeypatch.setattr(Sample, "_times", lambda *_: pytest.fail("walked again"))
+    assert search(PROBLEM, FEW, folder=tmp_path).history.identical(whole.history)
 
 
-@pytest.mark.thorough
-def test_a_longer_search_goes_on_from_a_shorter_one_and_another_leaves_it_alone(tmp_path):
-    few = Effort(budget=30, starts=20, refine_budget=0)
-    search(PROBLEM, few, folder=tmp_path)
-    (kept,) = tmp_path.iterdir()
-    before = kept.read_bytes()
+def test_another_search_leaves_the_cached_evaluations_alone(tmp_path: Path):
+    search(PROBLEM, FEW, folder=tmp_path)
+    (file,) = tmp_path.iterdir()
+    before = file.read_bytes()
     for problem, effort in (
-        (Problem(HWS, 0.4, 0.5, observation_time="start"), few),
-        (Problem(NetworkForm("hws", "sequential"), 0.5, 0.5, observation_time="start"), few),
-        (PROBLEM, replace(few, starts=21)),
-        (PROBLEM, replace(few, seed=1)),
+        (replace(PROBLEM, low=0.4), FEW),
+        (replace(PROBLEM, form=NetworkForm("hws", "sequential")), FEW),
+        (PROBLEM, replace(FEW, starts=21)),
+        (PROBLEM, replace(FEW, seed=1)),
     ):
         assert search(problem, effort, folder=tmp_path).replayed == 0
-    assert kept.read_bytes() == before
-    assert search(PROBLEM, replace(few, budget=60), folder=tmp_path).replayed == before.count(b"\n") - 1
-    assert kept.read_bytes().startswith(before)
+    assert file.read_bytes() == before
 
 
-def test_only_candidates_of_this_search_count_as_known(tmp_path):
-    first, second = (Effort(one, budget=30, starts=20, refine_budget=0) for one in ("evolution", "cmaes"))
-    rows = [
-        {row.tobytes() for row in search(PROBLEM, one, folder=tmp_path).history.candidate.values}
-        for one in (first, second)
+def squares(rows: np.ndarray, log: str) -> np.ndarray:
+    with Path(log).open("a") as file:
+        file.writelines(f"{row.tolist()}\n" for row in rows)
+    return (rows**2).sum(axis=1) / 3
+
+
+def test_cached_values_have_the_same_bits_and_lose_at_most_a_torn_line(tmp_path: Path):
+    def cached() -> CachedValues:
+        return CachedValues(Cell("squares", squares, {"log": str(tmp_path / "calls")}), tmp_path / "cache")
+
+    rows = np.random.default_rng(1).standard_normal((20, 5))
+    first, direct = cached(), (rows**2).sum(axis=1) / 3
+    values = np.concatenate([first(rows[:7]), first(rows[[3, 8, 8, 9]])[1:], first(rows[10:])])
+    assert values.tobytes() == direct[[*range(7), 8, 8, 9, *range(10, 20)]].tobytes()
+    again = cached()
+    assert again.known == 19 and again(rows).tobytes() == direct.tobytes()
+    assert len((tmp_path / "calls").read_text().splitlines()) == 20
+    (path,) = (tmp_path / "cache").iterdir()
+    path.write_bytes(path.read_bytes()[:-5])
+    torn = cached()
+    assert torn.known == 19 and torn(rows).tobytes() == direct.tobytes() and cached().known == 20
+
+
+@pytest.mark.parametrize("algorithm", ["evolution", "cmaes"])
+def test_what_is_found_is_written_and_judged_on_fresh_starts(tmp_path: Path, algorithm: Any):
+    problem = Problem(HWS, 0.3, 0.6, observation_time="start")
+    result = run_search(problem, Effort(algorithm, **SMALL | {"verdict_starts": 500}), tmp_path)
+    found = hexmj.load_controller(str(tmp_path / "found.toml"))
+    answer = json.loads(json.dumps(result.summary(), default=str))
+    assert found == Cruse1998(hexmj.Symmetric(**answer["found"]), name="found")
+    assert searched_on(str(tmp_path / "found.toml"), found) == {str(tmp_path / "found.toml"): [0]}
+    for name, one in {"found": found, "hws": hexmj.HWS, "ldvs": hexmj.LDVS}.items():
+        flss, interval = hexmj.flss_over_range(one, 0.3, 0.6, n_starts=500, observation_time="start", seed=1998)
+        assert answer["verdict"][name]["start"] == {"flss": flss, "flss_low": interval[0], "flss_high": interval[1]}
+        assert "walk" in answer["verdict"][name]
+    history = xr.load_dataset(tmp_path / "history.nc")
+    assert history.best.values[-1] == answer["cost"]
+    assert json.loads(history.attrs["settings"])["effort"]["algorithm"] == algorithm
+    assert all(path.stat().st_size for path in result.files)
+
+
+def test_the_command_reports_a_finished_search_again(run: Any, tmp_path: Path):
+    words = [
+        "search",
+        "--form",
+        "hws",
+        "--velocity",
+        0.3,
+        0.6,
+        "--observation-time",
+        10,
+        "--starts",
+        10,
+        "--budget",
+        10,
     ]
-    (kept,) = tmp_path.iterdir()
-    kept.write_text("".join(kept.read_text().splitlines(keepends=True)[: 1 + len(rows[0])]))
-    assert search(PROBLEM, second, folder=tmp_path).replayed == len(rows[0] & rows[1]) < len(rows[1]) / 2
+    words += ["--ties", "later", "--refine-budget", 0, "--verdict-starts", 20, "--out", tmp_path]
+    code, text, _ = run(*words, "--json")
+    answer = json.loads(text)
+    assert code == 0 and answer["replayed"] == 0
+    code, text, _ = run(*words)
+    assert code == 0 and f"{answer['evaluations']} evaluations, " in text
+    assert json.loads((tmp_path / "manifest.json").read_text())["settings"] == answer["settings"]
 
 
-def test_evaluations_of_which_nobody_knows_what_they_are_are_refused_and_left_alone(tmp_path):
-    effort = Effort(budget=30, starts=20, refine_budget=0)
-    whole = search(PROBLEM, effort, folder=tmp_path)
-    (kept,) = tmp_path.iterdir()
-    lines = kept.read_text().splitlines(keepends=True)
-    kept.write_text("".join([*lines[:5], lines[5][:-4], *lines[6:]]))  # a damaged line is evaluated again
-    again = search(PROBLEM, effort, folder=tmp_path)
-    assert again.history.identical(whole.history)
-    assert again.replayed < len(lines) - 1
-    kept.write_text("precious")
-    with pytest.raises(InputError, match="is damaged, or of another search"):
-        search(PROBLEM, effort, folder=tmp_path)
-    assert kept.read_text() == "precious"
+@pytest.mark.slow
+def test_a_physical_search_counts_falls(tmp_path: Path):
+    conditions = hexmj.Conditions(vp=200.0)
+    problem = Problem(NetworkForm("mirrored"), 0.9, 0.9, 5.0, conditions=conditions, feedback=True)
+    effort = Effort(begin="ldvs", population=2, budget=2, starts=2, refine_budget=0, verdict_starts=4)
+    answer = run_search(problem, effort, tmp_path).summary()
+    found = hexmj.SensoryFeedback(hexmj.load_controller(str(tmp_path / "found.toml")))
+    fell = hexmj.physical_flss(found, [0.9], n_starts=4, observation_time=5.0, seed=1998, conditions=conditions)
+    assert answer["verdict"]["found"]["5.0"]["flss"] == fell.flss.item()
 
 
-def test_without_cmaes_it_is_said_what_brings_it(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "cmaes", None)
-    assert Effort().algorithm == "evolution"
-    with pytest.raises(InputError, match=r'pip install "\.\[search\]"'):
-        Effort("cmaes")
+def test_another_controller_is_searched_by_name_and_searched_on(tmp_path: Path):
+    """The search continues from what an earlier one found, with its other fields."""
+    (tmp_path / "begun.toml").write_text('controller = "pace:Pace"\n[fields]\ngood = 2.5\nname = "paced"\n')
+    problem = Problem(named_form(str(tmp_path / "begun.toml")), 0.4, 0.4, 5.0)
+    effort = Effort(**SMALL, seed=1)
+    result = run_search(problem, effort, tmp_path)
+    found = hexmj.load_controller(str(tmp_path / "found.toml"))
+    assert found == Pace(*result.found.vector.tolist(), name="paced")
+    assert result.found.history.candidate.values[0].tolist() == [2.5, -0.5]
+    assert result.verdict.controller.values.tolist() == ["found", "usual"]
+    again = Problem(named_form(str(tmp_path / "found.toml")), 0.4, 0.4, 5.0)
+    with pytest.raises(InputError, match="begins with"):
+        run_search(again, replace(effort, seed=2), tmp_path)
+    with pytest.raises(InputError, match="verdict_seed"):
+        run_search(again, replace(effort, seed=2, verdict_seed=1), tmp_path / "again")
+    run_search(again, replace(effort, seed=2), tmp_path / "again")
+    name = str(tmp_path / "again" / "found.toml")
+    assert searched_on(name, hexmj.load_controller(name)) == {name: [1, 2]}
 
 
 @pytest.mark.parametrize(
-    ("make", "sentence"),
+    ("begin", "seed"), [("own-0.4-without-3", 0), ("robust-0.3", 5), ("mine.toml-without-3", 7), (None, 1)]
+)
+def test_verdict_starts_of_an_earlier_search_are_refused(tmp_path, monkeypatch, begin, seed):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(f"searched = {{ seeds = [7] }}\n{network_toml(hexmj.LDVS)}")
+    problem = Problem(NetworkForm("mirrored"), 0.4, 0.4, 5.0)
+    with pytest.raises(InputError, match="verdict_seed"):
+        run_search(problem, Effort(**SMALL, begin=begin, seed=1, verdict_seed=seed), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_search_keeps_order_and_model_variant_of_its_beginning(tmp_path: Path):
+    begin = hexmj.PRESETS["lasting-0.3"]
+    for given, expected in ((None, "lasting"), (MODEL_VARIANTS["printed"], "printed")):
+        form = named_form("mirrored", begin, model_variant=given)
+        run_search(Problem(form, 0.3, 0.3, 5.0), Effort(**SMALL, begin="lasting-0.3"), tmp_path / expected)
+        found = hexmj.load_controller(str(tmp_path / expected / "found.toml"))
+        assert isinstance(found, Cruse1998) and found.model_variant == MODEL_VARIANTS[expected]
+    form = named_form("hws", replace(hexmj.HWS, order="sequential"))
+    cost = search(Problem(form, 0.4, 0.4, "start"), Effort(**SMALL | {"starts": 300}, begin="hws")).history.cost
+    lost = hexmj.first_loss(hexmj.draw_starts(300, 0), replace(hexmj.HWS, order="sequential"), 0.4, 40.0)
+    assert cost.values[0] == np.isfinite(lost).mean()
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
     [
-        (lambda: Problem(HWS, 0.5, 0.1), "expected 0 <= low <= high < 1"),
-        (lambda: Problem(HWS, 0.5, 1.0), "expected 0 <= low <= high < 1"),
-        (lambda: Problem(HWS, -0.1, 0.5), "expected 0 <= low <= high < 1"),
-        (lambda: Problem(HWS, math.nan, 0.5), "expected 0 <= low <= high < 1"),
-        (lambda: Problem(HWS, 0.0, 0.5), "has no period"),
-        (lambda: NetworkForm("lvds"), "valid names: hws, ldvs"),  # pyright: ignore[reportArgumentType]
-        (lambda: NetworkForm("hws", "x"), "valid names: printed, undelayed"),  # pyright: ignore[reportArgumentType]
-        (lambda: Problem(HWS, 0.5, 0.5, feedback=True), "feedback without conditions"),
-        (lambda: Effort(budget=0), "at least one generation, 10 evaluations"),
-        (lambda: Effort("annealing"), "valid names: evolution, cmaes"),  # pyright: ignore[reportArgumentType]
-        (lambda: Effort(refine_budget=-1), "expected 0 or more"),
-        (lambda: search(PROBLEM, Effort(population=0)), "population = 0; expected a whole number of at least 2"),
-        (lambda: Effort("cmaes", population=3), "population = 3; expected a whole number of at least 4"),
-        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain = 0.0; expected above 0 and at most 1e.06"),
-        (lambda: search(PROBLEM, Effort(starts=0)), "starts = 0; expected"),
-        (lambda: search(PROBLEM, Effort(refine_starts=0)), "starts = 0; expected"),
-        (lambda: search(PROBLEM, Effort(seed=-1)), "seed = -1; expected"),
+        (lambda: Problem(HWS, 0.5, 0.1), "velocity"),
+        (lambda: Problem(HWS, 0.5, 1.0), "velocity"),
+        (lambda: Problem(HWS, 0.0, 0.5), "velocity"),
+        (lambda: Problem(hexmj.HWS, 0.4, 0.5), "form"),  # pyright: ignore[reportArgumentType]
+        (lambda: Problem(HWS, 0.5, 0.5, feedback=True), "feedback"),
+        (lambda: Problem(FieldsForm(Pace()), 0.5, 0.5, over="mean"), "over"),
+        (lambda: NetworkForm("lvds"), "form"),  # pyright: ignore[reportArgumentType]
+        (lambda: NetworkForm("hws", "x"), "order"),  # pyright: ignore[reportArgumentType]
+        (lambda: Effort(budget=0), "budget"),
+        (lambda: Effort("annealing"), "algorithm"),  # pyright: ignore[reportArgumentType]
+        (lambda: Effort("cmaes", population=3), "population"),
+        (lambda: Effort(refine_starts=0), "refine_starts"),
+        (lambda: Effort(seed=-1), "seed"),
+        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain"),
+        (lambda: search(PROBLEM, Effort(begin=Pace())), "begin"),
+        (lambda: search(PROBLEM, Effort(begin="ldvs")), "begin"),
+        (lambda: named_form("nothing"), "form"),
+        (lambda: named_form("wilson", order="sequential"), "order"),
     ],
 )
-def test_nonsense_gets_a_sentence(make, sentence):
-    with pytest.raises(InputError, match=sentence):
+def test_bad_input_is_refused(make: Any, name: str):
+    with pytest.raises(InputError, match=name):
         make()
-
-
-def test_what_has_no_such_parameters_is_refused():
-    with pytest.raises(InputError, match="uncoordinated has no field of the type float"):
-        FieldsForm(hexmj.UNCOORDINATED)
-    with pytest.raises(InputError, match="ldvs to begin with; expected a Pace"):
-        search(Problem(FieldsForm(Pace()), 0.4, 0.4), Effort(begin=hexmj.LDVS))
-    with pytest.raises(InputError, match="pace is not made of weights alone"):
-        search(PROBLEM, Effort(begin=Pace()))
-
-
-def test_a_set_walks_by_its_own_rules_where_a_search_begins_with_it():
-    """One that walks as printed begins searches by other rules, too."""
-    weights = hexmj.NetworkForm("mirrored").vector(hexmj.PRESETS["own-0.3"])
-    assert np.array_equal(hexmj.NetworkForm("mirrored", order="sequential").vector(hexmj.PRESETS["own-0.3"]), weights)
-    with pytest.raises(
-        InputError, match=r"^lasting-0.3 to begin with has reading = lasting; expected printed, as of wh"
-    ):
-        search(Problem(hexmj.NetworkForm("mirrored"), 0.4, 0.4), Effort(begin=hexmj.PRESETS["lasting-0.3"]))
-    with pytest.raises(InputError, match=r"^ldvs to begin with has order = sequential; expected undelayed, as of what"):
-        hexmj.NetworkForm("ldvs", order="undelayed").vector(replace(hexmj.LDVS, order="sequential"))

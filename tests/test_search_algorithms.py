@@ -8,10 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexmj import NetworkForm, Problem
-from hexmj.search.algorithms import CovarianceAdaptation
-from hexmj.search.algorithms import Domain
-from hexmj.search.algorithms import SIGMA, Evolution, mutated, selection_probabilities
-from hexmj.search.algorithms import refine, search_population as run
+from hexmj.search.algorithms import (
+    SIGMA,
+    CovarianceAdaptation,
+    Domain,
+    Evolution,
+    mutated,
+    refine,
+    selection_probabilities,
+)
+from hexmj.search.algorithms import search_population as run
 
 TARGET = np.array([3.0, -2.0, 0.0, 6.0, 0.5, 1.0])
 """Where the test cost is least: real numbers but for parameters 2 (0) and 5 (1), which are binary."""

@@ -1,4 +1,4 @@
-"""What a candidate costs: FLSS on the same starts, on paper or in physics, with ties or without."""
+"""The cost of a candidate is its FLSS on the same starts, kinematic or physical, with ties or without."""
 
 import time
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ import pytest
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
 from hexmj.controllers import Step, stepwise
-from hexmj.search.results import convergence_figure
 from hexmj.search.forms import FORMS
 from hexmj.search.problems import Sample
+from hexmj.search.results import convergence_figure
 from hexmj.search.stages import Effort, search
 from pace import Pace
 
@@ -30,7 +30,9 @@ def test_the_cost_is_the_flss_of_the_same_starts(observation_time, order):
         expected = hexmj.flss(controller, [0.4], n_starts=300, observation_time=observation_time, seed=5).flss.item()
         assert one.costs(vector[None]) == [expected]
         some = Sample(Problem(form, 0.2, 0.6, observation_time), 300, 5)
-        expected, _ = hexmj.flss_over_range(controller, 0.2, 0.6, n_starts=300, observation_time=observation_time, seed=5)
+        expected, _ = hexmj.flss_over_range(
+            controller, 0.2, 0.6, n_starts=300, observation_time=observation_time, seed=5
+        )
         assert some.costs(vector[None]) == [expected]
         verdict = some.verdict({"one": controller})
         assert verdict.flss.sel(controller="one", observation_time=str(observation_time)) == expected
@@ -58,7 +60,10 @@ def test_the_physical_cost_is_the_physical_flss(feedback):
     if not feedback:
         verdict = sample.verdict({"ldvs": walked}).flss.sel(controller="ldvs")
         assert verdict.sel(observation_time="start") == expected
-        assert verdict.sel(observation_time="walk") == hexmj.physical_flss(walked, [0.6], observation_time="walk", **how).flss.item()
+        assert (
+            verdict.sel(observation_time="walk")
+            == hexmj.physical_flss(walked, [0.6], observation_time="walk", **how).flss.item()
+        )
 
 
 SCRATCH = np.zeros(1)

@@ -232,6 +232,7 @@ class Sample:
             InputError: its controller refuses to walk, or no leg reaches its targets.
             SimulationError: a start's simulation fails.
         """
+        self.settle(threads)
         for one in self.variants.values():
             try:
                 one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
