@@ -128,21 +128,9 @@ def test_what_is_found_is_written_and_judged_on_fresh_starts(tmp_path: Path, alg
 
 
 def test_the_command_reports_a_finished_search_again(run: Any, tmp_path: Path):
-    words = [
-        "search",
-        "--form",
-        "hws",
-        "--velocity",
-        0.3,
-        0.6,
-        "--observation-time",
-        10,
-        "--starts",
-        10,
-        "--budget",
-        10,
-    ]
-    words += ["--ties", "later", "--refine-budget", 0, "--verdict-starts", 20, "--out", tmp_path]
+    sizes = "--starts 10 --budget 10 --refine-budget 0 --verdict-starts 20"
+    line = f"search --form hws --velocity 0.3 0.6 --observation-time 10 --ties later {sizes}"
+    words = [*line.split(), "--out", tmp_path]
     code, text, _ = run(*words, "--json")
     answer = json.loads(text)
     assert code == 0 and answer["replayed"] == 0
