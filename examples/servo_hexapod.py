@@ -4,7 +4,7 @@ Lengths, masses and ranges come from a public description of the PhantomX (HumaR
 feet's positions, servos and ground are ours.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import acos, atan2, hypot
 from pathlib import Path
 from typing import Any
@@ -134,7 +134,7 @@ class Larger:
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
         """Begin a plan, see `hexmj.controllers.Controller`; sensory feedback is not supported."""
         small = {name: getattr(stride, name) / self.times for name in ("aep0", "pep0", "pep_min", "dt")}
-        lines = {name: tuple(np.divide(ends, self.times).tolist()) for name, ends in vars(stride.geometry).items()}
+        lines = {name: tuple(np.divide(ends, self.times).tolist()) for name, ends in asdict(stride.geometry).items()}
         small["geometry"] = Geometry(**lines)
         faster = acceleration and replace(acceleration, rate=acceleration.rate * self.times)
         plan = self.of.begin(starts / self.times, velocity, replace(stride, **small), faster, threads)

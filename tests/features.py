@@ -47,7 +47,8 @@ RENAMED: dict[str, str] = {
     "n_tried": "trial_starts",
     "tried_at": "trial_velocity",
 }  # key, file name or text in the reference -> its new name
-IGNORED = {"settings", "replayed", "looks", "margin"}  # keys and file names that are not compared; see `walk settings`
+# Keys and file names that are not compared; see `walk settings`.
+IGNORED = {"settings", "replayed", "variants.py", "model_variants.py"}
 TOLERANCE = {"rel_tol": 1e-4, "abs_tol": 1e-6}  # of floating-point numbers
 LONGEST = 12  # longer arrays of numbers are stored as a summary
 COARSE = hexmj.Stride(dt=0.5)
@@ -186,8 +187,7 @@ def kinematic(*models: str) -> Any:
 
 
 def wrappers() -> Any:
-    from hexmj.controllers.wrappers import LegLost
-    from hexmj.controllers.wrappers import PoorSenses
+    from hexmj.controllers.wrappers import LegLost, PoorSenses
 
     feedback = hexmj.SensoryFeedback(hexmj.LDVS)
     wrapped = {"feedback": feedback, "lost leg": LegLost(hexmj.LDVS, 1)}
