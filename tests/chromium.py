@@ -23,51 +23,51 @@ OPTIONS = (
 )  # fmt: skip
 
 OFF = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
-"""No name is found, so nothing but this machine is reached."""
+"""Resolve no names, so that only this machine can be reached."""
 
 PATIENCE = 120.0
-"""How long an answer may take [s]."""
+"""Longest time until an answer [s]."""
 
 
 class Tab:
-    """A page that is open, with all that it asked for and complained about."""
+    """An open page, its requests and its errors."""
 
     def __init__(self, socket: Connection, session: str) -> None:
         self.requests: list[str] = []
         self.complaints: list[str] = []
         self._socket, self._session, self._asked = socket, session, 0
 
-    def call(self, method: str, **given: Any) -> dict[str, Any]:
-        """Call a method of the protocol, and take in what happened until it answers."""
+    def call(self, method: str, **options: Any) -> dict[str, Any]:
+        """Call a method of the protocol and record events until its answer."""
         self._asked += 1
-        asked = {"id": self._asked, "sessionId": self._session, "method": method, "params": given}
+        asked = {"id": self._asked, "sessionId": self._session, "method": method, "params": options}
         self._socket.send(json.dumps(asked))
         while True:
-            told = json.loads(self._socket.recv(timeout=PATIENCE))
-            if told.get("id") == self._asked and told.get("sessionId") == self._session:
-                assert "error" not in told, told
-                return told["result"]
-            self._take(told.get("method", ""), told.get("params", {}))
+            answer = json.loads(self._socket.recv(timeout=PATIENCE))
+            if answer.get("id") == self._asked and answer.get("sessionId") == self._session:
+                assert "error" not in answer, answer
+                return answer["result"]
+            self._take(answer.get("method", ""), answer.get("params", {}))
 
-    def _take(self, method: str, told: dict[str, Any]) -> None:
+    def _take(self, method: str, answer: dict[str, Any]) -> None:
         if method == "Network.requestWillBeSent":
-            self.requests.append(told["request"]["url"])
+            self.requests.append(answer["request"]["url"])
         elif method == "Runtime.exceptionThrown":
-            details = told["exceptionDetails"]
+            details = answer["exceptionDetails"]
             self.complaints.append(details.get("exception", details).get("description", details["text"]))
         elif method == "Log.entryAdded":
-            self.complaints.append(told["entry"]["text"])
+            self.complaints.append(answer["entry"]["text"])
 
     def open(self, address: str) -> None:
-        """Open an address, and wait until it is loaded."""
+        """Open an address and wait until it is loaded."""
         self.call("Page.navigate", url=address)
         self.wait("document.readyState === 'complete'")
 
     def value(self, script: str) -> Any:
-        """What an expression of JavaScript, or what it promises, is."""
-        told = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
-        assert "exceptionDetails" not in told, told["exceptionDetails"]
-        return told["result"].get("value")
+        """Return the value of an expression of JavaScript or of its promise."""
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
 
     def wait(self, script: str, seconds: float = PATIENCE) -> None:
         """Wait until an expression is true."""
@@ -78,30 +78,25 @@ class Tab:
         }})"""
         self.value(poll)
 
-    def resize(self, width: int, height: int, phone: bool = False, dark: bool = False) -> None:
-        """Give the page a screen of so many pixels."""
-        scale = 2 if phone else 1
-        self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone
-        )
-        self.call("Emulation.setTouchEmulationEnabled", enabled=phone)
-        theme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[theme])
+    def resize(self, width: int, height: int) -> None:
+        """Set the size of the screen [pixels]."""
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **metrics)
 
     def press(self, key: str) -> None:
-        """Press a key and let it go."""
+        """Press and release a key."""
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code="Space" if key == " " else key)
 
     def screenshot(self, path: Path) -> Path:
-        """What is seen, as PNG."""
+        """Write a screenshot as PNG."""
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
         return path
 
 
 @contextmanager
 def tab() -> Iterator[Tab]:
-    """An empty page of a Chromium of its own; the test is skipped where there is none."""
+    """Open an empty page in a new Chromium; skip the test if there is none."""
     program = next((found for name in NAMES if (found := shutil.which(name))), None)
     if program is None:
         pytest.skip("needs Chromium: `make browser` installs it")
@@ -114,11 +109,11 @@ def tab() -> Iterator[Tab]:
             with connect(next(lines).split()[-1], max_size=None) as socket:
                 socket.send(json.dumps({"id": 0, "method": "Target.createTarget", "params": {"url": "about:blank"}}))
                 target = json.loads(socket.recv(timeout=PATIENCE))["result"]["targetId"]
-                given = {"targetId": target, "flatten": True}
-                socket.send(json.dumps({"id": 0, "method": "Target.attachToTarget", "params": given}))
-                while "result" not in (told := json.loads(socket.recv(timeout=PATIENCE))):
+                options = {"targetId": target, "flatten": True}
+                socket.send(json.dumps({"id": 0, "method": "Target.attachToTarget", "params": options}))
+                while "result" not in (answer := json.loads(socket.recv(timeout=PATIENCE))):
                     pass
-                opened = Tab(socket, told["result"]["sessionId"])
+                opened = Tab(socket, answer["result"]["sessionId"])
                 for domain in ("Page", "Runtime", "Network", "Log"):
                     opened.call(f"{domain}.enable")
                 yield opened

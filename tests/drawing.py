@@ -1,4 +1,4 @@
-"""Tests that draw: left out where nothing can be rendered, but by CI, which has to be able to."""
+"""Mark of tests that draw: they are skipped if nothing can be rendered, except in CI."""
 
 import os
 

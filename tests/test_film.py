@@ -110,14 +110,6 @@ def test_a_film_of_two_has_them_side_by_side_with_one_clock(plan, fallen, tmp_pa
 
 
 @drawing
-def test_a_title_that_the_font_lacks_is_a_warning(fallen, tmp_path):
-    boxes, plain = (fallen.assign_attrs(title=title) for title in ("三角 A 三", "Schräg, Ωmega"))
-    with pytest.warns(UserWarning, match="三角 ") as warned:
-        render([boxes, plain, boxes], tmp_path / "film.mp4", replace(SMALL, fps=5.0))
-    assert len(warned) == 1
-
-
-@drawing
 def test_a_film_of_a_part_shows_the_frames_of_the_whole_film(fallen, tmp_path):
     film, part = replace(SMALL, slow_motion=5.0), fallen.isel(step=slice(80, 160))  # from 0.1 to 0.2 s
     frames = 15  # 0.1 s * 5 * 30

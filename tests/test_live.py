@@ -190,10 +190,10 @@ class Choosy:
 
     name: str = "choosy"
 
-    def begin(self, starts, velocity, *rest):
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
         if np.isin(starts[:, 0], [STARTS[1][0], STARTS[2][0]]).any():
             raise InputError("choosy refuses")
-        return LDVS.begin(starts, velocity, *rest)
+        return LDVS.begin(starts, velocity, stride, acceleration, threads)
 
 
 def test_starts_that_cannot_be_walked_are_skipped_with_a_message():

@@ -12,7 +12,6 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
-import numpy as np
 import pytest
 
 from chromium import tab
@@ -23,7 +22,7 @@ from hexmj.errors import InputError
 from hexmj.measures.physical import physical_walk
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
-from hexmj.view.browser import BrowserView, check_port, footfall, page_server
+from hexmj.view.browser import BrowserView, check_port, page_server
 from hexmj.view.live import LiveWalk
 from hexmj.view.session import LiveSession
 
@@ -49,12 +48,6 @@ def until(view: BrowserView, done: Callable[[], bool]) -> None:
         view.step(0.02)
 
 
-def test_the_footfall_diagram_has_a_bar_for_every_swing():
-    off = np.zeros((100, 6), dtype=bool)
-    off[10:20, 0] = off[40:60, 0] = off[90:, 5] = True
-    assert footfall(np.arange(1, 101) / 80, off).count("<rect") == 3
-
-
 def test_the_page_is_served_and_its_sliders_change_the_walk(view):
     with urlopen(view.address) as answer:
         assert answer.status == 200
@@ -76,6 +69,7 @@ def test_the_page_is_served_and_its_sliders_change_the_walk(view):
     until(view, lambda: walk.conditions.vp == 120.0)
     assert walk.moment.seconds < seconds
     assert "margin" in view._readout.content
+    assert "<rect" in view._footfall.content
 
 
 @pytest.mark.parametrize(("velocity", "vp"), [(0.97, 10.0), (0.345, 1000.0)])

@@ -1,7 +1,7 @@
-"""What is seen of a compiled body and of its ground, as triangles."""
+"""The visible parts of a compiled body and of its ground as triangles."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -10,23 +10,22 @@ from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import BUMPS, ground_level
 
 AROUND, RINGS = 14, 4
-"""Corners around a round thing, and rings of each of its ends."""
+"""Corners around a round geom, and rings of each of its ends."""
 
-UNTOLD = (0.5, 0.5, 0.5, 1.0)
-"""The colour of a geom that has none of its own."""
+UNSET_COLOUR = (0.5, 0.5, 0.5, 1.0)
+"""Colour of a geom without a colour of its own."""
 
-SEEN = 3
-"""Groups of geoms below this are shown, as MuJoCo's own renderer has it."""
+VISIBLE_GROUPS = 3
+"""Number of the first groups of geoms, which MuJoCo's renderer shows."""
 
-FINE = 8
+PER_BUMP = 8
 """Points of the ground's surface from one bump to the next."""
 
 KINDS = mujoco.mjtGeom
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """Triangles, each of a body that moves as a whole."""
+class Shape(NamedTuple):
+    """Triangles; each belongs to a body."""
 
     corners: np.ndarray
     """(corner, 3) in the frame of its body [mm]."""
@@ -41,38 +40,35 @@ class Shape:
 
 
 def body_shape(model: mujoco.MjModel) -> Shape:
-    """All that moves."""
-    return joined(geom_shape(model, i) for i in range(model.ngeom) if model.geom_bodyid[i] and _seen(model, i))
+    """Return the shape of all moving bodies."""
+    return joined(geom_shape(model, i) for i in range(model.ngeom) if model.geom_bodyid[i] and _visible(model, i))
 
 
 def ground_shape(compiled: CompiledBody) -> Shape:
-    """What lies on the plane or ahead of the feet, without the plane itself."""
+    """Return the shape of the obstacles on the plane or ahead of the feet, without the plane."""
     model, conditions = compiled.model, compiled.conditions
-    lengths = conditions.body.lengths
-    laid = (i for i in range(model.ngeom) if not model.geom_bodyid[i] and model.geom_type[i] == KINDS.mjGEOM_BOX)
-    shapes = [geom_shape(model, i) for i in laid]
+    boxes = (i for i in range(model.ngeom) if not model.geom_bodyid[i] and model.geom_type[i] == KINDS.mjGEOM_BOX)
+    shapes = [geom_shape(model, i) for i in boxes]
     if conditions.ground == "rough":
-        spacing, margin = lengths.bump_spacing, lengths.highest_bump
+        spacing, margin = conditions.body.lengths.bump_spacing, conditions.body.lengths.highest_bump
         along, across = (spacing * (count - 1) + 2 * margin for count in BUMPS)
-        x, y = (np.arange(0.0, length + spacing / FINE, spacing / FINE) for length in (along, across))
+        x, y = (np.arange(0.0, length + spacing / PER_BUMP, spacing / PER_BUMP) for length in (along, across))
         places = np.stack(np.meshgrid(x + conditions.ground_at, y - across / 2, indexing="ij"), axis=-1)
-        shapes.append(surface(places, ground_level(conditions, places)))
+        shapes.append(_surface(places, ground_level(conditions, places)))
     return joined(shapes)
 
 
 def joined(shapes: Iterable[Shape]) -> Shape:
-    """One shape of several; of none, one without corners."""
-    none, nothing = np.empty((0, 3)), np.empty(0, int)
-    every = [Shape(none, none, none.astype(int), none, nothing)]
-    every += shapes
-    first = np.cumsum([0, *(len(one.corners) for one in every[:-1])])
-    faces = np.concatenate([one.faces + n for one, n in zip(every, first, strict=True)])
-    rest = {name: np.concatenate([getattr(one, name) for one in every]) for name in vars(every[0]) if name != "faces"}
-    return Shape(faces=faces, **rest)
+    """Join shapes into one; without any, it has no corners."""
+    empty = np.empty((0, 3))
+    parts = [Shape(empty, empty, empty.astype(int), empty, np.empty(0, int)), *shapes]
+    first = np.cumsum([0, *(len(part.corners) for part in parts[:-1])])
+    faces = np.concatenate([part.faces + n for part, n in zip(parts, first, strict=True)])
+    return Shape(*map(np.concatenate, zip(*parts, strict=True)))._replace(faces=faces)
 
 
 def geom_shape(model: mujoco.MjModel, geom: int) -> Shape:
-    """One geom; of a kind without an outline of its own, such as a plane, nothing."""
+    """Return the shape of one geom; it is empty for a plane."""
     kind, size = KINDS(model.geom_type[geom]), model.geom_size[geom]
     if kind in (KINDS.mjGEOM_SPHERE, KINDS.mjGEOM_CAPSULE, KINDS.mjGEOM_CYLINDER, KINDS.mjGEOM_ELLIPSOID):
         corners, normals, faces = _round(kind, size)
@@ -84,18 +80,13 @@ def geom_shape(model: mujoco.MjModel, geom: int) -> Shape:
         return joined([])
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    turn = turn.reshape(3, 3)
-    return Shape(
-        corners=corners @ turn.T + model.geom_pos[geom],
-        normals=normals @ turn.T,
-        faces=faces,
-        colour=np.tile(_rgba(model, geom)[:3], (len(corners), 1)),
-        body=np.full(len(corners), model.geom_bodyid[geom]),
-    )
+    turn = turn.reshape(3, 3).T
+    colour, body = np.tile(_rgba(model, geom)[:3], (len(corners), 1)), np.full(len(corners), model.geom_bodyid[geom])
+    return Shape(corners @ turn + model.geom_pos[geom], normals @ turn, faces, colour, body)
 
 
-def surface(places: np.ndarray, height: np.ndarray) -> Shape:
-    """The ground at places on a grid, (i, j, 2), where its height, (i, j), is above 0 [mm]."""
+def _surface(places: np.ndarray, height: np.ndarray) -> Shape:
+    """Return the ground at places on a grid, (i, j, 2), where its height, (i, j), is above 0 [mm]."""
     corners = np.concatenate([places, height[..., None]], axis=-1).reshape(-1, 3)
     slopes = np.gradient(height, places[:, 0, 0], places[0, :, 1])
     normals = np.stack([-slopes[0], -slopes[1], np.ones_like(height)], axis=-1).reshape(-1, 3)
@@ -105,18 +96,18 @@ def surface(places: np.ndarray, height: np.ndarray) -> Shape:
     return Shape(corners, unit, faces, np.zeros_like(corners), np.zeros(len(corners), int))
 
 
-def _seen(model: mujoco.MjModel, geom: int) -> bool:
-    return bool(model.geom_group[geom] < SEEN and _rgba(model, geom)[3] > 0)
+def _visible(model: mujoco.MjModel, geom: int) -> bool:
+    return bool(model.geom_group[geom] < VISIBLE_GROUPS and _rgba(model, geom)[3] > 0)
 
 
 def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """As MuJoCo draws it: in its material's colour unless it has one of its own."""
+    """Colour as MuJoCo draws it: that of the material if the geom has none of its own."""
     material, own = model.geom_matid[geom], model.geom_rgba[geom]
-    return model.mat_rgba[material] if material >= 0 and (own == UNTOLD).all() else own
+    return model.mat_rgba[material] if material >= 0 and (own == UNSET_COLOUR).all() else own
 
 
 def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, normals and faces of what is round about its z axis: a profile, turned."""
+    """Corners, normals and faces of a geom that is round about its z axis: a profile (radius, z), turned."""
     rise = np.linspace(-np.pi / 2, 0.0, RINGS + 1)
     if kind == KINDS.mjGEOM_CYLINDER:
         radius, z = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 0.0]), np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
@@ -128,18 +119,17 @@ def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarr
         scale = size if kind == KINDS.mjGEOM_ELLIPSOID else (size[0],) * 3
         length = size[1] if kind == KINDS.mjGEOM_CAPSULE else 0.0
     angle = np.linspace(0.0, 2 * np.pi, AROUND + 1)
-    way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    corners = _turned(radius, z, way) * scale
+
+    def turned(out: np.ndarray, up: np.ndarray) -> np.ndarray:
+        """Turn a profile, (ring,) outwards and upwards, about the z axis, (ring, corner, 3)."""
+        return np.stack(
+            np.broadcast_arrays(np.outer(out, np.cos(angle)), np.outer(out, np.sin(angle)), up[:, None]), -1
+        )
+
+    corners, normals = turned(radius, z) * scale, turned(out, up) / scale
     corners[..., 2] += np.where(np.arange(len(z)) < len(z) // 2, -length, length)[:, None]
-    normals = _turned(out, up, way) / scale
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     return corners.reshape(-1, 3), normals.reshape(-1, 3), _lattice(len(z), len(angle))[:, ::-1]
-
-
-def _turned(out: np.ndarray, up: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """A profile, (ring,) outwards and upwards, turned into directions on the plane, (corner, 2): (ring, corner, 3)."""
-    upwards = np.broadcast_to(up[:, None, None], (len(up), len(way), 1))
-    return np.concatenate([out[:, None, None] * way, upwards], axis=-1)
 
 
 def _lattice(rows: int, columns: int) -> np.ndarray:
@@ -151,19 +141,15 @@ def _lattice(rows: int, columns: int) -> np.ndarray:
 
 def _box(size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners, normals and faces of a box by its half sizes."""
-    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    corners, normals = [], []
-    for axis in range(3):
-        for side in (-1, 1):
-            one = np.insert(square[::side], axis, side, axis=1) if axis != 1 else np.insert(square[::-side], 1, side, 1)
-            corners.append(one * size)
-            normals.append(np.tile(side * np.eye(3)[axis], (4, 1)))
-    quarters = 4 * np.arange(6)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
-    return np.concatenate(corners), np.concatenate(normals), quarters.reshape(-1, 3)
+    square, sides = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), [(a, side) for a in range(3) for side in (-1, 1)]
+    corners = [np.roll(np.column_stack([np.full(4, side), square[::side]]), a, axis=1) for a, side in sides]
+    normals = [np.tile(side * np.eye(3)[a], (4, 1)) for a, side in sides]
+    faces = 4 * np.arange(6)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
+    return np.concatenate(corners) * size, np.concatenate(normals), faces.reshape(-1, 3)
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, normals and faces of a mesh; corners of different normals are different ones."""
+    """Corners, normals and faces of a mesh; corners with different normals are different corners."""
     rows = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     pairs = np.stack([model.mesh_face[rows], model.mesh_facenormal[rows]], axis=-1).reshape(-1, 2)
     distinct, faces = np.unique(pairs, axis=0, return_inverse=True)

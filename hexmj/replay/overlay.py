@@ -1,12 +1,10 @@
 """Overlay of a film: a caption above, a scale, and a footfall diagram that grows below."""
 
-from functools import cache, lru_cache
-from math import floor
+from functools import cache
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from matplotlib.ft2font import FT2Font
 from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
@@ -59,28 +57,29 @@ class Overlay:
 
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
         """Draw the scale, a bar of a round length at the centre of mass, and the legend of the diagram."""
-        image, size, edge = Image.fromarray(background), self._pixels(11), self._pixels(10)
-        middle = image.height // 2
+        image, font, edge = Image.fromarray(background), _font(self._pixels(11)), self._pixels(10)
+        draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
-            draw, length = ImageDraw.Draw(image), _round(self._pixels(BAR) / scale)
+            length = _round(self._pixels(BAR) / scale)
             end = edge + round(length * scale)
             draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
             for x in (edge, end):
                 draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
-            _write(image, (end + self._pixels(5), middle), f"{length:g} mm", size)
+            draw.text((end + self._pixels(5), middle), f"{length:g} mm", INK, font, "lm")
         legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
-        _write(image, (image.width - edge, middle), legend, size, anchor="rm")
+        draw.text((image.width - edge, middle), legend, INK, font, "rm")
         return np.asarray(image)
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
         """Draw title and state in the first line; time, velocities and margin in the second."""
-        take, size, edge = self._take, self._pixels(15), self._pixels(10)
+        take, edge = self._take, self._pixels(10)
+        bold, plain = _font(self._pixels(15), bold=True), _font(self._pixels(12))
         image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
-        first, second = round(0.29 * self._top), round(0.75 * self._top)
+        draw, first, second = ImageDraw.Draw(image), round(0.29 * self._top), round(0.75 * self._top)
         state, colour = self._state(row, seconds)
-        free = image.width - 3 * edge - _font(size, bold=True).getlength(state)
-        _write(image, (edge, first), _shortened(take.title, _font(size, bold=True), free), size, bold=True)
-        _write(image, (image.width - edge, first), state, size, colour, "rm", bold=True)
+        title = _shortened(take.title, bold, image.width - 3 * edge - bold.getlength(state))
+        draw.text((edge, first), title, INK, bold, "lm")
+        draw.text((image.width - edge, first), state, colour, bold, "rm")
         outside = self._outside(seconds)
         known = seconds < take.fell and not outside
         fields = {
@@ -90,7 +89,7 @@ class Overlay:
             0.79: margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown",
         }
         for place, text in fields.items():
-            _write(image, (edge + place * (image.width - 2 * edge), second), text, self._pixels(12))
+            draw.text((edge + place * (image.width - 2 * edge), second), text, INK, plain, "lm")
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
@@ -160,12 +159,6 @@ class Overlay:
         return max(1, round(size * self._scale))
 
 
-def lacking(title: str) -> str:
-    """Return the characters of a title that the font of the captions lacks."""
-    known = FT2Font(_font_file(bold=True)).get_charmap()
-    return "".join(dict.fromkeys(character for character in title if ord(character) not in known))
-
-
 def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
     """Return as much of a text as fits into a width [pixels]."""
     if font.getlength(text) <= width:
@@ -189,38 +182,7 @@ def _ticks(begin: float, end: float) -> np.ndarray:
     return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # + 0.0: never -0
 
 
-def _write(
-    image: Image.Image,
-    place: tuple[float, float],
-    text: str,
-    size: int,
-    colour: tuple[int, int, int] = INK,
-    anchor: str = "lm",
-    *,
-    bold: bool = False,
-) -> None:
-    """Write a text as `ImageDraw.text` does, with a cache: most of a caption is the same on the next frame."""
-    x, y = floor(place[0]), floor(place[1])
-    mask, (left, top) = _mask(text, size, anchor, place[0] - x, place[1] - y, bold)
-    image.paste(colour, (x + left, y + top), mask)
-
-
-@lru_cache(64)
-def _mask(text: str, size: int, anchor: str, x: float, y: float, bold: bool) -> tuple[Image.Image, tuple[int, int]]:
-    """Return a text's opacity, for an anchor at a fraction (x, y) of a pixel, and the place of its corner."""
-    font = _font(size, bold)
-    left, top, right, bottom = font.getbbox(text, anchor=anchor)
-    left, top = floor(left) - 2, floor(top) - 2
-    mask = Image.new("L", (floor(right) + 4 - left, floor(bottom) + 4 - top))
-    ImageDraw.Draw(mask).text((x - left, y - top), text, 255, font, anchor=anchor)
-    return mask, (left, top)
-
-
 @cache
 def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    return ImageFont.truetype(_font_file(bold), size)
-
-
-def _font_file(bold: bool) -> Path:
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name
+    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)

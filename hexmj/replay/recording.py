@@ -2,11 +2,12 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from hexmj.bodies.kinematics import standing_tips
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
@@ -15,60 +16,49 @@ from hexmj.files import read_netcdf, write_netcdf
 from hexmj.legs import LEGS
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.physical import PhysicalWalk
-from hexmj.bodies.kinematics import standing_tips
-from hexmj.physics.foot_path import TipTargets
-from hexmj.physics.foot_path import hold
+from hexmj.physics.foot_path import TipTargets, hold
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, one_start
 
-
-class Variable(NamedTuple):
-    """Dimensions, unit and meaning of a variable."""
-
-    dimensions: tuple[str, ...]
-    units: str
-    long_name: str
-
-
 _STEP, _LEG, _ONCE = ("step",), ("step", "leg"), ()
 
 TIMES = {
-    "time": Variable(_STEP, "time unit", "time, in the unit 1 mm / V_p"),
-    "seconds": Variable(_STEP, "s", "time"),
+    "time": (_STEP, "time unit", "time, in the unit 1 mm / V_p"),
+    "seconds": (_STEP, "s", "time"),
 }
-"""Coordinates of the steps."""
+"""Coordinates of the steps, with their dimensions, units and meanings."""
 
 PLANNED = {
-    "velocity": Variable(_STEP, "V_p", "commanded velocity V_r during the step"),
-    "planned_x": Variable(_LEG, "mm", "planned tip on its own axis"),
-    "planned_y": Variable(_LEG, "mm", "planned tip beside the body axis, left positive"),
-    "planned_stance": Variable(_LEG, "1", "leg retracts in the plan"),
-    "planned_margin": Variable(_STEP, "mm", "stability margin of the plan"),
-    "planned_loss_time": Variable(_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
-    "planned_tip": Variable((*_LEG, "coordinate"), "mm", "commanded tip in the world, lifted while it swings"),
-    "qpos": Variable((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
-    "centre_of_mass": Variable((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
+    "velocity": (_STEP, "V_p", "commanded velocity V_r during the step"),
+    "planned_x": (_LEG, "mm", "planned tip on its own axis"),
+    "planned_y": (_LEG, "mm", "planned tip beside the body axis, left positive"),
+    "planned_stance": (_LEG, "1", "leg retracts in the plan"),
+    "planned_margin": (_STEP, "mm", "stability margin of the plan"),
+    "planned_loss_time": (_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
+    "planned_tip": ((*_LEG, "coordinate"), "mm", "commanded tip in the world, lifted while it swings"),
+    "qpos": ((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
+    "centre_of_mass": ((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
 }
 """Variables of every recording."""
 
 MEASURED = {
-    "measured_x": Variable(_LEG, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
-    "measured_y": Variable(_LEG, "mm", "foot beside the centre of mass, left positive"),
-    "measured_stance": Variable(_LEG, "1", "foot touches the ground"),
-    "measured_margin": Variable(_STEP, "mm", "measured stability margin"),
-    "measured_loss_time": Variable(_ONCE, "time unit", "first loss of measured static stability, or inf"),
-    "fall_time": Variable(_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
-    "fall_part": Variable(_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
-    "clearance": Variable(_ONCE, "mm", "least height of the trunk's lowest point"),
-    "tilt": Variable(_ONCE, "rad", "greatest tilt of the trunk"),
-    "speed": Variable(_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
-    "slip": Variable(_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
-    "tracking": Variable(_ONCE, "mm", "95th percentile of the distance of a foot from its target on the ground"),
-    "depth": Variable(_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
-    "saturation": Variable(_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
-    "unreachable": Variable(_ONCE, "1", "tip targets out of reach"),
+    "measured_x": (_LEG, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
+    "measured_y": (_LEG, "mm", "foot beside the centre of mass, left positive"),
+    "measured_stance": (_LEG, "1", "foot touches the ground"),
+    "measured_margin": (_STEP, "mm", "measured stability margin"),
+    "measured_loss_time": (_ONCE, "time unit", "first loss of measured static stability, or inf"),
+    "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
+    "fall_part": (_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
+    "clearance": (_ONCE, "mm", "least height of the trunk's lowest point"),
+    "tilt": (_ONCE, "rad", "greatest tilt of the trunk"),
+    "speed": (_ONCE, "1", "distance walked ahead over distance commanded, until the fall"),
+    "slip": (_ONCE, "mm/s", "mean sliding speed of a foot in contact"),
+    "tracking": (_ONCE, "mm", "95th percentile of the distance of a foot from its target on the ground"),
+    "depth": (_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
+    "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
+    "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }
 """Variables of a physical walk. A puppet, which only shows the plan, has none of them."""
 
@@ -237,10 +227,10 @@ def _dataset(
         "planned_loss_time": loss_time(planned)[0],
     }
 
-    def filled(table: dict[str, Variable]) -> dict[str, Any]:
+    def filled(table: dict[str, tuple]) -> dict[str, tuple]:
         return {
-            name: (row.dimensions, values[name], {"units": row.units, "long_name": row.long_name})
-            for name, row in table.items()
+            name: (dimensions, values[name], {"units": units, "long_name": long_name})
+            for name, (dimensions, units, long_name) in table.items()
             if name in values
         }
 

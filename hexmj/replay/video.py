@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from warnings import warn
 
 import mujoco
 import numpy as np
@@ -19,7 +18,7 @@ from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
 from hexmj.replay.film import ENCODINGS, MOST_PANELS, Film, encoder, missing_encoder
-from hexmj.replay.overlay import Overlay, lacking
+from hexmj.replay.overlay import Overlay
 from hexmj.replay.take import Take, takes_of
 
 BRIGHTER = 1.2
@@ -49,9 +48,6 @@ def render(
         progress: True for a bar, or a function that receives the fraction done since its last call.
         body: description of the recorded body.
 
-    Warns:
-        UserWarning: a title has characters that the font of the captions, DejaVu Sans, lacks.
-
     Returns:
         Number of frames: the time from the first beginning to the last end, at `Film.fps`.
 
@@ -70,9 +66,6 @@ def render(
     begin, end = min(take.begin for take in takes), max(take.end for take in takes)
     frames = max(1, round((end - begin) * film.slow_motion * film.fps))
     times = begin + np.arange(frames) / (film.fps * film.slow_motion)
-    for title in dict.fromkeys(take.title for take in takes):
-        if characters := lacking(title):
-            warn(f"the film shows boxes for {characters} in the title {title!r}; its font lacks them", stacklevel=2)
     overlays = [Overlay(take, film, begin, end) for take in takes]
     with shown(progress, "rendering") as advance, replacing(path) as part:
         _write(takes, overlays, part, times, film, advance)

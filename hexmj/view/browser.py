@@ -16,7 +16,7 @@ import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
-from hexmj.diagrams import spans
+from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
@@ -271,24 +271,8 @@ class BrowserView:
         seconds = np.array([moment.seconds for moment in shown])
         margins = (np.array([getattr(moment, name) for moment in shown]) for name in ("margin", "planned_margin"))
         self._margins.data = (seconds, *(np.where(np.isfinite(margin), margin, np.nan) for margin in margins))
-        self._footfall.content = footfall(seconds, ~np.array([moment.stance for moment in shown]))
-
-
-def footfall(seconds: np.ndarray, off: np.ndarray) -> str:
-    """Return a footfall diagram as SVG, with bars while a foot is off the ground, (time, leg)."""
-    end = float(seconds[-1])
-    bars = [
-        f'<rect x="{100 * (1 + (begin - end) / CHARTED):.2f}" y="{10 * leg + 2}" height="7"'
-        f' width="{100 * length / CHARTED:.2f}"/>'
-        for leg in range(6)
-        for begin, length in spans(seconds, off[:, leg])
-    ]
-    names = "".join(f'<div style="height:{100 / 6}%">{name}</div>' for name in LEGS)
-    return (
-        '<div style="text-align:center">feet off the ground, the same time</div><div style="display:flex;height:9em;'
-        f'margin:0 1.2em .6em .6em"><div style="width:2.2em">{names}</div><svg viewBox="0 0 100 60" width="100%"'
-        f' height="100%" preserveAspectRatio="none" fill="currentColor">{"".join(bars)}</svg></div>'
-    )
+        swings, vp = ~np.array([moment.stance for moment in shown]), self.session.walk.conditions.vp
+        self._footfall.content = footfall_html("", seconds * vp, swings, "the same time")
 
 
 def readout(session: LiveSession, moment: Moment) -> str:
