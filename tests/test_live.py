@@ -11,8 +11,8 @@ from hexmj.conditions import Conditions
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.registry import load_controller
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
@@ -124,7 +124,7 @@ def test_after_a_failing_begin_the_last_walk_continues():
     live = begun()
     live.advance(0.1)
     before = live.moment
-    with pytest.raises(InputError, match="too fast"):
+    with pytest.raises(ValueError, match="too fast"):
         live.steer(controller=Stumbles(), velocity=0.6)
     assert live.moment is before
     assert live.advance(0.1).seconds == pytest.approx(before.seconds + 0.1, abs=0.01)

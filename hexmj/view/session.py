@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from hexmj.errors import InputError, SimulationError
 from hexmj.replay.take import Take
 from hexmj.view.live import LiveWalk, Moment
 
@@ -96,7 +95,7 @@ class LiveSession:
     def _done(self, change: Callable[[], object]) -> bool:
         try:
             change()
-        except (InputError, SimulationError) as error:
+        except Exception as error:  # also any error of a controller
             self.message = str(error)
             return False
         return True
