@@ -1,4 +1,4 @@
-"""Controllers that each break one law of the protocol, with the law and what is said of it."""
+"""Controllers that each fail one interface check, with the name of the check."""
 
 import itertools
 from collections.abc import Callable
@@ -66,14 +66,7 @@ class Slow(Own):
 
 
 @dataclass(frozen=True)
-class Hiding(Own):
-    """With a setting that is no plain data."""
-
-    thing: Any = object()  # noqa: RUF009  # one for all
-
-
-@dataclass(frozen=True)
-class MirroredInVain(Own):
+class FalselyMirrored(Own):
     """Claims what it does not keep."""
 
     mirrored = True
@@ -106,17 +99,6 @@ class Counting(Own):
         """See `protocol.Controller`."""
         object.__setattr__(self, "begun", self.begun + 1)
         return Own.begin(self, starts, velocity, stride, acceleration)
-
-
-@dataclass(frozen=True)
-class Hurrying(Own):
-    """Changes the stride that it is told."""
-
-    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        """See `protocol.Controller`."""
-        plan = Own.begin(self, starts, velocity, replace(stride), acceleration)
-        object.__setattr__(stride, "dt", 0.2)
-        return plan
 
 
 def moved_by_all(plan, *_):
@@ -228,24 +210,15 @@ class OtherAtSpeed:
 
 @dataclass(frozen=True)
 class AtSpeed:
-    """Begins at speed with what cannot be steered."""
+    """Begins at speed with a plan that cannot be steered."""
 
-    other: Any = None
     name: str = "at speed"
 
     def begin(self, *given: Any) -> Any:
         return hexmj.LDVS.begin(*given)
 
     def begin_at_speed(self, *given: Any) -> Any:
-        return self.other and self.other.begin(*given)
-
-
-@dataclass(frozen=True)
-class BegunOtherwise(Metronome):
-    """An heir that nobody begins at speed, since its own begin does something else."""
-
-    def begin(self, *given: Any, **how: Any) -> Any:
-        return hexmj.LDVS.begin(*given, **how)
+        return Own().begin(*given)
 
 
 def put_back(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> None:
@@ -289,94 +262,66 @@ class NeverSlow(Metronome):
 
 
 def steered(rule: type = Metronome, **changed: Any) -> Any:
-    """A rival whose plans do something else where they are steered."""
+    """Return a baseline whose plans do something else when they are steered."""
     plan = type("SteeredPlan", (LiftedPlan,), changed)
-    return type("Steered", (rule,), {"_plan": lambda rule, *asked: plan(rule, *asked)})()
+    return type("Steered", (rule,), {"_plan": lambda rule, *arguments: plan(rule, *arguments)})()
 
 
-BROKEN: list[tuple[str, Any, str]] = [
-    ("see", steered(see=lambda *_: None), "tips of start 0, leg L1 is .* after see; expected"),
-    ("see", steered(see=lambda plan, tips, _: LiftedPlan.see(plan, tips, plan.standing)), "standing of .* after see"),
-    ("see", steered(tips=property(lambda plan: plan.starts[:, :5])), r"tips has the shape \(16, 5\) after a step; exp"),
-    ("see", steered(standing=property(lambda plan: 1 / 0)), "a plan, tips and standing: ZeroDivisionError"),
-    ("see", steered(tips=property(lambda plan: plan.starts)), "tips of start 1, leg L1 is .* after a step; expected"),
-    ("see", steered(see=with_the_first), "among others, that go on after see, differ: .* in step 2.., start "),
-    (
-        "restart",
-        steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips)),
-        "tips of start 1, leg L1 is .* after restart of some starts; expected",
-    ),
-    (
-        "restart",
-        steered(restart=lambda plan, which, _: LiftedPlan.restart(plan, which, plan.starts)),
-        "tips of start 0, leg L1 is .* after restart of some starts; expected",
-    ),
-    ("restart", steered(Righetti, restart=begun_elsewhere), "restart, and beginning, differ: x is"),
-    ("restart", steered(Righetti, restart=others_forget), "starts alone, and beside some that restart, differ: x is"),
-    ("restart", steered(restart=put_back), "restart, and beginning, differ: x is"),
-    (
-        "slow down",
-        steered(slow_down=lambda *_: None),
-        "accelerating: velocity of start 2 is 0.225 in step 1 after slow_d",
-    ),
-    (
-        "slow down",
-        steered(slow_down=lambda plan, which: LiftedPlan.slow_down(plan, np.ones_like(which))),
-        "accelerating: velocity of start 3, which was not asked to, is",
-    ),
-    (
-        "slow down",
-        steered(slow_down=lambda plan, _: LiftedPlan.see(plan, plan.starts, plan.standing)),
-        "tips of start 1, leg L1 is .* after slow_down; expected",
-    ),
-    ("slow down", steered(Righetti, slow_down=forgetful), "go on as fast, and the same without slow_down, differ: "),
-    ("slow down", NeverSlow(), "accelerating: velocity of start 2 is 0.5 in step 1 after slow_down; expected 0.1"),
-    ("at speed", AtSpeed(), "begin_at_speed of at speed gave None; expected a plan that can be steered"),
-    ("at speed", AtSpeed(Own()), "begin_at_speed of at speed gave Step.*; expected a plan that can be steered"),
-    ("at speed", OtherAtSpeed(), "begin without an acceleration, and begin_at_speed, differ: x is"),
-    ("settings", Melting(), "not frozen"),
-    ("settings", Hiding(), "object.*is no setting"),
-    ("begin", Slow(), r"V = 0.\d+ is too fast"),
-    ("begin", spoilt(lambda *_: 3), "begin gave 3; expected a plan"),
-    ("begin", spoilt(one_step_on), "the plan is at step 1; expected one at time 0"),
-    ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9)), "the plan is of other starts"),
-    ("begin", spoilt(lambda plan, *_: setattr(plan, "stride", hexmj.Stride(dt=0.2))), "the plan's stride is Stride"),
-    ("steps", spoilt(starts_halved), "starts are changed as it goes on; expected the plan to work on a copy"),
-    ("steps", Counting(), "begin changes begun of the controller; expected it left alone"),
-    ("steps", Hurrying(), "begin changes dt of the stride; expected it left alone"),
-    ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]}), r"x is float64 of the shape \(600, 1, 6\); expected"),
-    ("steps", walks_changed(lambda walk: {"stance": 1.0 * walk.stance}), "stance is float64 .* expected bool"),
-    ("steps", walks_changed(lambda walk: {"geometry": CENTRED}), "geometry = .*; expected that of the stride"),
-    ("steps", walks_changed(lambda walk: {"time": walk.time - 0.1}), "expected k dt"),
-    ("times", walks_changed(lambda walk: {"time": walk.time * (1 + 1e-12)}), "expected k dt"),
-    ("times", walks_changed(lambda walk: {"velocity": np.full_like(walk.velocity, 0.5)}), "expected V_r as commanded"),
-    ("steps", steps_changed(x=lambda walk: np.where(walk.stance[0], walk.x[0], np.nan)), "x is nan in step"),
-    ("steps", steps_changed(height=lambda walk: np.inf), "height is inf in step 0, start 0 .V = 0., leg L1"),
-    ("reach", steps_changed(x=lambda walk: walk.x[0] + 5.0), "x is .* mm in step .*; expected -21 to 11 mm"),
-    ("reach", steps_changed(y=lambda walk: 1.6 * walk.y[0]), "y is 28.8 mm in .*; expected 9 to 27 mm"),
-    ("reach", steps_changed(height=lambda walk: 30.0), "height is 30 mm in .*; expected -10 to 20 mm"),
-    ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT)), "begun alike differ: x is"),
-    ("begun again", spoilt(one_step_on_with_two_threads), "with 1 and 2 threads differ: x is"),
-    ("side by side", OfOneMind(), "a plan alone, and beside another of the same controller, differ: x is"),
-    ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean()), "or among others differ: x"),
-    ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)}), "in parts of .* differ: x is"),
-    ("first losses", spoilt(losses_of_its_own), r"first_losses gives the steps \[1 1 .* expected those of the plan"),
-    ("mirrored", MirroredInVain(left_leg_ahead), "mirrored starts, mirrored back, differ: x is"),
-    ("sense", spoilt(moved_by_all), "starts it is told nothing of differ: x is"),
+BROKEN: list[tuple[str, Any]] = [
+    ("see", steered(see=lambda *_: None)),
+    ("see", steered(see=lambda plan, tips, _: LiftedPlan.see(plan, tips, plan.standing))),
+    ("see", steered(tips=property(lambda plan: plan.starts[:, :5]))),
+    ("see", steered(tips=property(lambda plan: plan.starts))),
+    ("see", steered(see=with_the_first)),
+    ("restart", steered(restart=lambda plan, which, tips: LiftedPlan.restart(plan, np.ones_like(which), tips))),
+    ("restart", steered(restart=lambda plan, which, _: LiftedPlan.restart(plan, which, plan.starts))),
+    ("restart", steered(Righetti, restart=begun_elsewhere)),
+    ("restart", steered(Righetti, restart=others_forget)),
+    ("restart", steered(restart=put_back)),
+    ("slow down", steered(slow_down=lambda *_: None)),
+    ("slow down", steered(slow_down=lambda plan, which: LiftedPlan.slow_down(plan, np.ones_like(which)))),
+    ("slow down", steered(slow_down=lambda plan, _: LiftedPlan.see(plan, plan.starts, plan.standing))),
+    ("slow down", steered(Righetti, slow_down=forgetful)),
+    ("slow down", NeverSlow()),
+    ("at speed", AtSpeed()),
+    ("at speed", OtherAtSpeed()),
+    ("settings", Melting()),
+    ("begin", Slow()),
+    ("begin", spoilt(lambda *_: 3)),
+    ("begin", spoilt(one_step_on)),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "starts", plan.starts + 1e-9))),
+    ("begin", spoilt(lambda plan, *_: setattr(plan, "stride", hexmj.Stride(dt=0.2)))),
+    ("begin", spoilt(lambda *_: 1 / 0)),
+    ("steps", spoilt(starts_halved)),
+    ("steps", Counting()),
+    ("steps", walks_changed(lambda walk: {"x": walk.x[:, :1]})),
+    ("steps", walks_changed(lambda walk: {"geometry": CENTRED})),
+    ("steps", steps_changed(x=lambda walk: np.where(walk.stance[0], walk.x[0], np.nan))),
+    ("steps", steps_changed(height=lambda walk: np.inf)),
+    ("steps", steps_changed(x=lambda walk: np.zeros((2, 2)))),
+    ("times", walks_changed(lambda walk: {"time": walk.time * (1 + 1e-12)})),
+    ("times", walks_changed(lambda walk: {"velocity": np.full_like(walk.velocity, 0.5)})),
+    ("reach", steps_changed(x=lambda walk: walk.x[0] + 5.0)),
+    ("reach", steps_changed(y=lambda walk: 1.6 * walk.y[0])),
+    ("reach", steps_changed(height=lambda walk: 30.0)),
+    ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT))),
+    ("begun again", spoilt(one_step_on_with_two_threads)),
+    ("side by side", OfOneMind()),
+    ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean())),
+    ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)})),
+    ("first losses", spoilt(losses_of_its_own)),
+    ("mirrored", FalselyMirrored(left_leg_ahead)),
+    ("sense", spoilt(moved_by_all)),
     *(
-        ("sense", spoilt(moved_by(one.name, first_rows)), "starts it is told nothing of differ: x is")
-        for one in fields(Sensed)
-        if one.name not in ("ids", "tips")
+        ("sense", spoilt(moved_by(field.name, first_rows)))
+        for field in fields(Sensed)
+        if field.name not in ("ids", "tips")
     ),
-    ("sense", spoilt(moved_by("tilt", their_mean)), "a start it is told of, beside others and alone, differ: x is"),
-    ("sense", spoilt(moved_by("tilt", right_rows_while_all_walk)), "beside others and alone, differ: x is .* in step "),
-    ("sense", spoilt(moved_by_swings), "starts it is told nothing of differ: x is"),
-    (
-        "sense",
-        spoilt(slowed_by_anyone),
-        "starts it is told nothing of differ: velocity is 0.01 and 0.02",
-    ),
-    ("sense", spoilt(ids_written_on), "sense changes what it is told, ids"),
-    ("sense", spoilt(written_on), "sense changes what it is told, tips"),
-    ("steps", steps_changed(x=lambda walk: np.zeros((2, 2))), "x of a step has the shape"),
+    ("sense", spoilt(moved_by("tilt", their_mean))),
+    ("sense", spoilt(moved_by("tilt", right_rows_while_all_walk))),
+    ("sense", spoilt(moved_by_swings)),
+    ("sense", spoilt(slowed_by_anyone)),
+    ("sense", spoilt(ids_written_on)),
+    ("sense", spoilt(written_on)),
 ]
+"""Name of the check that fails, and a controller."""

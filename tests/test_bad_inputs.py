@@ -2,14 +2,19 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hexmj
+from hexmj.gaits import gait, limit_gait
+from hexmj.phases import circular_mean, circular_range, wilson_phase
+from hexmj.walks import part_of
 
 STARTS = np.zeros((2, 6))
+WALK = hexmj.walk(STARTS, hexmj.LDVS, 0.5, 1.0)
 
 CASES: dict[str, tuple[str, Callable[[], Any]]] = {
     "too few starts": ("n_starts", lambda: hexmj.draw_starts(0, seed=0)),
@@ -52,6 +57,23 @@ CASES: dict[str, tuple[str, Callable[[], Any]]] = {
     "feet and stance of other shapes": ("stance", lambda: hexmj.stability_margin(np.zeros((6, 2)), np.ones(5, bool))),
     "standing foot at NaN": ("feet", lambda: hexmj.stability_margin(np.full((6, 2), np.nan), np.ones(6, bool))),
     "no such controller": ("controller", lambda: hexmj.load_controller("no-such-controller")),
+    "memory": ("memory", lambda: hexmj.walk(np.zeros((10**5, 6)), hexmj.LDVS, 0.3, 1e5)),
+    "velocity stepped over": (
+        "V = 0.999",
+        lambda: hexmj.walk(
+            STARTS, hexmj.LDVS, 0.999, 10.0, stride=hexmj.Stride(dt=1.0), acceleration=hexmj.Acceleration(0.01, 0.05)
+        ),
+    ),
+    "gait at V = 0": ("velocity", lambda: limit_gait(hexmj.LDVS, 0.0)),
+    "gait of few periods": ("periods", lambda: limit_gait(hexmj.LDVS, 0.4, periods=3)),
+    "gait of one step": ("1 steps", lambda: gait(hexmj.walk(STARTS, hexmj.LDVS, 0.4, 0.1))),
+    "no phases": ("phase", lambda: circular_mean([])),
+    "phases in no rows": ("phase", lambda: circular_range([0.95, 0.05])),
+    "gait of a negative velocity": ("velocity", lambda: wilson_phase([0.5, -1.0])),
+    "five legs of a walk": ("stance", lambda: replace(WALK, stance=np.ones((2, 1, 5), dtype=bool))),
+    "times of another walk": ("time", lambda: replace(WALK, time=np.ones(3))),
+    "walk of no steps": ("0 steps", lambda: hexmj.loss_time(part_of(WALK, slice(0)))),
+    "no controller with feedback": ("controller", lambda: hexmj.SensoryFeedback("ldvs")),  # pyright: ignore
     "no such file": ("does-not-exist", lambda: hexmj.load("does-not-exist.nc")),
     "no such figure": ("which", lambda: hexmj.plot(hexmj.flss(hexmj.LDVS, [0.5], n_starts=2), "map")),
     "no such start": (
@@ -79,3 +101,16 @@ def test_impossible_values_are_refused(name: str, call: Callable[[], Any]):
 def test_unknown_arguments_are_pythons_own_errors(call: Callable[[], Any], error: type[Exception]):
     with pytest.raises(error):
         call()
+
+
+def test_numbers_of_numpy_are_numbers():
+    usual = hexmj.flss(hexmj.LDVS, [0.5], n_starts=30, seed=4, observation_time=20.0)
+    arguments: Any = {"n_starts": np.int64(30), "seed": np.uint8(4), "observation_time": np.float64(20.0)}
+    assert hexmj.flss(hexmj.LDVS, np.array([0.5]), **arguments).identical(usual)
+    assert hexmj.Stride(dt=np.float32(0.25)) == hexmj.Stride(dt=0.25)  # pyright: ignore
+
+
+def test_states_may_be_given_as_0_and_1():
+    feet, stance = WALK.feet[0], WALK.stance[0]
+    margin = hexmj.stability_margin(feet, stance)
+    assert np.array_equal(hexmj.stability_margin(feet.tolist(), stance.astype(int)), margin)

@@ -1,19 +1,20 @@
-"""The check of controllers: those that keep the protocol pass, and what breaks a law is found in one sentence."""
+"""Interface checks: controllers that keep the interface pass, and every broken law is found."""
 
 import json
-import re
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import hexmj
-from broken_controllers import BROKEN, BegunOtherwise, Melting, steps_changed
+from broken_controllers import BROKEN, steps_changed
 from coarse_steps import COARSE
 from hexmj.controllers import conformance
-from hexmj.controllers.conformance import FIRST, check_controller, findings
-from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.conformance import check_controller, findings
+from hexmj.controllers.cruse1998 import Cruse1998
+from hexmj.controllers.laws import FIRST, LAWS
 from hexmj.errors import InputError
 from stepwise_ldvs import Own
 from tiers import few_of
@@ -36,25 +37,17 @@ def test_other_controllers_conform():
     check_controller(hexmj.SensoryFeedback(LDVS))
     check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))
     assert all(finding.well and finding.found for finding in findings(Own()))
-    check_controller(BegunOtherwise())
     check_controller(Metronome("wilson"), hexmj.Stride(dt=1.0))
 
 
-def test_who_refuses_some_walks_is_held_to_the_laws_in_the_others():
+def test_a_controller_that_refuses_some_walks_is_checked_in_the_others():
     stride = hexmj.Stride(dt=0.2)
-    with pytest.raises(AssertionError, match=r"begin: .*; if it cannot plan there, ask for other"):
+    with pytest.raises(AssertionError, match="begin"):
         check_controller(COARSE, stride)
-    for velocities in ([0.3, 0.4], [0.05, 0.02], [0.0, 0.1]):
+    for velocities in ([0.3, 0.4], [0.0, 0.1]):
         check_controller(COARSE, stride, velocities)
-    many = [n / 40 for n in range(17)]
-    for velocities, said in (
-        ([], "a list"),
-        ([1.0], "V < 1"),
-        ([0.4], "2 to 16"),
-        (many, "2 to 16"),
-        ([0.5, 0.9999], "V and a step"),
-    ):
-        with pytest.raises(InputError, match=said):
+    for velocities in ([], [1.0], [0.4], [n / 40 for n in range(17)], [0.5, 0.9999]):
+        with pytest.raises(InputError):
             check_controller(COARSE, stride, velocities)
 
 
@@ -72,60 +65,41 @@ def test_who_does_not_accelerate_is_found_at_any_velocities(velocities):
     assert "times" in wrong
 
 
-@pytest.mark.parametrize(("law", "controller", "words"), BROKEN)
-def test_what_breaks_a_law_is_found_in_one_sentence(law, controller, words):
+@pytest.mark.parametrize(("law", "controller"), BROKEN)
+def test_a_broken_law_is_found(law, controller):
     trials = conformance._trials(controller, np.array(conformance.VELOCITIES), hexmj.Stride())
-    found = next(filter(None, (conformance._wrong(conformance.LAWS[law][0], trial) for trial in trials)))
-    assert re.search(words, found), found
-    assert "\n" not in found
+    assert any(conformance._failure(LAWS[law][0], trial) for trial in trials)
 
 
 @pytest.mark.parametrize("law", FIRST)
 def test_one_cause_is_found_once(law):
-    """What the laws after one rest on; they would say the same again."""
-    for broken, controller, _ in BROKEN:
+    """The checks after one of `FIRST` would find the same again."""
+    for broken, controller in BROKEN:
         if broken == law:
             *kept, finding = findings(controller)
-            assert finding.name == law
-            assert finding.found.endswith("; the laws after this one were not tried")
-            assert all(one.well for one in kept if one.name != "settings")
+            assert finding.name == law and not finding.well
+            assert all(earlier.well for earlier in kept if earlier.name != "settings")
 
 
-@pytest.mark.thorough
-def test_feet_that_slide_are_told():
-    """No law forbids it; tips that stand still slide with V_r, at most."""
-    *_, last = findings(Own())
-    assert (last.name, last.found) == (
-        "sliding",
-        "feet that stand stay where they are on the ground: their tips recede at V_r",
-    )
-    *_, last = findings(steps_changed(x=lambda walk: np.zeros(6), stance=lambda walk: True))
-    assert last.well
-    assert last.found.startswith("feet that stand would slide: ")
-    assert "but one is off by 0.95 V_p, in step 1, start 3 (V = 0.95), leg L1" in last.found
-    *_, last = findings(steps_changed(y=lambda walk: walk.y[0] + 1e-3 * walk.time[0]))
-    assert "but one is off by 0.001 V_p" in last.found
+def test_sliding_feet_are_a_remark():
+    walks = Own(), steps_changed(x=lambda walk: np.zeros(6), stance=lambda walk: True)
+    (*_, still), (*_, slides) = (findings(controller) for controller in walks)
+    assert still.note and slides.note and still.well and slides.well
+    assert still.found != slides.found
 
 
-def test_the_first_law_that_is_broken_is_raised():
-    with pytest.raises(AssertionError, match=r"^settings: the dataclass is not frozen; expected"):
-        check_controller(Melting())
-
-
-def test_what_is_no_controller_is_refused():
+def test_only_controllers_are_checked():
     for thing in (3, Own, hexmj.Symmetric()):
-        with pytest.raises(hexmj.InputError, match="expected a controller, a frozen dataclass"):
-            check_controller(thing)
-    with pytest.raises(hexmj.InputError, match="a controller's name = 3; expected a text"):
-        check_controller(Own(name=3))  # pyright: ignore[reportArgumentType]
+        with pytest.raises(hexmj.InputError, match="controller"):
+            check_controller(cast(Any, thing))
 
 
 def test_check_controller_says_what_is_wrong(run, tmp_path):
     code, out, _ = run("check-controller", "ldvs")
     assert code == 0
     *laws, last = out.splitlines()
-    assert all(line.startswith("well   ") for line in laws)
-    assert last.startswith("note   sliding: ")
+    assert all(line.startswith("ok ") for line in laws)
+    assert last.startswith("note")
     wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
     (tmp_path / "mine.py").write_text(wrong)
     code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hexmj.cli.commands import options_of
 
 import hexmj
-from hexmj.cli.commands import options_of
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.baselines.lifted import Legs
-from hexmj.gaits import gait
 from hexmj.files import read_toml
+from hexmj.gaits import gait
 from hexmj.search.problems import Sample
 from hexmj.timing import Stride
 

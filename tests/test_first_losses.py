@@ -1,4 +1,4 @@
-"""First losses on paper: fast and general ones, of the network and of any other plan."""
+"""First losses of static stability: the fast and the general way, of the network and of any other plan."""
 
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -101,83 +101,18 @@ def test_a_centre_of_mass_on_the_edge_is_lost():
     assert np.array_equal(planned_losses(plan, np.array([9, 2])), [3, 0])
 
 
-@pytest.mark.parametrize("steps", [(-1, 0), (0, 11), (0,), (0, np.nan), (0.0, 2.0), (True, False)])
-def test_losses_that_make_no_sense_are_refused(steps, monkeypatch):
-    plan = LDVS.begin(np.zeros((2, 6)), np.full(2, 0.5), STRIDE)
-    monkeypatch.setattr(plan, "first_losses", lambda _: np.array(steps))
-    with pytest.raises(hexmj.InputError, match="expected the number of a step, from 0 on, for each start"):
-        first_losses(plan, np.array(10))
-
-
-class Lamed(NetworkPlan):
-    """The network's plan, of which leg L2 never stands."""
-
-    def advance(self, steps: int) -> PlannedWalk:
-        walk = NetworkPlan.advance(self, steps)
-        return replace(walk, stance=walk.stance & (np.arange(6) != 1))
-
-
-class Wrapped:
-    """The same around a plan, whose other names it hands on."""
-
-    def __init__(self, plan: Any) -> None:
-        self._plan = plan
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._plan, name)
-
-    def advance(self, steps: int) -> PlannedWalk:
-        return Lamed.advance(self._plan, steps)
-
-
-class Around:
-    """A base of wrappers, which hands on losses and leaves the walk to its heirs."""
-
-    def __init__(self, plan: Any) -> None:
-        self._plan, self.starts, self.stride, self.done = plan, plan.starts, plan.stride, 0
-
-    def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        return self._plan.first_losses(steps)
-
-
-class LamedAround(Around):
-    def advance(self, steps: int) -> PlannedWalk:
-        self.done += steps
-        return Lamed.advance(self._plan, steps)
-
-
-@pytest.mark.parametrize("how", ["changed class", "wrapped", "wrapped by an heir", "changed object"])
-def test_losses_that_another_plan_tells_are_not_believed(how):
-    starts = hexmj.draw_starts(20, 0)
-    plan: Any = LDVS.begin(starts, np.full(20, 0.3), STRIDE)
-    if how == "changed object":
-        plan.advance = partial(Lamed.advance, plan)
-    else:
-        plan.__class__ = Lamed
-        plan = Wrapped(plan) if how == "wrapped" else plan
-    if how == "wrapped by an heir":
-        plan = LamedAround(LDVS.begin(starts, np.full(20, 0.3), STRIDE))
-    steps = np.full(20, 900)
-    own = LDVS.begin(starts, np.full(20, 0.3), STRIDE).first_losses(steps)
-    assert (first_losses(plan, steps) > 0).sum() > (own > 0).sum() + 5
-
-
-def begun(how: str) -> NetworkPlan:
-    """The network's plan of the same starts, which its controller has put elsewhere."""
-    plan = LDVS.begin(hexmj.draw_starts(20, 0), np.full(20, 0.3), STRIDE)
-    if how == "legs in the air":
-        plan.see(plan.tips, np.arange(6) > np.ones((20, 1)))
-    elif how == "walked in":
-        plan.advance(700)
-        plan.done = 0
-    else:
-        plan.restart(np.arange(20) < 10, plan.tips[::-1])
-    return plan
-
-
-@pytest.mark.parametrize("how", ["legs in the air", "walked in", "other starts"])
+@pytest.mark.parametrize("how", ["legs in the air", "advanced"])
 def test_losses_of_a_plan_that_was_put_elsewhere_are_of_where_it_is(how):
+    def begun() -> NetworkPlan:
+        plan = LDVS.begin(hexmj.draw_starts(20, 0), np.full(20, 0.3), STRIDE)
+        if how == "advanced":
+            plan.advance(700)
+            plan.done = 0
+        else:
+            plan.see(plan.tips, np.arange(6) > np.ones((20, 1)))
+        return plan
+
     steps, plain = np.full(20, 900), LDVS.begin(hexmj.draw_starts(20, 0), np.full(20, 0.3), STRIDE)
-    losses = first_losses(begun(how), steps)
-    assert np.array_equal(losses, planned_losses(begun(how), steps))
+    losses = first_losses(begun(), steps)
+    assert np.array_equal(losses, planned_losses(begun(), steps))
     assert not np.array_equal(losses, first_losses(plain, steps))

@@ -1,10 +1,7 @@
 """The examples' own controllers go through everything, and bodies do what plans ask for."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,19 +10,15 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.cli import loaded
-from hexmj.cli.options import Controlled
 from hexmj.controllers import Sensed, Step, stepwise
 from hexmj.controllers.conformance import check_controller
 from hexmj.gaits import CYCLES, limit_gait
-from hexmj.measures.kinematic import KinematicFlss
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import settle
 from hexmj.replay.recording import PLANNED
 from hexmj.rotations import heading
 from hexmj.search.problems import Sample
-from hexmj.studies.entrants import entrants
 from hexmj.walks import PlannedWalk
 from tiers import few_of
 
@@ -89,29 +82,12 @@ def test_the_guide_shows_the_example():
 
 
 @pytest.mark.slow
-def test_the_guide_is_enough(tmp_path):
-    """What it shows, saved as told."""
-    code, test = re.findall(r"```python\n(.+?)```", GUIDE.read_text(encoding="utf-8"), flags=re.DOTALL)
-    (tmp_path / "mine.py").write_text(code)
-    (tmp_path / "test_mine.py").write_text(test)
-    subprocess.run([sys.executable, "-m", "pytest", "-q", "test_mine.py"], cwd=tmp_path, check=True)
-
-
-@pytest.mark.slow
 def test_oscillators_reach_the_tripod():
     found = limit_gait(hexmj.load_controller(OWN["tripod"]), 0.5, n_starts=20, stride=STRIDE, periods=CYCLES + 10)
     assert found.periodic.all()
     assert found.stable.all()
     assert found.phase == pytest.approx(np.full((20, 7), 0.5), abs=0.01)
     assert found.duty_factor == pytest.approx(np.full((20, 6), 1 / 1.5), abs=0.01)
-
-
-@pytest.mark.thorough
-def test_uncoupled_oscillators_lose_more():
-    tripod = hexmj.load_controller(OWN["tripod"])
-    loose = type(tripod)(pull=0.0)  # pyright: ignore[reportCallIssue]
-    pulled, free = (hexmj.flss(one, [0.3], n_starts=300).flss.item() for one in (tripod, loose))
-    assert pulled < 0.5 * free
 
 
 @pytest.mark.slow
@@ -251,16 +227,15 @@ def test_a_posture_of_ones_own_is_honoured():
     assert np.mean(higher) == pytest.approx(2.0, abs=0.3)
 
 
-@pytest.mark.parametrize("name", ["feeler", "turning"])
-def test_on_the_command_line(name, run):
-    """The documented commands try the tripod."""
-    code, out, _ = run("flss", "--model", OWN[name], "--velocities", 0.5, "--starts", 4, "--observation time", 30,
-                       "--physical", "--json")  # fmt: skip
+def test_flss_of_a_controller_on_the_command_line(run):
+    name = OWN["turning"]
+    options = "--velocity", 0.5, "--starts", 4, "--observation-time", 30, "--physical", "--json"
+    code, out, _ = run("flss", "--controller", name, *options)
     assert code == 0
     assert json.loads(out)
 
 
-def test_a_controller_that_breaks_a_law_ends_the_command_with_1(run, tmp_path):
+def test_a_controller_that_fails_a_check_ends_the_command_with_1(run, tmp_path):
     (tmp_path / "lazy.py").write_text(
         "from dataclasses import dataclass\n"
         "from hexmj.controllers import Step, stepwise\n\n"
@@ -272,96 +247,23 @@ def test_a_controller_that_breaks_a_law_ends_the_command_with_1(run, tmp_path):
     )
     code, out, _ = run("check-controller", f"{tmp_path / 'lazy.py'}:Lazy")
     assert code == 1
-    (wrong,) = (line for line in out.splitlines() if line.startswith("WRONG"))
-    assert "x is 99 mm in step 0, start 0 (V = 0), leg L1; expected -21 to 11 mm" in wrong
+    assert "x is 99 mm" in out
 
-
-CHATTY = """
-from dataclasses import dataclass
-import hexmj
-print("module")
-
-@dataclass(frozen=True)
-class Chatty:
-    name: str = "chatty"
-
-    def begin(self, *asked, **how):
-        print("begin")
-        return hexmj.LDVS.begin(*asked, **how)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("more", few_of(["", "--processes 2"], ""))
-def test_what_a_controller_prints_is_no_answer(tmp_path, more):
-    (tmp_path / "mine.py").write_text(CHATTY)
-    words = ["compare", "--models", "mine.py:Chatty", "--velocities", "0.5", "0.6", "--starts", "2", "--observation time", "3"]
-    command = [sys.executable, "-m", "hexmj", *words, "--no-video", "--json", *more.split()]
-    paths = os.environ | {"PYTHONPATH": str(Path(hexmj.__file__).parents[1])}
-    done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, env=paths)
-    assert json.loads(done.stdout)["chatty"]["kinematic"]
-    assert "module\n" in done.stderr
-    assert "begin\n" in done.stderr
-
-
-FAR = """
-from dataclasses import dataclass, replace
-import numpy as np
-import hexmj
-from hexmj.controllers import Step, stepwise
 
 @dataclass(frozen=True)
 class Far:
+    """All tips stand at x."""
+
     x: float = 1e6
     name: str = "far"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        def step(v):
-            return Step(np.full(starts.shape, self.x), np.ones(starts.shape, dtype=bool))
-        return stepwise(step, starts, velocity, stride, acceleration)
-"""
+        """See `protocol.Controller`."""
+        return stepwise(lambda v: Step(self.x, True), starts, velocity, stride, acceleration)
 
 
-def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome(tmp_path):
-    (tmp_path / "far.py").write_text(FAR)
-    far = hexmj.load_controller(f"{tmp_path / 'far.py'}:Far")
-    with pytest.raises(hexmj.InputError, match=r"start 0: \d+ of \d+ tips that its legs were told are out of reach"):
-        hexmj.physical_flss(far, [0.5], n_starts=2, observation_time=5.0)
-    problem = hexmj.Problem(hexmj.FieldsForm(far), 0.5, 0.5, observation_time=5.0, conditions=hexmj.Conditions())
+def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome():
+    with pytest.raises(hexmj.InputError, match="reach"):
+        hexmj.physical_flss(Far(), [0.5], n_starts=2, observation_time=5.0)
+    problem = hexmj.Problem(hexmj.FieldsForm(Far()), 0.5, 0.5, observation_time=5.0, conditions=hexmj.Conditions())
     assert Sample(problem, 2, 0).costs(np.array([[1e6], [5.0]])).tolist() == [1.0, 0.0]
-
-
-def test_a_command_uses_a_controller_as_it_was_loaded_whatever_becomes_of_its_file(tmp_path, monkeypatch):
-    """So a recording is of the controller that was compared, and no half saved file ends a run."""
-    monkeypatch.setattr(loaded, "LOADED", {})
-    (mine := tmp_path / "mine.py").write_text((EXAMPLES / "tripod.py").read_text())
-    name = f"{mine}:Tripod"
-    controlled = Controlled()
-    first = controlled.controller(name)
-    mine.write_text("def half(")
-    assert controlled.controllers([name])[first.name] is first
-    assert entrants((name,), loaded.loaded)["tripod"].controller is first
-
-
-def test_a_file_that_a_controller_names_may_not_change_while_a_command_is_at_work(tmp_path, monkeypatch, run):
-    """A verdict, a recording or a film would be of another one than the numbers."""
-    monkeypatch.chdir(tmp_path)
-    text = (EXAMPLES / "tripod.py").read_text()
-    Path("mine.py").write_text(re.sub(r"( +)name: str", r"\1gains: str = 'gains.txt'\n\1name: str", text, count=1))
-    Path("gains.txt").write_text("1")
-    result = "hexmj.measures.kinematic.KinematicFlss.result"
-    frequencies = KinematicFlss.result
-    command = ("flss", "--model", "mine.py:Tripod", "--velocities", 0.5, "--starts", 5, "--observation time", 5, "--out", "out")
-    assert run(*command)[0] == 0
-
-    def edited(self, data):
-        Path("gains.txt").write_text("2")
-        return frequencies(self, data)
-
-    monkeypatch.setattr(result, edited)
-    code, _, said = run(*command)
-    assert code == 2 and "gains of" in said and "has changed while it was in use; start again" in said
-    loaded.loaded("mine.py:Tripod")
-    Path("gains.txt").write_text("3")
-    with pytest.raises(hexmj.InputError, match=r"a file that mine\.py:Tripod names has changed while the command was"):
-        loaded.check_loaded()

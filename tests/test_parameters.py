@@ -1,18 +1,26 @@
 """Weights, symmetric forms, presets and parameter files."""
 
-import re
 import runpy
 import shlex
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998 import HWS, LDVS, PRESETS, MODEL_VARIANTS, Cruse1998, ModelVariant, Symmetric, Weights
-from hexmj.controllers.cruse1998.presets import OWN, network_toml
+from hexmj.controllers.cruse1998 import (
+    HWS,
+    LDVS,
+    MODEL_VARIANTS,
+    PRESETS,
+    Cruse1998,
+    ModelVariant,
+    Symmetric,
+    Weights,
+    network_toml,
+)
+from hexmj.controllers.cruse1998.presets import OWN
 from hexmj.controllers.cruse1998.weights import HWS_WEIGHTS, LDVS_WEIGHTS, NEIGHBOURS, NO_WEIGHTS, general
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
@@ -64,7 +72,7 @@ def test_short_forms_leave_out_the_velocity_dependence():
     )
     weights: Any
     for weights, short in ((LDVS.weights, 9), (general(LDVS.weights), 48)):
-        with pytest.raises(InputError, match=r"p34.* lack it"):
+        with pytest.raises(InputError, match="p34"):
             weights.to_vector(short)
     assert general(LDVS.weights).p34.any()
 
@@ -97,33 +105,28 @@ def test_files_give_the_same_walk_as_the_preset(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text",
     [
-        ("[symmetric]\np5_i = 1.0", "unknown key 'p5_i'; valid keys: 'p1_i'"),
-        ("[symmetric]\np1_i = 'ten'", "p1_i = 'ten'; expected a number"),
-        ("[symmetric]\np1_i = true", "expected a number"),
-        ("[symmetric]\np1_i = nan", "finite"),
-        ("[symmetric]\np2 = 0.5", r"model\.toml \[symmetric\]: p2 = 0\.5; .* expected 0 or 1"),
-        ("[symmetric", "cannot be read as TOML"),
-        ("[other]\na = 1", "expected one table, .* and before it order and reading"),
-        ("", "holds nothing"),
-        ("[weights.p9]\n'1,2' = 1.0", r"unknown table \[weights.p9\]; valid names: p1"),
-        ("[weights.p1]\n'1,6' = 1.0", "unknown key '1,6'; valid keys: '1,2'"),
-        ("[weights.p4]\n'2,1' = 2", r"model\.toml: .*binary"),
-        ("weights = 3", "expected one table"),
-        ("[weights]\np1 = 3", "expected a table with the keys"),
+        "[symmetric]\np5_i = 1.0",
+        "[symmetric]\np1_i = 'ten'",
+        "[symmetric]\np1_i = nan",
+        "[symmetric]\np2 = 0.5",
+        "[symmetric",
+        "[other]\na = 1",
+        "",
+        "[weights.p9]\n'1,2' = 1.0",
+        "[weights.p1]\n'1,6' = 1.0",
+        "[weights.p4]\n'2,1' = 2",
+        "weights = 3",
+        "order = 'random'\n[symmetric]",
+        "model_variant = ['lasting']\n[symmetric]",
     ],
 )
-def test_files_that_make_no_sense(tmp_path, text, words):
+def test_invalid_files_are_refused(tmp_path, text):
     path = tmp_path / "model.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=r"model\.toml"):
         load_controller(str(path))
-
-
-def test_names_that_do_not_exist():
-    with pytest.raises(InputError, match=r"neither one of hws, ldvs, uncoordinated, own-0.1, .* nor a TOML file"):
-        load_controller("lvds")
 
 
 def test_names_of_controllers(tmp_path):
@@ -134,63 +137,33 @@ def test_names_of_controllers(tmp_path):
     assert [load_controller(name).name for name in names] == ["hws", "own-0.1", "found-0.1"]
 
 
-def test_weights_off_the_neighbour_sets():
-    p1 = np.zeros((6, 6))
-    p1[0, 5] = 1.0
-    with pytest.raises(InputError, match="p1 of leg L1 from leg R3"):
-        Weights(p1, *(np.zeros((6, 6)) for _ in range(6)))
-    with pytest.raises(InputError, match=r"p1 has shape \(5, 6\); expected \(6, 6\)"):
-        Weights(np.zeros((5, 6)), *(np.zeros((6, 6)) for _ in range(6)))
-    with pytest.raises(InputError, match="p31 holds a number that is not finite"):
-        Weights(*(np.full((6, 6), np.nan if kind == 2 else 0.0) for kind in range(7)))
-    with pytest.raises(InputError, match="p1_i = inf; expected a finite number"):
-        Symmetric(p1_i=np.inf)
-    with pytest.raises(InputError, match="expected 58"):
-        Weights.from_vector([0.0] * 10)
-    with pytest.raises(InputError, match="expected 10"):
-        Symmetric.from_vector([0.0] * 8)
+def weights_with(**changed: np.ndarray) -> Weights:
+    return Weights(**{kind: np.zeros((6, 6)) for kind in NEIGHBOURS} | changed)
 
 
 @pytest.mark.parametrize(
-    ("made", "words"),
+    ("name", "make"),
     [
-        (lambda: Geometry(lateral=(18.0, 0.0, 15.0)), "expected finite origins and lateral distances above 0 mm"),
-        (lambda: Geometry(origins=(28.0, float("inf"), -20.0)), "expected finite origins"),
-        (lambda: Acceleration(start=1.0), r"velocity at the start = 1.0; expected 0 <= V_r\(0\) < 1"),
-        (lambda: Acceleration(rate=0.0), "acceleration = 0.0; expected a finite number above 0"),
-        (lambda: Conditions(gravity=1.0), "condition 'gravity'; valid names: "),
-        (
-            lambda: draw_starts(MOST_DRAWN + 1, 0),
-            f"starts = {MOST_DRAWN + 1}; expected at most {MOST_DRAWN} in one array",
-        ),
+        ("lateral", lambda: Geometry(lateral=(18.0, 0.0, 15.0))),
+        ("start", lambda: Acceleration(start=1.0)),
+        ("rate", lambda: Acceleration(rate=0.0)),
+        ("dt", lambda: Stride(dt=1e-6)),
+        ("pep0", lambda: Stride(aep0=-11.0)),
+        ("pep0", lambda: Stride(pep0=float("nan"))),
+        ("n_starts", lambda: draw_starts(MOST_DRAWN + 1, 0)),
+        ("p1", lambda: weights_with(p1=np.eye(6)[[5, 0, 1, 2, 3, 4]])),
+        ("p1", lambda: weights_with(p1=np.zeros((5, 6)))),
+        ("p31", lambda: weights_with(p31=np.full((6, 6), np.nan))),
+        ("p1_i", lambda: Symmetric(p1_i=np.inf)),
+        ("58", lambda: Weights.from_vector([0.0] * 10)),
+        ("10", lambda: Symmetric.from_vector([0.0] * 8)),
+        ("order", lambda: Cruse1998(HWS.weights, order=cast(Any, "random"))),
+        ("weights", lambda: Cruse1998(cast(Any, "hws"))),
     ],
 )
-def test_settings_that_make_no_sense(made, words):
-    with pytest.raises(InputError, match=words):
-        made()
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"dt": 0.0}, "dt = 0.0; expected a time step of at least 1e-05"),
-        ({"dt": 1e-6}, "dt = 1e-06; expected a time step of at least 1e-05"),
-        ({"aep0": -11.0}, "expected pep_min <= pep0 < aep0"),
-        ({"pep_min": 0.0}, "expected pep_min <= pep0 < aep0"),
-        ({"pep0": float("nan")}, "expected aep0, pep0 and pep_min between"),
-        ({"geometry": "fig1"}, "geometry = 'fig1'; expected a Geometry"),
-    ],
-)
-def test_strides_that_make_no_sense(change, words):
-    with pytest.raises(InputError, match=words):
-        Stride(**change)
-
-
-def test_networks_that_make_no_sense():
-    with pytest.raises(InputError, match="order = 'random'; valid names: printed, undelayed, sequential"):
-        Cruse1998(HWS.weights, order="random")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(InputError, match="weights = 'hws'; expected a Symmetric or a Weights"):
-        Cruse1998("hws")  # pyright: ignore[reportArgumentType]
+def test_invalid_settings_are_refused(name, make):
+    with pytest.raises(InputError, match=name):
+        make()
 
 
 def test_weights_copy_their_input():
@@ -230,9 +203,9 @@ def test_each_of_our_own_sets_names_the_command_that_found_it():
             continue
         assert "--seed" in words
         single = name[-1].isdigit()
-        at = words.index("--velocity" if single else "--velocities") + 1
+        at = words.index("--velocity") + 1
         assert words[at : at + 2 - single] == ([name.rpartition("-")[2]] if single else ["0.1", "0.5"])
-        assert ("--reading" in words) == (PRESETS[name].model_variant != ModelVariant())
+        assert ("--model-variant" in words) == (PRESETS[name].model_variant != ModelVariant())
         assert ("--over" in words) == name.startswith("robust")
         if "--begin" in words:
             begun = load_controller(words[words.index("--begin") + 1])
@@ -257,15 +230,6 @@ def test_written_rules_are_read_again(order, model_variant, tmp_path):
     assert load_controller(str(path)) == Cruse1998(LDVS.weights, order, "network", MODEL_VARIANTS[model_variant])
 
 
-@pytest.mark.parametrize("wrong", ["'wrong'", "['lasting']", "1"])
-@pytest.mark.parametrize(("rule", "valid"), [("order", "sequential"), ("model_variant", "lasting")])
-def test_unknown_rules_are_refused(rule, valid, wrong, tmp_path):
-    path = tmp_path / "network.toml"
-    path.write_text(f"{rule} = {wrong}\n{network_toml(LDVS)}")
-    with pytest.raises(InputError, match=re.escape(f"{rule} = {wrong}") + f".*{valid}"):
-        load_controller(str(path))
-
-
-def test_a_reading_without_a_name_is_not_written():
-    with pytest.raises(InputError, match="has no name; named ones: printed, lasting"):
+def test_a_model_variant_without_a_name_is_not_written():
+    with pytest.raises(InputError, match="strongest"):
         network_toml(Cruse1998(LDVS.weights, model_variant=ModelVariant(rear="strongest")))

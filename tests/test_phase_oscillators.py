@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines.phase_oscillators import BIASES, Oscillators, PhaseOscillators
-from hexmj.controllers.baselines import BASELINES
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
 from hexmj.phases import PAIRS

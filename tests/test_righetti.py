@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hexmj
+from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines.righetti import Hopf, Righetti
-from hexmj.controllers.baselines import BASELINES
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk

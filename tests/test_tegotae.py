@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines.tegotae import Phases, Tegotae
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk

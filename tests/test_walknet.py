@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.baselines.lifted import Legs
 from hexmj.controllers.baselines.walknet import CURVE, REACOG, Constants, Walknet, sent_load
 from hexmj.errors import InputError
 from hexmj.gaits import gait

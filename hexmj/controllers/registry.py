@@ -135,7 +135,10 @@ def _object(module: ModuleType, what: str, name: str) -> Controller:
             found = found()
         except TypeError as error:
             raise InputError(f"controller {name!r} needs defaults for all fields: {error}") from error
-    check_controller_type(found)
+    try:
+        check_controller_type(found)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
     return found
 
 

@@ -1,16 +1,18 @@
-"""What all rivals share: the protocol, the legs, and being found by name."""
+"""The common part of all baselines: the interface, the legs, and their names."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
 
 import hexmj
-from hexmj.controllers.conformance import check_controller
+from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.baselines.evolved import Evolved
 from hexmj.controllers.baselines.lifted import Lifted
 from hexmj.controllers.baselines.metronomes import Metronome
-from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.baselines.walknet import Walknet
+from hexmj.controllers.conformance import check_controller
 from hexmj.errors import InputError
 from hexmj.gaits import gait
 from hexmj.measures.kinematic import walk
@@ -22,17 +24,17 @@ from tiers import few_of
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", few_of(BASELINES, "wilson", "cpg-tripod", "tegotae"))
-def test_every_rival_keeps_the_protocol_and_is_found_by_name(name: str) -> None:
+def test_every_baseline_keeps_the_interface_and_is_found_by_name(name: str) -> None:
     assert hexmj.load_controller(name) is BASELINES[name]
     check_controller(BASELINES[name])
 
 
 @pytest.mark.parametrize("name", BASELINES)
-def test_a_rival_can_be_steered_as_if_nothing_had_happened(name: str) -> None:
-    rival, starts, stride = BASELINES[name], hexmj.draw_starts(6, 3), Stride()
-    assert isinstance(rival, Lifted)
+def test_a_baseline_restarts_as_it_began(name: str) -> None:
+    baseline, starts, stride = BASELINES[name], hexmj.draw_starts(6, 3), Stride()
+    assert isinstance(baseline, Lifted)
     velocity, eq11 = np.full(6, 0.5), Acceleration(rate=0.005)
-    plan, other = (Lifted.begin(rival, starts, velocity, stride, eq11) for _ in range(2))
+    plan, other = (Lifted.begin(baseline, starts, velocity, stride, eq11) for _ in range(2))
     plan.advance(300)
     plan.see(plan.tips, plan.standing)
     plan.restart(np.ones(6, dtype=bool), starts)
@@ -62,53 +64,21 @@ class Age(NamedTuple):
     since: np.ndarray
 
 
-@pytest.mark.parametrize("state", [np.zeros((2, 6)), None, (np.zeros((2, 6)),)])
-def test_a_rule_that_remembers_no_named_tuple_is_refused_as_it_begins(state) -> None:
-    own = {"name": "rule", "at_start": lambda self, legs: state}
-    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
-    with pytest.raises(
-        InputError, match=r"at_start gave .* expected a named tuple of arrays whose first axis is the start, 2"
-    ):
-        hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)
-
-
-@pytest.mark.parametrize("later", [lambda legs: (legs.x,), lambda legs: Age(legs.x[0])])
-def test_a_rule_that_later_remembers_no_named_tuple_of_all_starts_is_refused(later) -> None:
-    own = {
-        "name": "rule",
-        "at_start": lambda self, legs: Age(legs.x),
-        "lifts": lambda self, state, legs: (later(legs), legs.x < 0),
-    }
-    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
-    with pytest.raises(InputError, match=r"lifts gave .* expected a named tuple of arrays whose first axis is"):
-        hexmj.walk(hexmj.draw_starts(2, 0), rule, 0.5, 1.0)
-
-
 @pytest.mark.parametrize(
-    "lifted",
+    ("name", "make"),
     [
-        lambda up: up.astype(int),
-        lambda up: up[:, :1],
-        lambda up: up[0],
-        lambda up: np.False_,
-        lambda up: up.tolist(),
-        np.ma.array,
+        ("theta", lambda: Evolved(theta=float("nan"))),
+        ("tau", lambda: Evolved(tau=2000.0)),
+        ("wave", lambda: Metronome(cast(Any, "gallop"))),
+        ("rules", lambda: Walknet(rules=(1, 4))),
     ],
 )
-def test_a_rule_that_lifts_something_else_than_legs_is_refused(lifted) -> None:
-    own = {
-        "name": "rule",
-        "at_start": lambda self, legs: Age(legs.x),
-        "lifts": lambda self, state, legs: (state, lifted(legs.x < 0)),
-    }
-    rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
-    with pytest.raises(
-        InputError, match=r"lifts gave .* as lifted legs; expected True and False, \(start, leg\), \(6, 6\)"
-    ):
-        hexmj.walk(hexmj.draw_starts(6, 0), rule, 0.5, 1.0)
+def test_invalid_constants_are_refused(name: str, make: Any) -> None:
+    with pytest.raises(InputError, match=name):
+        make()
 
 
-def test_what_a_rule_makes_of_the_legs_it_is_told_of_is_its_own() -> None:
+def test_a_rule_may_change_its_arguments() -> None:
     def lifts(spoils: bool):
         def decided(self, state, legs):
             far = legs.x < -8.0 * legs.v
