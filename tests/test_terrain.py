@@ -214,7 +214,7 @@ def test_obstacles_have_their_names_and_sizes():
 def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
     body = replace(STICK_INSECT, lengths=replace(STICK_INSECT.lengths, ground_reach=60.0))
     ahead = Conditions(ground=ground, ground_at=46.0, **size)
-    with pytest.raises(InputError, match="walks off"):
+    with pytest.raises(InputError, match="start 0"):
         physical_walk(draw_starts(1, 3), PRESETS["own-0.3"], 0.3, 700.0, conditions=replace(ahead, body=body))
 
 
