@@ -17,17 +17,7 @@ from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, Settling
-from hexmj.studies.biology import (
-    ANIMALS,
-    PAST,
-    SOURCES,
-    SPEEDS,
-    STEP,
-    Animal,
-    Biology,
-    biology_figure,
-    timing,
-)
+from hexmj.studies.biology import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, Biology, biology_figure, timing
 from hexmj.studies.quantities import (
     SEGMENTS,
     UNITS,

@@ -433,10 +433,7 @@ def test_without_physics_pushes_and_grasping_are_left_out():
         ("observation_time", {"observation_time": 1.9}),
         ("duration", {"recovery": 1e-7}),
         ("grasp", {"conditions": Conditions(grasp=3.0)}),
-        (
-            "unsteerable",
-            {"controller": Unsteerable()},
-        ),
+        ("unsteerable", {"controller": Unsteerable()}),
     ],
 )
 def test_bad_input_is_refused(name, wrong):

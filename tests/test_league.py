@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
 from hexmj.studies.entrants import EVERYONE, Entrant, entrants, short_names
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import losses, unless_refused, walks
+from hexmj.studies.league_cells import EntrantWalks, unless_refused
 from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
 from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells
@@ -66,7 +66,7 @@ def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
 def test_the_way_is_what_was_walked_in_whole_steps() -> None:
     stride, conditions = Stride(dt=1.0), hexmj.Conditions()
     told: Any = {"conditions": conditions, "stride": stride, "threads": 1}
-    found = walks(Entrant(hexmj.LDVS), hexmj.LDVS, 0.3, 20.9, n_starts=3, seed=1, **told)
+    found = EntrantWalks(Entrant(hexmj.LDVS), 0.3, 20.9, 3, 1, stride).outcomes(hexmj.LDVS, conditions, 1)
     starts = draw_starts(3, 1, stride)
     end = physical_walk(starts, hexmj.LDVS, 0.3, 20.9, **told).qpos[-1, :, 0]
     walked, upright = end - settle(starts, conditions, stride, 1).qpos[:, 0], np.isinf(found.fall.values)
@@ -118,7 +118,7 @@ def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None
 @pytest.mark.parametrize("observation_time", ["start", 40.0])
 def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(observation_time: str | float) -> None:
     eq11, entrant = hexmj.Acceleration(rate=0.01), Entrant(hexmj.load_controller("uncoordinated"))
-    found = losses(entrant, 0.5, observation_time, n_starts=20, seed=0, stride=Stride(), acceleration=eq11)
+    found = EntrantWalks(entrant, 0.5, observation_time, 20, 0, Stride()).losses(eq11)
     lost = first_loss(hexmj.draw_starts(20, 0), hexmj.UNCOORDINATED, 0.5, 80.0, acceleration=eq11)
     assert np.array_equal(found.lost, np.isfinite(lost))
 
@@ -167,20 +167,12 @@ def test_sequential_sets_and_those_that_read_legs_are_told_too() -> None:
         assert network_rules(settings_of(hexmj.load_controller(name))) == ""
 
 
-class Walked(TypedDict):
-    """How walks go."""
-
-    seed: int
-    conditions: Conditions
-    stride: Stride
-
-
 def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
-    entrant, how = Entrant(Stretched()), Walked(seed=0, conditions=Conditions(), stride=Stride())
-    found = walks(entrant, entrant.controller, 0.5, 10.0, n_starts=6, **how)
+    entrant = Entrant(Stretched())
+    found = EntrantWalks(entrant, 0.5, 10.0, 6, 0, Stride()).outcomes(entrant.controller, Conditions())
     refused = hexmj.draw_starts(6, 0)[:, 0] > 0
     assert refused.any() and not refused.all()
-    still = walks(Entrant(Still()), Still(), 0.5, 10.0, n_starts=6, **how)
+    still = EntrantWalks(Entrant(Still()), 0.5, 10.0, 6, 0, Stride()).outcomes(Still(), Conditions())
     for name, values in found.items():
         assert np.isnan(values.values[refused]).all()
         assert np.array_equal(values.values[~refused], still[name].values[~refused], equal_nan=True)
@@ -239,9 +231,9 @@ def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
 
 
 def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
-    entrant, how = Entrant(Still()), Walked(seed=0, conditions=Conditions(settling_time=3.0), stride=Stride())
+    entrant = Entrant(Still())
     with pytest.raises(SimulationError):
-        walks(entrant, entrant.controller, 0.3, 5.0, n_starts=2, **how)
+        EntrantWalks(entrant, 0.3, 5.0, 2, 0, Stride()).outcomes(entrant.controller, Conditions(settling_time=3.0))
 
 
 def test_a_difference_leaves_out_starts_that_are_not_known_and_takes_parts_of_walks() -> None:

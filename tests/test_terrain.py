@@ -12,16 +12,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexmj import (
-    LDVS,
-    PRESETS,
-    STICK_INSECT,
-    Conditions,
-    InputError,
-    Stride,
-    draw_starts,
-    physical_walk,
-)
+from hexmj import LDVS, PRESETS, STICK_INSECT, Conditions, InputError, Stride, draw_starts, physical_walk
 from hexmj.bodies.ground import beyond_the_ground, ground_level
 from hexmj.bodies.mjcf import compile_body
 from hexmj.io import settings

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from hexmj.gaits import CYCLES
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import FRESH, PERIODS, differences, frequencies, happened, padded, velocity_axis
 from hexmj.plotting import head, in_figure, picture
-from hexmj.studies import league_cells
 from hexmj.studies.base import Study
 from hexmj.studies.entrants import Entrant, short_names
 from hexmj.studies.league import REGIMES
+from hexmj.studies.league_cells import EntrantWalks
 from hexmj.sweep import Cell
 from hexmj.validate import whole
 
@@ -107,17 +107,16 @@ class Ablation(Study):
         """Return a cell for each controller, measure and velocity."""
 
         def cell(name: str, controller: Controller, measure: str, velocity: float, time: float) -> Cell:
-            given: dict[str, Any] = {"entrant": Entrant(controller), "velocity": velocity, "seed": self.seed}
-            given |= {"stride": self.stride, "n_starts": self.n_starts}
+            few = {"limit": min(self.n_starts, REGIMES), "physical": min(self.physical_starts, self.n_starts)}
+            until = "start" if measure == "start" else "walk"
+            n_starts = few.get(measure, self.n_starts)
+            walks = EntrantWalks(Entrant(controller), velocity, until, n_starts, self.seed, self.stride)
             name = f"{name}-{measure}-V-{velocity:g}"
-            if measure in ("start", "walk"):
-                return Cell(name, league_cells.losses, given | {"observation_time": measure}, time)
             if measure == "limit":
-                few = {"n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-                return Cell(name, league_cells.regimes, given | few, 10 * time)
-            own = {"controller": controller, "observation_time": "walk", "conditions": self.conditions}
-            few = {"n_starts": min(self.physical_starts, self.n_starts)}
-            return Cell(name, league_cells.walks, given | own | few, 20 * time)
+                return Cell(name, walks.gaits, {"periods": self.periods}, 10 * time)
+            if measure == "physical":
+                return Cell(name, walks.outcomes, {"controller": controller, "conditions": self.conditions}, 20 * time)
+            return Cell(name, walks.losses, {}, time)
 
         self.check_walks(self.velocities, self.conditions)
         return [

@@ -1,6 +1,6 @@
 """The league: every entrant in kinematic walks, in physics, and in every trial, with a cell for each."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,10 +11,10 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.tables import FRESH, PERIODS
-from hexmj.studies import league_cells as cells
 from hexmj.studies.base import Study
-from hexmj.studies.disturbed_walks import GRID, Case
+from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.entrants import Entrant
+from hexmj.studies.league_cells import EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration
@@ -134,44 +134,37 @@ class League(Study):
 
     def _asked(self, entrant: Entrant) -> Iterator[tuple[str, Cell]]:
         """Yield the cells of an entrant by question; gaits and trials need random starts."""
+        every, few = self.n_starts, min(self.physical_starts, self.n_starts)
 
-        def cell(name: str, function: Callable[..., Any], time: float, own: Mapping[str, Any]) -> Cell:
-            """Its work is the time walked of all starts, unless its own settings have another number."""
-            given = {"entrant": entrant, "n_starts": self.n_starts, "seed": self.seed, "stride": self.stride, **own}
-            return Cell(f"{entrant.controller.name}-{name}", function, given, float(time * given["n_starts"]))
+        def cell(name: str, function: str, velocity: float, n_starts: int, cost: float, **own: Any) -> Cell:
+            walks = EntrantWalks(entrant, velocity, self.observation_time, n_starts, self.seed, self.stride)
+            return Cell(f"{entrant.controller.name}-{name}", getattr(walks, function), own, float(cost * n_starts))
 
-        timed: dict[str, Any] = {"observation_time": self.observation_time}
-        walked = {
-            "controller": entrant.controller,
-            "conditions": self.conditions,
-            "n_starts": min(self.physical_starts, self.n_starts),
-        }
         at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
+        walked = {"controller": entrant.controller, "conditions": self.conditions}
         for v, time in at:
-            own = timed | {"velocity": v}
-            yield f"kinematic {v}", cell(f"kinematic-V-{v:g}", cells.losses, time * KINEMATIC, own)
+            yield f"kinematic {v}", cell(f"kinematic-V-{v:g}", "losses", v, every, time * KINEMATIC)
         for v, time in at:
-            yield f"physics {v}", cell(f"physics-V-{v:g}", cells.walks, time, timed | walked | {"velocity": v})
+            yield f"physics {v}", cell(f"physics-V-{v:g}", "outcomes", v, few, time, **walked)
         if entrant.ideal:
             return
         for v, time in at:
-            own = {"velocity": v, "n_starts": min(self.n_starts, REGIMES), "periods": self.periods}
-            yield f"regime {v}", cell(f"regime-V-{v:g}", cells.regimes, 20 * time * KINEMATIC, own)
-        own = timed | dict(zip(("low", "high"), RANGE, strict=True))
-        yield "range", cell("range", cells.losses_over_range, 600 * KINEMATIC, own)
+            gaits = min(every, REGIMES)
+            yield f"gait {v}", cell(f"gait-V-{v:g}", "gaits", v, gaits, 20 * time * KINEMATIC, periods=self.periods)
+        ends = dict(zip(("low", "high"), RANGE, strict=True))
+        yield "range", cell("range", "losses_over_range", RANGE[0], every, 600 * KINEMATIC, **ends)
         if self.accelerating:
-            own = timed | {"velocity": FINAL, "acceleration": Acceleration()}
-            yield "accelerated", cell("accelerated", cells.losses, 10_000 * KINEMATIC, own)
-        tried = timed | {"velocity": self.trial_velocity}
+            own = {"acceleration": Acceleration()}
+            yield "accelerated", cell("accelerated", "losses", FINAL, every, 10_000 * KINEMATIC, **own)
+        v, few = self.trial_velocity, min(self.trial_starts, self.n_starts)
         for trial, leg in LEGS_LOST.items():
-            own = tried | {"leg_lost": leg}
-            yield f"kinematic, {trial}", cell(f"kinematic-{trial}", cells.losses, 200 * KINEMATIC, own)
-        few = {"n_starts": min(self.trial_starts, self.n_starts)}
+            name = f"kinematic-{trial}"
+            yield f"kinematic, {trial}", cell(name, "losses", v, every, 200 * KINEMATIC, leg_lost=leg)
         for trial, function, cost, own in self._tried(entrant):
-            yield trial, cell(trial, function, cost, tried | own | few)
+            yield trial, cell(trial, function, v, few, cost, **own)
 
-    def _tried(self, entrant: Entrant) -> Iterator[tuple[str, Callable[..., Any], float, dict[str, Any]]]:
-        """Yield every trial that the entrant can take: its cell function, cost and settings."""
+    def _tried(self, entrant: Entrant) -> Iterator[tuple[str, str, float, dict[str, Any]]]:
+        """Yield every trial that the entrant can take: its method of `EntrantWalks`, cost and settings."""
         from hexmj.physics.pushes import can_push
 
         time = float(observation_duration(self.observation_time, self.trial_velocity, self.stride))
@@ -180,11 +173,11 @@ class League(Study):
             if case and case.kind == "push" and not can_push(self.conditions, self.stride, time):
                 continue
             if case and entrant.steerable:
-                yield trial, cells.disturbed, 300, {"case": case, "conditions": self.conditions, "grid": GRID}
+                yield trial, "disturbed", 300, {"case": case, "conditions": self.conditions}
             elif case or (trial in GROUNDS and self.trial_velocity * time < crossed(self.conditions)):
                 continue
             elif walking := self.walking(trial, entrant):
-                yield trial, cells.walks, 180, walking
+                yield trial, "outcomes", 180, walking
 
     def walking(self, trial: str, entrant: Entrant) -> dict[str, Any] | None:
         """Return the controller and the conditions of a trial that is no disturbance.

@@ -67,7 +67,7 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     names, v = list(entrants), velocities.tolist()
     planned, walked, regimes = (
         [[data.get((name, f"{kind} {one}")) for one in v] for name in names]
-        for kind in ("kinematic", "physics", "regime")
+        for kind in ("kinematic", "physics", "gait")
     )
     events = {
         "kinematic": _each(planned, LOST),
