@@ -22,7 +22,6 @@ from hexmj.studies.quantities import (
     SEGMENTS,
     UNITS,
     Strides,
-    _course,
     last_strides,
     onsets,
     quantities,
@@ -75,17 +74,6 @@ def test_vertical_forces_are_what_the_touch_sensors_show_in_steps_taken_in_parts
     assert (np.linalg.norm(strides.ground[..., :2], axis=2) <= 1.0001 * strides.ground[..., 2] + 1e-6).all()  # friction
 
 
-def test_a_walk_whose_pushes_are_measured_has_the_same_bits():
-    starts = draw_starts(2, 0)
-    one, other = (
-        list(drive(at_rest, begin(LDVS, starts, 0.5, at_rest.stride), 30.0))
-        for at_rest in (settle(starts), Settling(Conditions(), Stride()).at(starts))
-    )
-    assert one[0].sensors.shape[2] == other[0].sensors.shape[2] + 18
-    for this, that in zip(one, other, strict=True):
-        np.testing.assert_array_equal(this.qpos, that.qpos)
-
-
 def test_forces_are_those_that_move_the_centre_of_mass():
     strides, _ = seen(STRIKES, 0.3, 200.0)
     rows, centre = np.arange(strides.every, len(strides.centre) - 1, strides.every), strides.centre
@@ -131,31 +119,6 @@ def test_quantities_agree_with_each_other_and_with_the_plan(walking):
         assert heights == sorted(heights, reverse=True)
 
 
-def test_work_is_of_the_insects_own_mass_whatever_it_carries(walking):
-    strides, compiled = walking[0][min(walking[0])], settle(draw_starts(1, 0)).compiled
-    carrying = replace(compiled, conditions=Conditions(load=1.0))
-    alone, together = (quantities(strides, one) for one in (compiled, carrying))
-    name = "work on the centre of mass"
-    assert together.pop(name) == 2.0 * alone.pop(name)
-    assert together == pytest.approx(alone, nan_ok=True)
-
-
-def test_a_leg_that_never_carries_counts_nowhere(walking):
-    """As an amputee's."""
-    strides, told = walking
-    whole, others = strides[0], np.arange(1, 6)
-    lost = replace(whole, ground=whole.ground.copy(), standing=whole.standing.copy())
-    lost.ground[:, 0], lost.standing[:, 0] = 0.0, False
-    lame = quantities(lost, settle(draw_starts(1, 0)).compiled)
-    assert_allclose(lame["duty factor"], (whole.ground[:, others, 2] > 0).mean(), rtol=1e-12)
-    front = [name for name in lame if name.endswith(", front") and ("torque" in name or "peak" in name)]
-    assert len(front) == 6 and np.isnan([lame[name] for name in front]).all()
-    impulses = [lame[f"vertical impulse, {segment}"] for segment in SEGMENTS]
-    assert sum(impulses) == pytest.approx(100.0 * lost.ground[..., 2].sum(axis=1).mean() / WEIGHT)
-    middle = [name for name in lame if name.endswith(", middle")]
-    assert [lame[name] for name in middle] == [told[0][name] for name in middle]
-
-
 def test_a_hop_is_no_swing():
     standing = np.ones(100, dtype=bool)
     standing[10:12] = standing[40:60] = standing[90:] = False
@@ -174,17 +137,6 @@ def test_who_lifts_where_strides_begin_or_end_has_as_many_stances_as_there_are_s
         assert [strides.lifted(leg)[0] for leg in range(6)] == [*legs]
         for leg in range(6):
             assert [len(stance) for stance in strides.stances(leg)] == [300] * strides.count
-
-
-def test_stances_begin_with_landing_and_those_that_the_ends_cut_are_put_together(walking):
-    strides = walking[0][0]
-    for leg in range(6):
-        stances = strides.stances(leg)
-        rows = np.concatenate(stances)
-        assert len(set(rows.tolist())) == len(rows)
-        assert strides.standing[:, leg].sum() == strides.standing[rows, leg].sum()
-        assert all(strides.standing[one[[0, -1]], leg].all() for one in stances)
-        assert abs(len(stances) - strides.count) <= 1
 
 
 def test_a_torque_that_rises_and_falls_evenly_is_past_half_its_peak_for_half_a_stance(walking):
@@ -226,15 +178,6 @@ def test_every_row_is_a_quantity_with_a_source_and_a_range_or_none():
 def falling(tmp_path_factory):
     """Short walks, of which some fall."""
     return run_study(Biology(UNCOORDINATED, 4, n_starts=5), tmp_path_factory.mktemp("biology"), threads=1)
-
-
-def test_a_course_does_not_hang_on_where_its_strides_begin(walking):
-    strides = next(iter(walking[0].values()))
-    for by in (1, 501):
-        later = replace(strides, standing=np.roll(strides.standing, by, axis=0))
-        for leg in range(6):
-            torque = strides.torques[:, 3 * leg + 1]
-            assert_allclose(_course(np.roll(torque, by), later, leg), _course(torque, strides, leg), atol=1e-9)
 
 
 def test_threads_change_no_bit(falling):

@@ -98,16 +98,6 @@ def test_what_cannot_be_asked_is_not_known(result) -> None:
     assert by_rank(result).entrant.values[-1] == "graham-ideal"
 
 
-@pytest.mark.slow
-def test_cells_do_not_depend_on_threads_or_on_the_other_entrants(league: League, data) -> None:
-    """But for those of disturbances, which look long for starts that keep stability until then."""
-    alone = replace(league, controllers={"wilson": league.controllers["wilson"]}, velocities=(0.6,)).named_cells()
-    asked = {name: cell for name, cell in alone.items() if name[1] not in ("halt", "leg", "push")}
-    assert len(asked) > 10
-    for name, cell in asked.items():
-        assert cell.compute(threads=1).equals(data[name]), name
-
-
 def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:
     """It lasts 2 time units."""
     for observation_time, pushed in ((1.9, False), (2.0, True)):
@@ -208,26 +198,6 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
     assert np.isnan(found(0, 1, 2, 3)).all()
     with pytest.raises(ZeroDivisionError):
         unless_refused(lambda which: walked(which[: 1 // 0]), 4, {"fall": "mm"})
-
-
-@pytest.mark.slow
-def test_tables_say_of_how_many_walks_where_some_are_missing() -> None:
-    one = League(
-        {"far": Entrant(Stretched())},
-        (0.5,),
-        6,
-        1,
-        n_starts=6,
-        observation_time=10.0,
-        accelerating=False,
-        periods=12,
-        seed=0,
-    )
-    result = one.result([cell.compute(threads=1) for cell in one.cells()])
-    left = int((hexmj.draw_starts(6, 0)[:, 0] <= 0).sum())
-    assert result.missing.item() == 6 - left and 0 < left < 6
-    text = league_markdown(result)
-    assert f") of {left} |" in text and f"far (walks missing: {6 - left}) |" in text
 
 
 def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:

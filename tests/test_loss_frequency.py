@@ -72,11 +72,6 @@ def test_windows():
         flss(LDVS, [0.1, 0.5], n_starts=2, observation_time=399.0, acceleration=Acceleration(0.001))
 
 
-def test_threads_do_not_matter():
-    one, two = (flss(LDVS, [0.3, 0.7], n_starts=3000, threads=n) for n in (1, 2))
-    assert one.equals(two)
-
-
 @pytest.mark.parametrize("samples", [2, 3])
 def test_samples_of_the_protocol(samples):
     table = flss(LDVS, [0.5], n_starts=1000 * samples, observation_time="start")
@@ -141,11 +136,6 @@ def test_generalised_flss_averages_over_velocities():
     inside, (low, high) = flss_over_range(LDVS, 0.2, 0.6, n_starts=2000, observation_time="start")
     assert ends[0] < low < inside < high < ends[1]
     assert flss_over_range(LDVS, 0.6, 0.6, n_starts=2000, observation_time="start")[0] == ends[1]
-
-
-def test_seven_samples_are_drawn_unless_told():
-    usual = flss_over_range(UNCOORDINATED, 0.8, 0.9, observation_time="start")
-    assert usual == flss_over_range(UNCOORDINATED, 0.8, 0.9, observation_time="start", n_starts=7000)
 
 
 def test_a_range_may_begin_at_a_stand():

@@ -19,7 +19,7 @@ from hexmj.io import settings
 from hexmj.measures.physical import PhysicalWalk, physical_outcomes
 from hexmj.measures.tables import reach
 from hexmj.physics.settle import settle
-from hexmj.studies.terrain import FARTHER, Terrain, terrain_figure
+from hexmj.studies.terrain import Terrain
 from hexmj.sweep import run_study
 
 GROUNDS = {
@@ -38,11 +38,6 @@ FEW: dict[str, Any] = {
 def walked(ground: str) -> PhysicalWalk:
     """A few starts that reach the obstacle when they have walked 7 mm, and cross it."""
     return physical_walk(draw_starts(3, seed=0), LDVS, 0.6, 150.0, conditions=GROUNDS[ground])
-
-
-def level_of(conditions: Conditions, places: np.ndarray) -> np.ndarray:
-    """Height of the ground at some places, (..., 2) [mm]."""
-    return ground_level(conditions, places)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +64,7 @@ def test_the_ground_is_as_high_as_it_says(ground):
         mujoco.mj_ray(model, data, np.array([*place, 50.0]), np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
         for place in places
     ]
-    levels = level_of(conditions, places)
+    levels = ground_level(conditions, places)
     assert_allclose(50.0 - np.array(down), levels, atol=1e-6)
     assert (levels != 0).any() == (ground != "flat")
 
@@ -80,7 +75,7 @@ def test_the_trunk_on_any_ground_is_a_fall(ground):
     compiled = compile_body(replace(GROUNDS[ground], ground_length=300.0) if ground == "hurdle" else GROUNDS[ground])
     model = compiled.model
     data = mujoco.MjData(model)
-    level = level_of(compiled.conditions, np.array([150.0, 0.0]))
+    level = ground_level(compiled.conditions, np.array([150.0, 0.0]))
     data.qpos[:7] = 150.0, 0.0, level + 1.0, 0.0, 1.0, 0.0, 0.0
     mujoco.mj_forward(model, data)
     assert data.sensordata[compiled.columns.trunk].any()
@@ -145,44 +140,9 @@ def test_a_cell_is_a_physical_walk_under_those_conditions(few):
         assert_array_equal(one[name], getattr(walks, name))
 
 
-@pytest.mark.thorough
-def test_the_distance_is_what_was_walked_in_whole_steps():
-    told: dict[str, Any] = {
-        "velocities": (0.4,),
-        "n_starts": 3,
-        "stride": Stride(dt=0.8),
-        "grounds": ("rough",),
-        "heights": (0.1,),
-        "grasps": (0.0,),
-    }
-    flat = run_study(Terrain(LDVS, **told)).sel(obstacle="flat").squeeze()
-    duration = flat.attrs["distance"] / 0.4
-    starts = draw_starts(3, 0, told["stride"])
-    walk = physical_walk(starts, LDVS, 0.4, duration, stride=told["stride"], threads=1)
-    upright = np.isinf(flat.fall.values)
-    walked = walk.qpos[-1, :, 0] - settle(starts, FARTHER, told["stride"], 1).qpos[:, 0]
-    assert upright.any() and duration % 0.8 > 0.1
-    assert_allclose(flat.distance.values[upright], walked[upright], rtol=1e-12)
-
-
-def test_where_nothing_is_reached_there_is_no_frequency():
-    """At V = 0.95 this start falls at once."""
-    alone = run_study(Terrain(LDVS, **FEW | {"n_starts": 1, "seed": 1, "velocities": (0.95,)}))
-    assert (alone.reached == 0).all() and np.isnan(alone.flss).all()
-
-
-def test_the_figure_has_a_panel_for_each_kind_of_ground(few):
-    figure = terrain_figure(few)
-    assert [axes.get_xlabel() for axes in figure.axes] == ["height of the step [mm]"]
-    assert (few.reached == 4).all() and few.attrs["starts"] == 6
-    assert figure.get_suptitle().endswith("; frequencies of at least 4 of them")
-    all_of_them = terrain_figure(few.assign(reached=few.reached + 2))
-    assert "of them" not in all_of_them.get_suptitle()
-
-
 @pytest.mark.slow
 def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
-    words = ["terrain", "--velocities", "0.6", "--grounds", "step", "--heights", "4", "--grasps", "0", "--starts", "6"]
+    words = ["terrain", "--velocity", "0.6", "--grounds", "step", "--heights", "4", "--grasps", "0", "--starts", "6"]
     (tmp_path / "walks").symlink_to(folder)
     code, text, _ = run(*words, "--out", tmp_path, "--json")
     assert code == 0

@@ -15,31 +15,16 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-TERMS = {
-    "vp": "$V_p$ = {:g} mm/s",
-    "step_height": "step height {:g} mm",
-    "standing_height": "standing height {:g} mm",
-    "lift_time": "lift time {:g} ms",
-    "landing_time": "landing time {:g} ms",
-    "load": "load {:g} times the weight",
-    "centre_of_mass": "centre of mass {:g} mm ahead of O",
-    "leg_mass": "legs' mass x {:g}",
-    "friction": "friction {:g}",
-    "grasp": "grasp {:g}",
-    "ground": "ground: {}",
-    "ground_height": "{:g} mm high",
-    "ground_at": "obstacle at {:g} mm",
-    "ground_length": "{:g} mm long",
-    "ground_seed": "seed {:g} of the bumps",
-    "longest_substep": "physics steps of at most {:g} ms",
-    "contact_gap": "contact gap {:g} ms",
-    "settling_time": "settling {:g} ms",
-    "body": "body {}",
+UNITS: dict[str, str] = {
+    "vp": "mm/s",
+    **dict.fromkeys(("step_height", "standing_height", "centre_of_mass", "ground_height"), "mm"),
+    **dict.fromkeys(("ground_at", "ground_length", "aep0", "pep0", "pep_min"), "mm"),
+    **dict.fromkeys(("lift_time", "landing_time", "longest_substep", "contact_gap", "settling_time"), "ms"),
 }
-"""Condition -> its text in a caption."""
+"""Units of conditions and of a stride's fields; the others are numbers or names."""
 
-STRIDE = {"aep0": "AEP$_0$ = {:g} mm", "pep0": "PEP$_0$ = {:g} mm", "pep_min": "PEP_min = {:g} mm", "dt": "dt = {:g}"}
-"""Field of a stride -> its text in a caption."""
+SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_min"}
+"""Their names in a caption, where these differ."""
 
 FEW = 3
 """Most controllers that a caption names."""
@@ -49,7 +34,7 @@ COLUMNS = 3
 
 
 def caption(result: "xr.Dataset") -> str:
-    """Return a line for a figure's title: controllers, starts, observation time, V_p, and what differs from defaults."""
+    """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings."""
     made = settings(result)
     axis = next((result[name].values for name in ("controller", "entrant") if name in result.coords), None)
     names = None if axis is None else np.ravel(axis).tolist()
@@ -73,8 +58,8 @@ def starts_in_words(number: int) -> str:
 def conditions_in_words(made: Mapping[str, Any]) -> str:
     """Return V_p and the conditions that are not defaults, from a result's settings; empty for a kinematic result."""
     given = made.get("conditions") or {}
-    shown = {"vp", *unusual(given)} & given.keys()
-    return ", ".join(_unbroken(TERMS[name].format(given[name])) for name in TERMS if name in shown)
+    shown = {"vp", *unusual(given)}
+    return ", ".join(_term(name, value) for name, value in given.items() if name in shown)
 
 
 def not_printed(controllers: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -163,12 +148,14 @@ def _walks(made: Mapping[str, Any]) -> list[str]:
 def _stride(stride: Mapping[str, Any]) -> str:
     """Return what differs from the default stride."""
     usual = asdict(Stride())
-    words = [word.format(stride[name]) for name, word in STRIDE.items() if stride.get(name, usual[name]) != usual[name]]
+    changed = [name for name in usual if name != "geometry" and stride.get(name, usual[name]) != usual[name]]
+    words = [_term(name, stride[name]) for name in changed]
     lines = {name: [*values] for name, values in usual["geometry"].items()}
-    words += ["other lines of the tips"] if stride.get("geometry", lines) != lines else []
-    return ", ".join(map(_unbroken, words))
+    return ", ".join(words + (["other lines of the tips"] if stride.get("geometry", lines) != lines else []))
 
 
-def _unbroken(text: str) -> str:
-    """Keep a number and its unit in one line."""
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
+def _term(name: str, value: Any) -> str:
+    """Return a setting with its unit, without breaks."""
+    number = f"{value:g}" if isinstance(value, float | int) else str(value)
+    text = f"{SYMBOLS.get(name, name.replace('_', ' '))} = {number} {UNITS.get(name, '')}"
+    return text.strip().replace(" ", "\N{NO-BREAK SPACE}")
