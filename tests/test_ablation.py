@@ -47,7 +47,7 @@ def test_without_all_mechanisms_the_network_is_uncoordinated() -> None:
     assert np.array_equal(one, other)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     study = Ablation({"walknet": switched("walknet")}, (0.5,), n_starts=20, physical_starts=2, periods=12)
     result = run_study(study)

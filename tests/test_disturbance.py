@@ -22,9 +22,9 @@ from hexmj import (
     physical_walk,
     walk,
 )
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.feedback import SensedPlan
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.studies.disturbance import DisturbedWalks, every_case, with_flss_after
@@ -276,7 +276,7 @@ def test_only_losses_after_the_disturbance_and_within_the_window_count():
 FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "observation_time": 30.0}
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
     pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "observation_time": 45.0}
     study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)

@@ -52,7 +52,7 @@ def result(league: League, data) -> xr.Dataset:
     return league.result([*data.values()])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
     table = flss(hexmj.LDVS, (0.3, 0.6), n_starts=12, observation_time=40.0)
     assert np.array_equal(result.kinematic.sel(entrant="ldvs"), table.flss)

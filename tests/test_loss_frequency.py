@@ -43,7 +43,7 @@ def test_reference_to_the_printed_digit(name, observation_time):
     assert (np.abs(ours - printed) <= digit / 2 + 1e-9).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_acceleration_nearly_keeps_stability():
     """The reference gives about 0.03 and 0.05 for a = 0.00008 up to V = 0.9; the paper below 0.05 and 0.1."""
     for controller, reference in ((LDVS, 0.03), (HWS, 0.05)):

@@ -125,7 +125,7 @@ def test_bad_input_is_refused(name, changed):
         StabilityMap(**given)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_command(tmp_path, run):
     words = ("map", "--values", 80, "--velocity", 0.7, "--starts", 4, "--observation-time", 20, "--out", tmp_path)
     code, out, _ = run(*words, "--json")

@@ -21,7 +21,7 @@ def slower(tmp_path_factory):
     return folder, run_study(StaticLimit(LDVS, vps=(400.0, 100.0, 25.0), **FEW), folder)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
     _, result = slower
     fast, slow = result.sel(vp=400.0), result.sel(vp=25.0)
@@ -63,7 +63,7 @@ def test_light_legs_keep_the_centre_of_mass_at_o(slower):
     assert (result.kinematic == result.kinematic[0, 0]).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
     """What keeps them apart where the same feet stand: legs that give way, and whose mass moves the centre of mass.
 
@@ -97,7 +97,7 @@ def test_bad_input_is_refused(name, wrong):
         StaticLimit(LDVS, **wrong)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     words = ("converge", "--vps", 100, 50, "--starts", 4, "--observation-time", 10, "--out", tmp_path)
     code, text, _ = run(*words, "--json")

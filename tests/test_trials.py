@@ -10,8 +10,7 @@ from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.wrappers import RISE, LegLost
-from hexmj.controllers.wrappers import PoorSenses
+from hexmj.controllers.wrappers import RISE, LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
@@ -81,7 +80,7 @@ def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() 
         LegLost(hexmj.LDVS, 0, 0.0)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None:
     check_controller(LegLost(hexmj.LDVS, 2))
     check_controller(LegLost(SensoryFeedback(hexmj.LDVS), 2))
@@ -92,7 +91,7 @@ def test_lame_controllers_and_those_with_poor_senses_keep_the_protocol() -> None
         PoorSenses(hexmj.LDVS, -1.0)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_poor_senses_that_are_perfect_change_nothing_and_errors_are_a_starts_own() -> None:
     starts, model_variant = hexmj.draw_starts(3, 2), SensoryFeedback(hexmj.LDVS)
     plain, perfect = (physical_walk(starts, one, 0.5, 40.0).qpos for one in (model_variant, PoorSenses(model_variant)))

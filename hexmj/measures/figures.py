@@ -63,7 +63,7 @@ def conditions_in_words(made: Mapping[str, Any]) -> str:
 
 
 def not_printed(controllers: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return the networks that do not plan as printed in 1998: order and model variant -> names, from settings by name."""
+    """Return the networks that do not plan as printed in 1998: rules -> names, from settings by name."""
     found: dict[str, list[str]] = {}
     for name, controller in controllers.items():
         if words := network_rules(controller):

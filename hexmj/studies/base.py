@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Study:
     """Settings that all studies share; the same starts walk in every cell.
 
-    A subclass has a field `controller` or `controllers`, and `velocity` or `velocities` unless its velocities are fixed.
+    A subclass has `controller` or `controllers`, and `velocity` or `velocities` unless its velocities are fixed.
     Fields `observation_time` and `acceleration` are there only if they can be chosen.
     """
 

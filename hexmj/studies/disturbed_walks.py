@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import REPEATED, advanced, begin, begin_at_speed, check_repeats
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.planning import planned_losses
+from hexmj.controllers.planning import REPEATED, advanced, begin, begin_at_speed, check_repeats, planned_losses
 from hexmj.controllers.protocol import (
     Controller,
     FeedbackPlan,

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.wrappers import LegLost
-from hexmj.controllers.wrappers import PoorSenses
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.wrappers import LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.tables import FRESH, PERIODS

@@ -291,7 +291,7 @@ def _torques(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
 
 
 def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
-    """Return a leg's torque, (row,), at each percent of its stance, (101,), averaged over stances; NaN without a stance.
+    """Return a leg's torque, (row,), at each percent of its stance, (101,), averaged over stances; NaN without one.
 
     The torque is positive where it carries the body.
     """

@@ -248,7 +248,7 @@ def _fates(walk: "PhysicalWalk", threads: int | None) -> dict[str, np.ndarray]:
 
 
 def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
-    """Add the frequencies, differences and counts of `StabilityMap.result` to outcomes over (value, velocity, start)."""
+    """Add the frequencies, differences and counts of `StabilityMap.result` to the outcomes of its cells."""
     cells = ("value", "velocity")
     events = {name: happened(data[outcome]).transpose(*cells, "start").values for name, outcome in FLSS.items()}
     new: dict[str, Any] = {}
