@@ -26,8 +26,8 @@ TRIALS = ("halt", "leg", "push", "step", "rough", "load", *LEGS_LOST, *READING)
 """Names of all trials."""
 
 ABOUT_TRIALS = (
-    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks that are stable until then;"
-    " step and rough ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg, from the front;"
+    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks that are stable until"
+    " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg, from front;"
     " reads: sensory feedback; noise, late: with errors of 10 % of the step range, 20 ms late; -: the plan cannot be"
     " steered or has no feedback, the walk is too short, or no walk is left"
 )
