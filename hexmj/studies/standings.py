@@ -27,7 +27,7 @@ TRIALS = ("halt", "leg", "push", "step", "rough", "load", *LEGS_LOST, *READING)
 
 ABOUT_TRIALS = (
     "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks that are stable until"
-    " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg, from front;"
+    " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg;"
     " reads: sensory feedback; noise, late: with errors of 10 % of the step range, 20 ms late; -: the plan cannot be"
     " steered or has no feedback, the walk is too short, or no walk is left"
 )
