@@ -3,7 +3,8 @@
     python examples/model_variants.py
     python examples/model_variants.py --starts 50 --gait-starts 4 --combinations 3
 
-Every combination walks the published weight sets. The claims are those from which no constant was inferred. The first combination is the printed one. A run that was stopped resumes if it is repeated.
+Every combination walks the published weight sets. The claims are those from which no constant was inferred. The first
+combination is the printed one. A run that was stopped resumes if it is repeated.
 """
 
 from collections.abc import Sequence

@@ -5,7 +5,6 @@ Each sees vectors and their costs only. The paper counts individuals from 1, the
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -43,18 +42,6 @@ class Domain:
         return rng.uniform(self.low, self.high, (size, len(self.low)))
 
 
-class Searcher(Protocol):
-    """An algorithm with a population."""
-
-    def ask(self) -> np.ndarray:
-        """Return parameters whose costs are not yet known, (candidate, parameter)."""
-        ...
-
-    def tell(self, costs: np.ndarray) -> None:
-        """Take the costs, (candidate,), of the parameters that `ask` returned."""
-        ...
-
-
 class Evolution:
     """The paper's evolutionary algorithm: selection against individual 1, then mutation.
 
@@ -71,11 +58,11 @@ class Evolution:
         self._known = np.empty(0)
 
     def ask(self) -> np.ndarray:
-        """Return all individuals; after Q^0 all but individual 1, whose cost is known."""
+        """Return the individuals whose costs are not yet known, (candidate, parameter): after Q^0 all but individual 1."""
         return self._domain.read(self.individuals[len(self._known) :])
 
     def tell(self, costs: np.ndarray) -> None:
-        """Form Q^{n+1}."""
+        """Form Q^{n+1} from the costs, (candidate,), of what `ask` returned."""
         costs = np.concatenate([self._known, costs])
         fittest = np.argmin(costs)
         others = self._rng.choice(len(costs), len(costs) - 1, p=selection_probabilities(costs))
@@ -112,13 +99,13 @@ class CovarianceAdaptation:
         self._start((domain.low + domain.high) / 2 if domain.begin is None else domain.begin)
 
     def ask(self) -> np.ndarray:
-        """Return the next generation."""
+        """Return the next generation, (candidate, parameter)."""
         asked = [self._cma.ask() for _ in range(self._population)]
         self._raw = [raw for _, raw in asked]
         return self._middle + self._half * np.array([encoded for encoded, _ in asked])
 
     def tell(self, costs: np.ndarray) -> None:
-        """Adapt mean and covariance."""
+        """Adapt mean and covariance to the costs, (candidate,), of what `ask` returned."""
         self._cma.tell(list(zip(self._raw, costs.tolist(), strict=True)))
         if self._cma.should_stop():
             self._start(self._domain.draw(1, self._rng)[0])
@@ -137,7 +124,9 @@ class CovarianceAdaptation:
         )
 
 
-def search_population(searcher: Searcher, costs: Costs, budget: int) -> tuple[np.ndarray, float]:
+def search_population(
+    searcher: Evolution | CovarianceAdaptation, costs: Costs, budget: int
+) -> tuple[np.ndarray, float]:
     """Run the whole generations that `budget` evaluations allow; return the best vector, (parameter,), and its cost."""
     done, tried = 0, []
     while done + len(candidates := searcher.ask()) <= budget:
