@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.controllers.planning import planned_losses
+from hexmj.controllers.planning import begin, planned_losses
 from hexmj.controllers.protocol import SteerableController
 from hexmj.gaits import limit_gait
 from hexmj.legs import LEGS

@@ -58,7 +58,7 @@ class Evolution:
         self._known = np.empty(0)
 
     def ask(self) -> np.ndarray:
-        """Return the individuals whose costs are not yet known, (candidate, parameter): after Q^0 all but individual 1."""
+        """Return the individuals of unknown cost, (candidate, parameter): after Q^0 all but individual 1."""
         return self._domain.read(self.individuals[len(self._known) :])
 
     def tell(self, costs: np.ndarray) -> None:

@@ -22,9 +22,8 @@ from hexmj.controllers.cruse1998.weights import (
     names_of,
     pairs,
 )
-from hexmj.controllers.registry import load_controller, parameter_file
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.controllers.registry import PART
+from hexmj.controllers.registry import PART, load_controller, parameter_file
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.plain import plain

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.controllers.cruse1998 import HWS, LDVS
-from hexmj.controllers.cruse1998 import network_toml
+from hexmj.controllers.cruse1998 import HWS, LDVS, network_toml
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.registry import parameter_file
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.registry import searched_on
+from hexmj.controllers.registry import parameter_file, searched_on
 from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
 from hexmj.io import results_folder, save, save_figure

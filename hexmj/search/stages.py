@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hexmj.controllers.registry import load_controller
 from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError, without_extra
 from hexmj.plain import plain
 from hexmj.progress import Progress, shown
