@@ -28,7 +28,10 @@ def begun(controller: Controller = LDVS, velocity: float = 0.4) -> LiveWalk:
     return LiveWalk(controller, velocity, STARTS[0])
 
 
-@pytest.mark.parametrize("controller", [LDVS, SensoryFeedback(LDVS), load_controller("graham")], ids=lambda case: case.name)
+CONTROLLERS = LDVS, SensoryFeedback(LDVS), load_controller("graham")
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda case: case.name)
 def test_an_unchanged_walk_is_the_measured_one(controller):
     """To the last bit, for any division into frames."""
     live, shown = begun(controller), []

@@ -115,7 +115,7 @@ def _conditions_text(conditions: Conditions, physical: bool) -> str:
 
 
 def _happened(take: Take) -> str:
-    """Tell when stability was lost and when the body fell, as far as the recording lasts."""
+    """State when stability was lost and when the body fell, if the recording lasts until then."""
     events = (take.lost, "stability first lost"), (take.fell, f"fell on {take.part.replace('_', ' ')}")
     texts = [f"{event} at {1000.0 * seconds:.0f} ms" for seconds, event in events if seconds <= take.end]
     return ", ".join(texts) or f"stability {'never lost' if take.lost == np.inf else 'not lost in this part'}"

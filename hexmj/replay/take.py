@@ -118,16 +118,13 @@ def margin_in_words(margin: float) -> str:
 def support_on_ground(
     conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Return the support polygon and the level at which it is drawn.
+    """Return the support polygon, (corner, 2), and the height of the highest ground below it, where it is drawn [mm].
 
     Args:
-        conditions: which tell the ground.
+        conditions: with the ground.
         feet: in the world, (leg, 2) [mm].
         stance: which of them stand, (leg,).
         centre: centre of mass in the world, (3,) [mm].
-
-    Returns:
-        Corners, (corner, 2), none without a standing foot, and the height of the highest ground below them [mm].
     """
     corners = support_polygon(feet, stance)
     below = np.vstack([corners, centre[:2]])

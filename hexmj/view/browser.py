@@ -264,25 +264,18 @@ class BrowserView:
         self._footfall = gui.add_html("")
 
     def _show_charts(self, moment: Moment) -> None:
-        self._readout.content = readout(self.session, moment)
+        session, walk, stable = self.session, self.session.walk, moment.margin > 0
+        state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if stable else 'outside'} the polygon"
+        sign = "\N{HEAVY CHECK MARK}" if stable and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
+        self._readout.content = (
+            f"**{margin_in_words(moment.margin)}** {sign} {state}\n\nV = {moment.velocity:.2f}, {moment.seconds:.2f} s,"
+            f" start {session.start}; {session.factor:.2f} times real time\n\n_{session.message}_"
+        ).removesuffix("\n\n__")
         if len(self._recent) < 2:
             return
         shown = list(self._recent)[:: max(1, len(self._recent) // 400)]
         seconds = np.array([moment.seconds for moment in shown])
         margins = (np.array([getattr(moment, name) for moment in shown]) for name in ("margin", "planned_margin"))
         self._margins.data = (seconds, *(np.where(np.isfinite(margin), margin, np.nan) for margin in margins))
-        swings, vp = ~np.array([moment.stance for moment in shown]), self.session.walk.conditions.vp
+        swings, vp = ~np.array([moment.stance for moment in shown]), walk.conditions.vp
         self._footfall.content = footfall_html("", seconds * vp, swings, "the same time")
-
-
-def readout(session: LiveSession, moment: Moment) -> str:
-    """Return the state of a walk as Markdown."""
-    walk, stable = session.walk, moment.margin > 0
-    state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if stable else 'outside'} the polygon"
-    sign = "\N{HEAVY CHECK MARK}" if stable and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
-    lines = [
-        f"**{margin_in_words(moment.margin)}** {sign} {state}",
-        f"V = {moment.velocity:.2f}, {moment.seconds:.2f} s, start {session.start};"
-        f" {session.factor:.2f} times real time",
-    ]
-    return "\n\n".join(lines + ([f"_{session.message}_"] if session.message else []))

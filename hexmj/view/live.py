@@ -68,7 +68,7 @@ class SteeredPlan:
 
     @property
     def has_feedback(self) -> bool:
-        """Whether the plan is told the state of the legs before each step."""
+        """Whether the plan receives the state of the legs before each step."""
         return isinstance(self._plan, FeedbackPlan)
 
     @property

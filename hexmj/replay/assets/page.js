@@ -22,21 +22,21 @@ function item(array, ...at) {
 }
 
 class Recording {
-  constructor(told) {
-    Object.assign(this, unpacked(told));
+  constructor(packed) {
+    Object.assign(this, unpacked(packed));
     this.margin = this.physical ? this.measured_margin : this.planned_margin;
     this.stance = this.physical ? this.measured_stance : this.planned_stance;
     this.begin = this.seconds[0] - this.step;
     this.end = this.seconds[this.seconds.length - 1];
   }
 
-  /** The step whose end is nearest to a time. */
+  /** Return the step whose end is nearest to a time. */
   row(seconds) {
     const row = Math.round((seconds - this.seconds[0]) / this.step);
     return Math.min(Math.max(row, 0), this.seconds.length - 1);
   }
 
-  /** The pose that is nearest to a step; the last one after a fall. */
+  /** Return the pose nearest to a step, after a fall the last one. */
   pose(row) {
     let low = 0, high = this.rows.length - 1;
     while (low < high) {
@@ -275,7 +275,7 @@ class Scene {
     this.gl.drawElements(this.gl.TRIANGLES, count, this.gl.UNSIGNED_INT, 0);
   }
 
-  /** Where a point of the world is seen, from the canvas' upper left corner, in CSS pixels. */
+  /** Return the place of a point of the world on the canvas, from its upper left corner [CSS pixels]. */
   seen([x, y, z]) {
     const m = this.camera, w = m[3] * x + m[7] * y + m[11] * z + m[15];
     const across = (m[0] * x + m[4] * y + m[8] * z + m[12]) / w, up = (m[1] * x + m[5] * y + m[9] * z + m[13]) / w;
@@ -303,7 +303,7 @@ function paper(canvas) {
 
 const FONT = 'system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
-/** Tips as they are told to be (open rings) and as they are (dots, filled while they stand), each leg's with its name. */
+/** Commanded tips (open rings) and measured ones (dots, filled in stance), with the names of the legs. */
 function drawMarks(canvas, scene, recording, pose, row, theme) {
   const draw = paper(canvas), tips = item(recording.tips, pose), planned = item(recording.planned_tips, pose);
   const centre = item(recording.centre_of_mass, pose);
@@ -348,7 +348,7 @@ function drawMarks(canvas, scene, recording, pose, row, theme) {
   });
 }
 
-/** Round numbers within an interval, some `count` of them. */
+/** Return about `count` round numbers within an interval. */
 function ticks(low, high, count) {
   const power = 10 ** Math.floor(Math.log10((high - low) / count));
   const step = [1, 2, 5, 10].map((one) => one * power).find((one) => (high - low) / one <= count);
@@ -532,7 +532,7 @@ function themeNow() {
   return Object.assign(theme, { dark: css.paper });
 }
 
-const told = (number, digits) => number.toFixed(digits).replace("-", "\u2212");
+const fixed = (number, digits) => number.toFixed(digits).replace("-", "\u2212");
 
 class Panel {
   constructor(recording, root) {
@@ -562,11 +562,11 @@ class Panel {
     const fallen = Number.isNaN(margin), stable = margin > 0;
     const shown = this.part("margin");
     shown.value = String(margin);
-    shown.textContent = fallen ? "margin unknown" : Number.isFinite(margin) ? `margin ${margin >= 0 ? "+" : ""}${told(margin, 2)} mm` : "no foot stands";
+    shown.textContent = fallen ? "margin unknown" : Number.isFinite(margin) ? `margin ${margin >= 0 ? "+" : ""}${fixed(margin, 2)} mm` : "no foot stands";
     const part = recording.part.replaceAll("_", " ");
     this.part("word").textContent = fallen ? `\u2716 fell on ${part}` : stable ? "\u2713 within the polygon" : "\u2716 outside the polygon";
     this.part("state").classList.toggle("lost", !stable);
-    this.part("now").textContent = `V = ${told(recording.velocity[row], 2)}, ${told(recording.seconds[row] * recording.vp, 1)} time units; ${recording.happened}`;
+    this.part("now").textContent = `V = ${fixed(recording.velocity[row], 2)}, ${fixed(recording.seconds[row] * recording.vp, 1)} time units; ${recording.happened}`;
     this.chart.draw(seconds, theme);
     if (!this.scene) return;
     const centre = item(recording.centre_of_mass, pose), target = [centre[0], centre[1], recording.level[pose] + 0.12 * this.size];
@@ -655,8 +655,8 @@ function main() {
     if (state.stale) {
       state.stale = false;
       slider.value = Math.round((state.seconds - begin) / step);
-      clock.value = `${told(1000 * state.seconds, 0)} of ${told(1000 * end, 0)} ms`;
-      slider.setAttribute("aria-valuetext", `${told(1000 * state.seconds, 0)} milliseconds`);
+      clock.value = `${fixed(1000 * state.seconds, 0)} of ${fixed(1000 * end, 0)} ms`;
+      slider.setAttribute("aria-valuetext", `${fixed(1000 * state.seconds, 0)} milliseconds`);
       for (const panel of panels) panel.draw(state.seconds, state.view, state.theme);
     }
     requestAnimationFrame(frame);
@@ -665,7 +665,7 @@ function main() {
   requestAnimationFrame(frame);
 }
 
-/** Turn by one finger or the mouse, zoom by two or the wheel. */
+/** Turn with one finger or the mouse, zoom with two fingers or the wheel. */
 function hold(canvas, turn, zoom) {
   const fingers = new Map();
   const apart = () => { const [a, b] = [...fingers.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
@@ -685,7 +685,7 @@ function hold(canvas, turn, zoom) {
   canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(event.deltaY / 1000)); }, { passive: false });
 }
 
-/** Go to the time that is pointed at in a chart. */
+/** Go to the time under the pointer in a chart. */
 function scrub(chart, seek) {
   const { canvas } = chart, to = (event) => seek(chart.seconds(event.clientX - canvas.getBoundingClientRect().left));
   canvas.onpointerdown = (event) => { canvas.setPointerCapture(event.pointerId); to(event); };
