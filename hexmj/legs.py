@@ -6,7 +6,6 @@ Index i of every axis `leg` is the paper's leg i + 1: 1 to 3 on the left from fr
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from hexmj.errors import InputError
 
@@ -63,8 +62,3 @@ CENTRED = Geometry(origins=(24.0, 0.0, -24.0))
 """The other interpretation: centre of mass above O_2, D6 = step range. It fits the paper almost as well."""
 
 GEOMETRIES = {"fig1": FIG1, "centred": CENTRED}
-
-
-def leg_last(values: Any) -> Any:
-    """Move the dimension `leg` of a DataArray to the end; return other values as they are."""
-    return values.transpose(..., "leg") if "leg" in getattr(values, "dims", ()) else values

@@ -20,6 +20,9 @@ ROUNDING = 4.0 * 2.0**-53
 """Bounds the error of a difference of two products, relative to the sum of their sizes (Shewchuk 1997, orient2d):
 within it a foot counts as lying on the line."""
 
+BLOCK = 4096
+"""Postures that one thread computes at a time."""
+
 NOWHERE = "feet: a standing foot is at NaN or infinity"
 
 
@@ -55,7 +58,10 @@ def _margins_of(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np
     def work(begin: int, end: int) -> None:
         margins(points[begin:end], stands[begin:end], margin[begin:end])
 
-    run_blocks(work, len(points), 4096, threads)
+    if len(points) <= BLOCK:
+        margins(points, stands, margin)
+    else:
+        run_blocks(work, len(points), BLOCK, threads)
     return margin.reshape(shape)
 
 

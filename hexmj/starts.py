@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.errors import InputError
-from hexmj.legs import leg_last
 from hexmj.timing import Acceleration, Stride
-from hexmj.validate import distinct, numbers, short, whole
+from hexmj.validate import distinct, leg_last, numbers, short, whole
 
 SAMPLE = 1000
 """Starts of one sample of the paper's protocol; it takes seven of them."""

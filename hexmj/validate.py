@@ -48,6 +48,11 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
         raise InputError(f"{name} = {short(values)}; expected numbers") from None
 
 
+def leg_last(values: Any) -> Any:
+    """Move the dimension `leg` of a DataArray to the end; return other values as they are."""
+    return values.transpose(..., "leg") if "leg" in getattr(values, "dims", ()) else values
+
+
 def states(name: str, values: ArrayLike) -> np.ndarray:
     """Return a new array of booleans, which may be given as 0 and 1."""
     array = np.asarray(values)

@@ -125,7 +125,7 @@ def check_home(compiled: CompiledBody) -> None:
             f"body {body.name!r}: in posture {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()}"
             f" mm; expected {expected[leg].tolist()}, the origin of its line at the standing height below the root"
         )
-    ahead, left, _ = _centre_of_mass(plain_model(body), body)
+    ahead, left, _ = _described_centre(body, body.mjcf.read_bytes())
     if compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance:
         raise InputError(
             f"body {body.name!r}: in posture {body.home!r} the centre of mass is {ahead:.4g} mm ahead of O; expected 0,"
@@ -146,6 +146,12 @@ def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
         raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
     check_described(model, body)
     return model
+
+
+@lru_cache(maxsize=16)
+def _described_centre(body: Body, mjcf: bytes) -> np.ndarray:
+    """Centre of mass of the MJCF as it is, see `_centre_of_mass`."""
+    return _centre_of_mass(_plain_model(body, mjcf), body)
 
 
 @lru_cache(maxsize=16)
@@ -287,7 +293,7 @@ def _centre_of_mass(model: mujoco.MjModel, body: Body) -> np.ndarray:
     """Centre of mass in posture home, in the root's frame (x ahead, y to the left, z up), (axis,) [mm]."""
     data = posed(model, model.key(body.home).qpos)
     mujoco.mj_comPos(model, data)
-    return data.subtree_com[model.body(body.root).id]
+    return data.subtree_com[model.body(body.root).id].copy()
 
 
 def _rounded(value: float, digits: int) -> float:

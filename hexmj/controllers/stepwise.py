@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike
 
 from hexmj.controllers.protocol import Sensed
 from hexmj.errors import InputError
-from hexmj.legs import leg_last
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import Acceleration, Stride, commanded_velocities
-from hexmj.validate import short
+from hexmj.validate import leg_last, short
 from hexmj.walks import PLANNED, PlannedWalk
 
 

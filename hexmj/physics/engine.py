@@ -21,13 +21,16 @@ from hexmj.conditions import Conditions
 from hexmj.errors import InputError, SimulationError
 from hexmj.jitted import jitted
 from hexmj.rotations import lowest
-from hexmj.threads import thread_count
+from hexmj.threads import check_memory, thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
 """Arrays that determine how a body goes on."""
 
 STATE_BITS = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
 """The same as a set of MuJoCo's state elements, which it records in one array."""
+
+MEMORY = 120_000
+"""Memory of a body while it walks, as measured for the stick insect [bytes]."""
 
 CLEAR = 0.01
 """Height of a trunk above flat ground from which it cannot touch it, in standing heights."""
@@ -113,6 +116,7 @@ class MujocoBatch:
 
     def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
         """Make `count` bodies, stepped by `threads`, one per core unless given."""
+        check_memory(f"{count} starts that walk at once in physics", MEMORY * count)
         self._model, self._root = compiled.model, compiled.root
         model = compiled.model
         self._batch = Batch(model, count, thread_count(threads))

@@ -2,7 +2,6 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,14 +15,10 @@ from hexmj.errors import InputError, OutOfReach, SimulationError
 from hexmj.physics.engine import Diverged, MujocoBatch, walk_error
 from hexmj.physics.substeps import SINK
 from hexmj.starts import checked_starts, draw_starts
-from hexmj.threads import check_memory
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0
 """Share of the depth that causes fine steps to which adhesion may press a foot at rest; the rest is for walking."""
-
-MEMORY = 120_000
-"""Memory of a start while it walks, as measured for the stick insect [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +43,13 @@ class Settled:
     """Of the walk."""
     stride: Stride
     """Of the plan."""
+    substeps: int
+    """Physics steps in one step of the plan."""
 
     @property
     def qpos(self) -> np.ndarray:
         """(start, position)."""
         return self.state[:, : self.compiled.model.nq]
-
-    @cached_property
-    def substeps(self) -> int:
-        """Physics steps in one step of a plan."""
-        return self.conditions.substeps(self.stride)
 
 
 class Settling:
@@ -80,6 +72,7 @@ class Settling:
         self._conditions, self._stride, self._threads = conditions, stride, threads
         self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False, pushes=pushes)
         check_home(self._compiled)
+        self._substeps = conditions.substeps(stride)
         self._batch: MujocoBatch | None = None
 
     def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
@@ -95,7 +88,6 @@ class Settling:
         conditions, stride, compiled = self._conditions, self._stride, self._compiled
         x = checked_starts(starts, stride)
         names = np.arange(len(x)) if names is None else names
-        check_memory(f"{len(x)} starts that walk at once in physics", MEMORY * len(x))
         model, columns, height = compiled.model, compiled.columns, conditions.standing_height
         tips = standing_tips(x, height, stride)
         joints, reachable = compiled.inverse(tips)
@@ -120,7 +112,9 @@ class Settling:
         load = compiled.carried(batch.sensors, batch.force)
         _check_rest(batch, load, names, compiled)
         torques = batch.force[:, columns.ctrl].copy()
-        return Settled(x, tips, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride)
+        return Settled(
+            x, tips, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride, self._substeps
+        )
 
     def _initial_batch(self, count: int) -> MujocoBatch:
         """Bodies in their initial state; the last batch is used again if it has as many."""

@@ -10,7 +10,6 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import begin, begin_at_speed
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
 from hexmj.errors import InputError
-from hexmj.legs import leg_last
 from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
@@ -19,7 +18,7 @@ from hexmj.physics.settle import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
 from hexmj.timing import MOST_STEPS, Stride
-from hexmj.validate import number, numbers
+from hexmj.validate import leg_last, number, numbers
 from hexmj.walks import PlannedWalk, joined, part_of
 
 ONLY = np.array([0])

@@ -7,6 +7,7 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -194,6 +195,7 @@ NO_WEIGHTS = Symmetric()
 """No coordinating mechanism."""
 
 
+@lru_cache(maxsize=64)
 def general(weights: AnyWeights) -> Weights:
     """Return the general weights of either form."""
     return weights.expand() if isinstance(weights, Symmetric) else weights
