@@ -38,23 +38,23 @@ class Command:
         how: Any = {"positional": self.positional, "hidden": self.hidden, "usual": self.usual}
         return options_class(name.replace("-", "_"), *sources, help=help, **how)
 
-    def main(self, name: str, words: list[str]) -> None:
-        """Parse the words after the command's name, and run the command."""
+    def parse(self, name: str, words: list[str]) -> SimpleNamespace:
+        """Return the options by name that the words after the command's name give."""
         import tyro
 
         help = not {"-h", "--help"}.isdisjoint(words)
         markers: Any = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
-        how: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
         if help:
             print(fill(" ".join((self.__doc__ or "").split()), 80), end="\n\n")
         try:
-            given = flat(tyro.cli(self.options(name, help), args=words, **how))
+            parsed = tyro.cli(
+                self.options(name, help), prog=f"hexmj {name}", description="", args=words, config=markers
+            )
         except SystemExit:
             if help:
                 print("Examples:", *(f"  hexmj {name} {example}".rstrip() for example in self.examples), sep="\n")
             raise
-        given.command = [name, *words]
-        self.run(given)
+        return SimpleNamespace(**vars(flat(parsed)), command=[name, *words])
 
     def run(self, given: SimpleNamespace) -> None:
         """Run the command with its options by name."""

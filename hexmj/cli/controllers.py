@@ -58,13 +58,13 @@ class League(StudyCommand):
     doing = "running the league"
     data = "league.nc"
     figures = {"league": "league", "league_walks": "walks"}  # noqa: RUF012
-    examples = ("--quick", "--controller ldvs wilson mine.py:Mine --velocity 0.3 0.5 --starts 100 --no-video")
+    examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")
 
     def build(self, given: SimpleNamespace) -> Any:
         from hexmj.studies.entrants import EVERYONE, FOUR, IDEAL, entrants
         from hexmj.studies.league import League
 
-        names = given.controller or (FOUR if given.quick else EVERYONE)
+        names = (FOUR if given.quick else EVERYONE) if given.controller is None else given.controller
         distinct("--controller", names)
         given.entrants, given.controller = (
             entrants(names),

@@ -96,9 +96,10 @@ def run(words: list[str]) -> None:
         case [word, *_] if word.startswith("--tyro-"):
             _complete(words)
         case [name, *rest] if name in COMMANDS:
-            command(name).main(name, rest)
+            chosen = command(name)
+            chosen.run(chosen.parse(name, rest))
         case [name, *_]:
-            raise InputError(f"{name!r} is no command. `hexmj --help` lists the commands.")
+            raise InputError(f"{name!r} is no command; `hexmj --help` lists them")
 
 
 def command(name: str) -> "Command":

@@ -108,7 +108,7 @@ class Disturb(StudyCommand):
     doing = "disturbing walks"
     data = "disturb.nc"
     figures = {"disturb": "disturb"}  # noqa: RUF012
-    examples = ("--kinematic --velocity 0.5", "--disturbances push --impulses 20 60 --strategies grasp --starts 10")
+    examples = ("--kinematic --velocity 0.5", "--disturbances push --impulses 40 --strategies grasp")
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.disturbance import MEASURES, strategies_in_words

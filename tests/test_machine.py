@@ -1,0 +1,111 @@
+"""The commands doctor and rerun."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexmj.cli import machine
+from hexmj.files import read_netcdf, write_netcdf
+
+FLSS = ["flss", "--velocity", 0.5, "--starts", 20, "--observation-time", "start"]
+
+MINE = """
+import dataclasses
+import hexmj
+
+MINE = dataclasses.replace(hexmj.LDVS, weights=hexmj.Symmetric(p1_i=12.0), name="mine")
+"""
+
+
+@pytest.mark.slow
+def test_this_machine_passes_all_checks(run):
+    code, text, _ = run("doctor", "--json")
+    answer = json.loads(text)
+    assert code == 0 and answer["well"], text
+    assert [check["name"] for check in answer["checks"]] == [*machine.CHECKS]
+    lines = run("doctor")[1].splitlines()
+    assert len(lines) == len(machine.CHECKS) and all(line.startswith("ok ") for line in lines)
+
+
+def fail() -> str:
+    raise OSError("the disk is full")
+
+
+@pytest.mark.parametrize("name", machine.CHECKS)
+def test_a_check_that_fails_names_its_error_and_remedy_and_the_others_follow(run, monkeypatch, name):
+    checks = {other: (lambda: "fine", "none") for other in machine.CHECKS} | {name: (fail, machine.CHECKS[name][1])}
+    monkeypatch.setattr(machine, "CHECKS", checks)
+    code, text, _ = run("doctor", "--json")
+    answer = json.loads(text)
+    assert code == 1 and not answer["well"] and len(answer["checks"]) == len(checks)
+    (wrong,) = (check for check in answer["checks"] if not check["well"])
+    assert wrong["name"] == name and wrong["found"] == "the disk is full" and wrong["remedy"]
+
+
+def test_checks_find_what_is_wrong(monkeypatch):
+    monkeypatch.setattr(machine, "version", lambda name: "0.1")
+    monkeypatch.setattr("hexmj.threads.cores", lambda: 10**6)
+    monkeypatch.setattr(machine, "RENDERING", "raise RuntimeError('no context')")
+    found = {finding.name: finding for finding in machine.examine()}
+    assert not found["versions"].well and "mujoco 0.1" in found["versions"].found
+    assert not found["rendering"].well and "no context" in found["rendering"].found
+
+
+def test_films_are_optional(monkeypatch):
+    def missing() -> str:
+        raise ModuleNotFoundError("No module named 'mediapy'")
+
+    monkeypatch.setattr(machine, "CHECKS", {"films": (missing, "none")})
+    (finding,) = machine.examine()
+    assert finding.well and finding.note
+
+
+@pytest.mark.parametrize("words", [FLSS, ["walk", "--velocity", 0.5, "--observation-time", 5, "--physical"]])
+def test_a_repeated_command_is_equal_to_the_last_bit(run, tmp_path, words):
+    assert run(*words, "--out", tmp_path / "out")[0] == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir() if path.is_file()}
+    code, text, _ = run("rerun", tmp_path / "out", "--json", "--threads", 1)
+    answer = json.loads(text)
+    assert code == 0 and answer["equal"] and answer["versions"] == {} and answer["command"][0] == words[0]
+    assert before == {path: path.read_bytes() for path in before}
+    assert run("rerun", tmp_path / "out" / "manifest.json")[0] == 0
+
+
+def test_a_changed_number_and_another_version_are_named(run, tmp_path):
+    assert run(*FLSS, "--out", tmp_path)[0] == 0
+    data = read_netcdf(tmp_path / "flss.nc")
+    data.flss[:] = np.nextafter(data.flss, 1.0)
+    write_netcdf(data, tmp_path / "flss.nc")
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest["versions"]["mujoco"] = "3.0.0"
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    code, text, _ = run("rerun", tmp_path, "--json")
+    answer = json.loads(text)
+    assert code == 1 and not answer["equal"]
+    assert "flss" in answer["differences"]["flss.nc"] and answer["versions"]["mujoco"][0] == "3.0.0"
+    code, text, _ = run("rerun", tmp_path)
+    assert code == 1 and "flss.nc" in text and "3.0.0" in text
+
+
+@pytest.mark.slow
+def test_an_edited_controller_gives_another_result(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("edited.py").write_text(MINE)
+    assert run(*FLSS, "--controller", "edited.py:MINE", "--out", "out")[0] == 0
+    Path("edited.py").write_text(MINE.replace("12.0", "1.0"))
+    environment = os.environ | {"PYTHONPATH": str(Path(machine.__file__).parents[2])}
+    done = subprocess.run([sys.executable, "-m", "hexmj", "rerun", "out"], env=environment, capture_output=True)
+    assert done.returncode == 1 and b"flss.nc" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["nowhere", "empty", "page.json"])
+def test_a_folder_without_numbers_to_compare_is_refused(run, tmp_path, name):
+    (tmp_path / "empty").mkdir()
+    content = {"command": ["--version"], "settings": {}, "versions": {}, "files": []}
+    (tmp_path / "page.json").write_text(json.dumps(content))
+    assert run("rerun", tmp_path / name)[0] == 2
