@@ -2,12 +2,13 @@
 
 import shlex
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from hexmj.cli.commands import options_of
 
 import hexmj
+from hexmj.cli.main import command
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.files import read_toml
@@ -64,10 +65,15 @@ def test_the_search_begins_with_legs_that_step_by_themselves():
 @pytest.mark.thorough
 def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     found = read_toml(FOUND)
-    problem = options_of(shlex.split(found["command"])[1:])._problem()
+    search: Any = command("search")
+    problem, _ = search.settings(search.parse("search", shlex.split(found["command"])[2:]))
     assert problem.controller(problem.form.vector(EVOLVED)) == EVOLVED
     few = found["fresh_few"]
-    (flss,) = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED}).flss.sel(observation_time=problem.observation_time)
+    (flss,) = (
+        Sample(problem, few["starts"], few["seed"])
+        .verdict({"evolved": EVOLVED})
+        .flss.sel(observation_time=problem.observation_time)
+    )
     assert flss * few["starts"] == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
 
 

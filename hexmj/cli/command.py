@@ -146,8 +146,7 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
 
 def searched(given: SimpleNamespace, names: Iterable[str] | None = None) -> dict[str, list[int]]:
     """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
-    from hexmj.controllers.registry import load_controller
-    from hexmj.controllers.registry import searched_on
+    from hexmj.controllers.registry import load_controller, searched_on
 
     own: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
     chosen = own if names is None else names

@@ -207,19 +207,9 @@ class Search(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, save_manifest
-        from hexmj.search.forms import named_form
-        from hexmj.search.problems import Problem
         from hexmj.search.results import run_search, title
-        from hexmj.search.stages import Effort
 
-        if not 1 <= len(given.velocity) <= 2:
-            raise InputError(f"--velocity = {given.velocity}; expected one velocity, or the two ends of a range")
-        if not given.physical:
-            no_effect(given, PHYSICAL, "without --physical")
-        effort = build(Effort, given)
-        own: dict[str, Any] = {"form": named_form(given.form, effort.beginning, **network_rules(given))}
-        own |= {"low": given.velocity[0], "high": given.velocity[-1]}
-        problem = build(Problem, given, **own, **({} if given.physical else {"conditions": None}))
+        problem, effort = self.settings(given)
         how: Any = {"threads": given.threads, "fresh": given.fresh, "figure": f"convergence.{given.format}"}
         result = run_search(problem, effort, given.out, progress=True, **how)
         result.files.append(save_manifest(given.command, result.settings, result.files, given.out / MANIFEST))
@@ -242,6 +232,21 @@ class Search(Command):
             *result.found.report(problem),
             *map(str, result.files),
         )
+
+    def settings(self, given: SimpleNamespace) -> Any:
+        """Return the problem and the effort that the options describe."""
+        from hexmj.search.forms import named_form
+        from hexmj.search.problems import Problem
+        from hexmj.search.stages import Effort
+
+        if not 1 <= len(given.velocity) <= 2:
+            raise InputError(f"--velocity = {given.velocity}; expected one velocity, or the two ends of a range")
+        if not given.physical:
+            no_effect(given, PHYSICAL, "without --physical")
+        effort = build(Effort, given)
+        own: dict[str, Any] = {"form": named_form(given.form, effort.beginning, **network_rules(given))}
+        own |= {"low": given.velocity[0], "high": given.velocity[-1]}
+        return build(Problem, given, **own, **({} if given.physical else {"conditions": None})), effort
 
 
 @dataclass(frozen=True)
